@@ -15,7 +15,7 @@ from softreach.arm import Loads, Manipulator, designs
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held
 from softreach.workspace import ReachableSolid, ReachableSurface, reachable_set
-from softreach.workspace.lifted_grid import LiftedGrid
+from softreach.workspace.grid import LiftedGrid
 from softreach.workspace.reach import rasterized_set
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -85,6 +85,12 @@ def test_a_finer_grid_agrees_to_the_errors(snapping):
     assert abs(finer.volume - snapping.volume) < finer.volume_error + snapping.volume_error
     assert snapping.volume_error < 0.1 * snapping.volume
     assert finer.hysteresis_share == pytest.approx(snapping.hysteresis_share, abs=0.01)
+
+
+@pytest.mark.large
+def test_of_several_sheets_twice_the_error_asked_for_has_to_do_and_is_not_warned_of():
+    found = reachable_set(loaded("lce", 5), accuracy=0.01)
+    assert 0.01 < found.volume_error / found.volume <= 0.02
 
 
 @pytest.mark.parametrize(

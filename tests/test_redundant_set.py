@@ -14,7 +14,7 @@ from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import ReachableSolid, reachable_set
-from softreach.workspace.redundant import smallest_memory
+from softreach.workspace.cells import smallest_memory
 from softreach.workspace.wrap import damped_steps
 
 

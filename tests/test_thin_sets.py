@@ -24,7 +24,7 @@ from softreach.inverse import solve_inverse
 from softreach.inverse.solutions import Status
 from softreach.rod.rods import as_tip_map
 from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
-from softreach.workspace.redundant import cells_of
+from softreach.workspace.cells import cells_of
 
 
 def two_segments() -> Manipulator:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from softreach.rod.tip_map import Held, TipMap, TipStatus
 from softreach.support.errors import InvalidInput
 from softreach.workspace import (
     ReachableCurve,
+    ReachableRegion,
     ReachableSolid,
     ReachableSurface,
     reachable_set,
@@ -197,6 +198,52 @@ def test_sheets_of_two_bundles_have_the_area_of_all(cusp):
     assert isinstance(surface, ReachableSurface)
     assert surface.area == pytest.approx(cusp_area(1.0), abs=surface.area_error + 0.01)
     assert surface.area_error < 0.05 * surface.area
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class FlatCusp(Cusp):
+    """r = (x, a, 0) of two bundles, in the posture that straight ways from one of some lead to."""
+
+    bounds: tuple = Cusp.bounds[:2]
+    at: np.ndarray = field(default_factory=lambda: np.array([[0.0, -1.0]]))
+    x: np.ndarray = field(default_factory=lambda: np.zeros(1))
+
+    def held(self, gamma, sizes):
+        found = super().held(gamma, sizes)
+        flat = (np.column_stack([tips[:, :2], 0 * tips[:, 2]]) for tips in (found[1], found[4]))
+        tips, end_tips = flat
+        return found._replace(tips=tips, end_tips=end_tips, frames=found.tips[:, :1])
+
+    def continued_from(self, gamma, frames=None):
+        return replace(self, at=gamma, x=frames[:, 0])
+
+    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
+        near = np.linalg.norm(gamma[:, None] - self.at, axis=2).argmin(axis=1)
+        x, way = followed(self.x[near], self.at[near], gamma)
+        lost = way < 1.0
+        tips[:] = np.where(lost[:, None], np.nan, np.column_stack([x, gamma[:, 1], 0 * x]))
+        if slopes is not None:
+            with np.errstate(all="ignore"):
+                steep = 1 / (3 * x**2 - gamma[:, 1])
+            slopes[:] = np.stack(
+                [np.column_stack([steep, x * steep]), np.tile([0.0, 1.0], (len(x), 1)), 0 * gamma],
+                1,
+            )
+        if status is not None:
+            status[:] = np.where(lost, TipStatus.SNAPS, TipStatus.STABLE)
+
+
+def test_a_region_of_a_plane_has_all_sheets_up_to_their_edges(monkeypatch):
+    monkeypatch.setattr("softreach.workspace.postures._MOST_ALONG", 24)
+    region = reachable_set(FlatCusp(), accuracy=0.2)
+    assert isinstance(region, ReachableRegion)
+    assert region.area == pytest.approx(cusp_area(), abs=region.area_error + 0.01)
+    between = 2 * FOLD * 1.05**2.5 / 2.5
+    assert region.hysteresis_share == pytest.approx(between / (2.1 * 2.05), abs=0.01)
+    a = np.array([0.5, 0.8, 0.95])
+    near, gap = (np.stack([share * np.sqrt(a / 3), a, 0 * a], axis=1) for share in (1.1, 0.5))
+    assert region.distance(np.concatenate([near, near * [-1, 1, 1]])).max() < 0.01
+    assert region.distance(gap).min() > 0.1
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -108,7 +108,7 @@ def _starts(
         if places is None:
             raise InvalidInput("places", None, "given, or `start`")
         targets = as_targets("places", places)
-        solutions = solve_inverse(rod, targets)
+        solutions = solve_inverse(rod, targets, from_rest=True)
         return targets, [solution.activations for solution in solutions]
     if places is None:
         gamma = rod.check_activations("start", np.atleast_2d(as_floats("start", start)))

@@ -385,7 +385,7 @@ def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
     atlas = varied(tmp_path / "a.zarr")
     across, up = sheet_axes(atlas)
     assert across.label == "E of rings[0].material (Pa)"
-    assert up.label == "$Z_1/L$ of left"
+    assert up.label == "Z₁/L of left"
     assert plot_metric_map(atlas, "reach_height").get_xlabel() == across.label
 
 

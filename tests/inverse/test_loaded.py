@@ -214,6 +214,63 @@ def test_a_path_ends_by_name_where_its_posture_loses_its_stability(start, ahead)
     assert margins[0] > 2 * margins[1] > 10 * margins[2]
 
 
+@pytest.fixture(scope="module")
+def two_postures():
+    """An arm that holds two postures at some activations: tips of those straight from rest and of
+    others, activations, and the answers."""
+    arm = hanging(0.030)
+    tip_map, n = as_tip_map(arm), 9
+    nodes = tip_map.box.from_free_cube(np.indices((n + 1,) * 3).reshape(3, -1).T / n)
+    held = tip_map.held(nodes, (n + 1,) * 3)
+    assert held is not None
+    gamma = nodes[held.node]
+    apart = np.linalg.norm(held.tips - tip_map.tips(nodes)[held.node], axis=1)
+    others, of_rest = np.flatnonzero(apart > 0.01 * arm.length)[::20], np.flatnonzero(apart < 1e-6)
+    chosen = np.concatenate([of_rest[:: len(of_rest) // 5], others])
+    maps = [tip_map.continued_from(gamma[[k]], held.frames[[k]]) for k in chosen]
+    pairs = zip(maps, chosen, strict=True)
+    tips = np.array([each.tips_and_slopes(gamma[[k]])[0][0] for each, k in pairs])
+    prepared = prepared_map(arm, cells=12)
+    return arm, gamma[chosen], tips, np.isin(chosen, others), solve_inverse(prepared, tips)
+
+
+def test_each_posture_of_an_activation_is_found_from_its_own_tip(two_postures):
+    arm, gamma, tips, is_other, solutions = two_postures
+    assert is_other.sum() >= 3
+    for wanted, tip, other, solution in zip(gamma, tips, is_other, solutions, strict=True):
+        (row,) = np.flatnonzero(np.abs(solution.activations - wanted).max(axis=1) < 1e-6)
+        assert (solution.sheets[row] > 0) == other
+        assert solution.residuals[row] < 1e-8 * arm.length
+        posture = solution.posture(row)
+        shape = configuration(posture, solution.activations[row], 2)
+        assert np.allclose(shape.position.values[-1], tip, atol=1e-6 * arm.length)
+        from_rest = as_tip_map(arm).tips(solution.activations[[row]])[0]
+        assert (np.linalg.norm(from_rest - tip) > 0.01 * arm.length) == other
+
+
+def test_paths_and_drags_begin_in_the_posture_of_a_solution(two_postures):
+    arm, gamma, tips, is_other, solutions = two_postures
+    k = np.flatnonzero(is_other)[0]
+    (row,) = np.flatnonzero(np.abs(solutions[k].activations - gamma[k]).max(axis=1) < 1e-6)
+    posture = solutions[k].posture(row)
+    inside = gamma[k] + 0.02 * (arm.bounds.mean(axis=1) - gamma[k])
+    ahead = posture.tips(inside[None])[0]
+    track = track_path(posture, [tips[k], ahead], gamma[k])
+    assert track.attrs["end"] == ""
+    assert np.allclose(track.activation.values[1], inside, atol=1e-6)
+    dragged = Drag(posture).to(tuple(gamma[k]), ahead)
+    assert dragged is not None
+    assert dragged.gap == 0.0
+    assert np.allclose(dragged.activation, inside, atol=1e-6)
+
+
+def test_only_postures_from_rest_are_given_where_no_others_are_asked_for(two_postures):
+    arm, gamma, tips, is_other, _ = two_postures
+    k = np.flatnonzero(is_other)[:1]
+    solutions = solve_inverse(prepared_map(arm, cells=12), tips[k], from_rest=True)
+    assert not (np.abs(solutions.activations - gamma[k]).max(axis=1) < 1e-3).any()
+
+
 def test_solutions_say_where_the_arm_leans_to_one_of_two_sides():
     """Both tendons pulled alike keep a hanging tentacle in its plane, up to the pitchfork."""
     arm = Manipulator.load(EXAMPLES / "tentacle.toml")

@@ -213,7 +213,7 @@ def searches(design, n):
     gamma, near, start = rng.uniform(rod.box.low, rod.box.high, (3, n, rod.box.bundles))
     targets = rod.tips(gamma)
     targets[::7] *= 1.2
-    return rod, Request(targets=targets, residual=1e-10, allowance=1e-6, near=near), start
+    return rod, Request(targets=targets, residual=1e-10, reach_tol=1e-6, near=near), start
 
 
 @pytest.mark.parametrize("design", [designs.redundant_trunk, six_bundles])

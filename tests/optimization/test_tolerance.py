@@ -15,7 +15,7 @@ from softreach.requirements import Box, Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.workspace import ReachableSolid, reachable_set
-from softreach.workspace.moving_boundary import MovingBoundary
+from softreach.workspace.gradient import MovingBoundary
 
 TRUNK = designs.minimal_trunk()
 NARROW = TRUNK.with_bounds((-0.9, -0.3))

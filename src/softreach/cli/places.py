@@ -64,7 +64,8 @@ def solve(
     solutions = solve_inverse(arm, points, within=reach, family=count)
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
-        console.json([record(vars(one), arm.length, *lengths) for one in solutions])
+        known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]
+        console.json([record(each, arm.length, *lengths) for each in known])
         return
     for solution in solutions:
         _print(solution, arm, count)
@@ -76,12 +77,13 @@ def _print(solution: Solution, arm: Manipulator, family: int) -> None:
     if len(solution) and solution.gap > _EXACT * arm.length:
         status += f" within {unit.rounded(solution.gap)}"
     console.line(f"target {unit.place(solution.target)}: {status}")
-    rows = zip(
-        solution.activations, solution.residuals, solution.conditions, solution.margins, strict=True
-    )
-    for gamma, residual, condition, margin in rows:
+    numbers = solution.residuals, solution.conditions, solution.margins, solution.sheets
+    for gamma, residual, condition, margin, sheet in zip(
+        solution.activations, *numbers, strict=True
+    ):
         quality = f"residual {unit.rounded(residual, digits='.1e')}"
         quality += f", condition {condition:.3g}, margin {margin:.3g}" if gamma.size else ""
+        quality += ", in a posture that it does not take straight from rest" if sheet else ""
         console.line(f"  {activation_text(arm, gamma)}  ({quality})")
     if not len(solution):
         least = unit.rounded(solution.gap_bound)

@@ -2,13 +2,7 @@
 
 import lazy_loader
 
-from softreach.cloud.clouds import (
-    compute_cloud,
-    design_of,
-    open_cloud,
-    save_cloud,
-    tip_map_of,
-)
+from softreach.cloud.clouds import compute_cloud, design_of, open_cloud, save_cloud, tip_map_of
 
 __all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
 

@@ -51,7 +51,7 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined, joined_by, rows
 from softreach.workspace.search import CLOSELY, nearest_tips
 
-__all__ = ["distinct", "every_branch"]
+__all__ = ["distinct", "every_branch", "with_other_sheets"]
 
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
@@ -92,6 +92,25 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
             parallel.in_order(partial(_alone, prepared, request, chosen) for chosen in sets)
         )
     return joined_by("target", parts)
+
+
+def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
+    """The roots, and after those of each target the ones in other postures than from rest."""
+    found = [no_roots(prepared.tip_map)]
+    for number, sheet in enumerate(prepared.sheets, 1):
+        target, start = sheet.starts.starts(request.targets)
+        ends = descend(sheet.tip_map, request.targets[target], start, request.residual)
+        part = roots_at(sheet.tip_map, request.targets, target, ends.gamma)
+        part = part._replace(sheet=np.full(len(target), number))
+        found.append(rows(part, part.residual <= request.reach_tol))
+    others = joined_by("target", found)
+    if not len(others.target):
+        return roots
+    # A sheet goes on into activations at which its posture is that from rest.
+    at_rest = roots_at(prepared.tip_map, request.targets, others.target, others.gamma)
+    same = at_rest.residual <= request.reach_tol
+    roots = distinct(prepared, request, roots.joined(rows(at_rest, same)))
+    return roots.joined(distinct(prepared, request, rows(others, ~same)))
 
 
 def _sets(order: Index, size: int) -> list[Index]:
@@ -150,12 +169,15 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     trial, goal = search.trial[converged], goal[converged]
     gamma = tip_map.box.clip(trial)
+    tips = placed(tip_map, gamma)
     roots = Roots(
         starts.target[converged],
         gamma,
+        tips,
         search.slope[converged],
-        np.linalg.norm(placed(tip_map, gamma) - goal, axis=1),
+        np.linalg.norm(tips - goal, axis=1),
         starts.cell[converged],
+        np.zeros(len(converged), np.int64),
     )
     within = roots.residual <= request.residual
     over = ~within & (gamma != trial).any(axis=1)
@@ -166,17 +188,17 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
 def _moved_to_bounds(tip_map: TipMap, request: Request, roots: Roots, goal: Array) -> Roots:
     """Step 8: those of roots beyond bounds that miss little enough on the bounds.
 
-    What moves a tip by the allowance moves a root by that over the smallest singular value, and to
+    What moves a tip by the reach_tol moves a root by that over the smallest singular value, and to
     move it back to the bounds moves the tip by no more than the condition number as much.
     """
-    near = roots.residual <= request.allowance * conditions(roots.slope)
+    near = roots.residual <= request.reach_tol * conditions(roots.slope)
     roots, goal = rows(roots, near), goal[near]
     if not len(goal):
         return roots
     ends = descend(tip_map, goal, roots.gamma, request.residual)
-    slope = tip_map.tips_and_slopes(ends.gamma)[1]
-    roots = roots._replace(gamma=ends.gamma, slope=slope, residual=ends.distance)
-    return rows(roots, roots.residual <= request.allowance)
+    tip, slope = tip_map.tips_and_slopes(ends.gamma)
+    roots = roots._replace(gamma=ends.gamma, tip=tip, slope=slope, residual=ends.distance)
+    return rows(roots, roots.residual <= request.reach_tol)
 
 
 def _improved(tip_map: TipMap, goal: Array, starts: Starts) -> Array:

@@ -18,7 +18,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask, rows
 
 _REACH = 1.5  # widths of a cell within which a root is looked for
-_MOST = 16  # searches for one target
+_MOST, _MOST_OF_SHEET = 16, 4  # searches for one target
 _AT_ONCE = 1 << 20  # pairs of a target and a vertex
 _CORNERS = corner_bits(3)
 _TORN = 0.05  # interpolation error in L beyond which corners are taken to be on different branches
@@ -113,6 +113,8 @@ class TornCells(NamedTuple):
     """Their tips [m], shape (n, 3)."""
     inverse: Array
     """Inverses of ∂r/∂γ there, in widths of a cell [1/m], shape (n, 3, 3)."""
+    most: int = _MOST
+    """Searches for one target."""
 
     @classmethod
     def at(cls, vertices: _Vertices, widths: Array) -> TornCells:
@@ -121,6 +123,13 @@ class TornCells(NamedTuple):
         if len(inverse):
             inverse[:] = np.linalg.pinv(vertices.slope * widths)
         return cls(vertices.gamma, vertices.tip, inverse)
+
+    @classmethod
+    def of_sheet(cls, tip_map: TipMap, gamma: Array, widths: Array) -> TornCells:
+        """Places (n, 3) on a sheet in cells of these widths; its steep edges are seen from afar."""
+        vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
+        found = rows(vertices, np.isfinite(vertices.tip[:, 0]))
+        return cls.at(found, 2.0 * widths)._replace(most=_MOST_OF_SHEET)
 
     def starts(self, targets: Array) -> tuple[Index, Array]:
         """Number of the target and activation of each start, sorted by target."""
@@ -136,7 +145,7 @@ class TornCells(NamedTuple):
         """Pairs of a target and a vertex that sees it near, the nearest few of each target."""
         away = targets[:, None] - self.tip
         step = np.abs(np.einsum("nij,tnj->tni", self.inverse, away)).max(axis=2)
-        count = min(_MOST, step.shape[1])
+        count = min(self.most, step.shape[1])
         vertex = np.argpartition(step, count - 1, axis=1)[:, :count]
         near = np.take_along_axis(step, vertex, axis=1) <= _REACH
         return np.nonzero(near)[0], vertex[near]

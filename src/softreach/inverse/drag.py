@@ -43,10 +43,14 @@ class Drag:
     to the side from which it was entered. With more, each step changes the activation least.
     """
 
-    def __init__(self, arm: Manipulator) -> None:
-        """Prepare an arm; with fewer than three free bundles the tip keeps to what they reach."""
-        self.arm = arm
+    def __init__(self, arm: Manipulator | TipMap) -> None:
+        """Prepare an arm; with fewer than three free bundles the tip keeps to what they reach.
+
+        Args:
+            arm: The design, or the tip map of the posture that it is in, as of `Solution.posture`.
+        """
         self._prepared: PreparedMap = prepared_map(arm)
+        self.arm = self._prepared.whole.arm
         self._rod = self._prepared.tip_map
         self._tracker = Continuation(self._rod, _RESIDUAL * self._rod.length)
         self._side = 0.0
@@ -115,4 +119,4 @@ class Drag:
         gap = float(np.linalg.norm(point.tip - target))
         within = tuple(float(value) for value in activation)
         self._last, held = (within, point), all_inputs(point.tip_map)
-        return Dragged(within, point.tip, 0.0 if gap <= self._tracker.allowance else gap, held)
+        return Dragged(within, point.tip, 0.0 if gap <= self._tracker.reach_tol else gap, held)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.nearest import descend
-from softreach.inverse.request import allowance, as_activations, as_residual, as_targets
+from softreach.inverse.request import as_activations, as_residual, as_targets, reach_tol
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles
 from softreach.rod.tip_map import TipMap
@@ -117,7 +117,7 @@ class Continuation:
     def __init__(self, tip_map: TipMap, residual: float) -> None:
         """Set up for tips within `residual` [m] of their points, or as near as tips can tell."""
         self.tip_map, self.box, self.residual = tip_map, tip_map.box, residual
-        self.allowance = allowance(tip_map, residual)
+        self.reach_tol = reach_tol(tip_map, residual)
         self._torn = False  # whether the last correction met a place where the arm snaps
 
     def at(self, gamma: Array, tip_map: TipMap | None = None) -> BranchPoint:
@@ -206,7 +206,7 @@ class Continuation:
         """Nearest to the last of some places (k, 3), if all are as near as tips can tell."""
         start = np.tile(gamma, (len(targets), 1))
         ends = descend(tip_map, targets, start, self.residual)
-        if not (ends.distance <= self.allowance).all():
+        if not (ends.distance <= self.reach_tol).all():
             return None
         return self.at(ends.gamma[-1], tip_map)
 
@@ -309,7 +309,9 @@ def _least_norm(slope: Array, moving: Mask) -> Array:
 def _best_start(
     tip_map: TipMap, tracker: Continuation, target: Array, residual: float
 ) -> BranchPoint | None:
-    solution = solve_inverse(tip_map, target[None], residual_over_length=residual)[0]
+    solution = solve_inverse(tip_map, target[None], residual_over_length=residual, from_rest=True)[
+        0
+    ]
     if not len(solution):
         return None
     best = solution.activations[solution.conditions.argmin()] / tip_map.measures

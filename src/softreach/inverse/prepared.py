@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.cells import (
-    ImageLeaves,
-    TornCells,
-    activation_cells,
-    image_tree,
-)
+from softreach.inverse.cells import ImageLeaves, TornCells, activation_cells, image_tree
 from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
@@ -24,6 +20,7 @@ from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
+from softreach.workspace.postures import all_postures
 
 __all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 
@@ -31,6 +28,18 @@ __all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
 _CELLS = 32
 _FEW = 500  # targets; to divide space for more takes less time than not to
 _COARSE = 1e-3  # tolerance of the map that searches begin with
+_NODES = 16  # cells along each axis of the grid on which sheets of postures are found
+
+
+class Sheet(NamedTuple):
+    """Postures to which activations do not lead straight from rest."""
+
+    whole: TipMap
+    """The tip map of all bundles that goes on from the nearest of them."""
+    tip_map: TipMap
+    """That of the free bundles."""
+    starts: TornCells
+    """Of searches."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +85,20 @@ class PreparedMap:
     @lazy
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
         return activation_cells(self.tip_map, self.cells)
+
+    @lazy
+    def sheets(self) -> list[Sheet]:
+        """Sheets of other postures than those from rest, of a loaded arm of three free bundles.
+
+        They are known at the nodes of a grid: one that is narrower than its cells may be missing.
+        """
+        every = all_postures(self.whole, _NODES) if self.dimension == 3 else None
+        sheets, box = list[Sheet](), self.tip_map.box
+        for whole, gamma in [] if every is None else every.sheets:
+            tip_map, known = free_bundles(whole), gamma[:, self.whole.box.free]
+            starts = TornCells.of_sheet(tip_map, known, box.widths / _NODES)
+            sheets.append(Sheet(whole, tip_map, starts))
+        return sheets
 
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""

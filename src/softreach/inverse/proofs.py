@@ -20,7 +20,7 @@ _MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforde
 _COARSE = 70_000  # cells that all targets share
 _ROUNDING = 1e-12  # of tips, in L
 _BLOCK = 16_384  # cells at once
-_ENOUGH = 0.2  # of the way from the allowance to the gap: a bound that large ends the search
+_ENOUGH = 0.2  # of the way from the reach_tol to the gap: a bound that large ends the search
 _MOST_EXCLUSION_CELLS = 20_000  # examined for one target
 _MOST_OF_THREE = 4_000  # the same with three bundles or fewer, where a proof needs far fewer
 _TARGET_BLOCK = 10  # targets at once
@@ -28,7 +28,7 @@ _SOFTNESS = 1e-6  # of the linear problem that says in which direction the targe
 
 
 def gap_bounds(
-    tip_map: TipMap, coarse: CoarseCells, targets: Array, gap: Array, allowance: float
+    tip_map: TipMap, coarse: CoarseCells, targets: Array, gap: Array, reach_tol: float
 ) -> Array:
     """A lower bound of the distance of each target from everything that the box reaches.
 
@@ -41,7 +41,7 @@ def gap_bounds(
         coarse: Its cells.
         targets: Shape (t, 3) [m].
         gap: Distance of the best place known from each [m], shape (t,).
-        allowance: Distance that a bound must exceed to prove anything of the arm itself [m]; every
+        reach_tol: Distance that a bound must exceed to prove anything of the arm itself [m]; every
             gap does.
 
     Returns:
@@ -51,7 +51,7 @@ def gap_bounds(
         return gap.copy()  # one place is reached
     from_base = np.linalg.norm(targets - np.array(tip_map.pose.position), axis=1)
     bounds = np.maximum(from_base - tip_map.farthest(), 0.0)
-    enough = allowance + _ENOUGH * (gap - allowance)
+    enough = reach_tol + _ENOUGH * (gap - reach_tol)
 
     def prove(rows: slice) -> None:
         proved = _exclusion_of_block(tip_map, coarse, targets[rows], enough[rows])

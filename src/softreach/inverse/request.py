@@ -11,13 +11,7 @@ from numpy.typing import ArrayLike
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
-from softreach.support.arrays import (
-    Array,
-    Index,
-    as_floats,
-    as_points,
-    check_finite,
-)
+from softreach.support.arrays import Array, Index, as_floats, as_points, check_finite
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import unit_names
 from softreach.support.units import TYPED, lengths_in
@@ -36,7 +30,7 @@ class Request:
     """Wanted positions of the tip [m], shape (t, 3)."""
     residual: float
     """|tip - target| at which a search has found its target [m]."""
-    allowance: float
+    reach_tol: float
     """|tip - target| that the error of tips leaves open, or that is asked for [m]; `residual` at
     least. No target so near to a tip of the arm is out of reach."""
     near: Array
@@ -49,6 +43,8 @@ class Request:
     """Activations wanted for each target where there are infinitely many."""
     seed: int = 0
     """Seed of the random activations that the others stay near to."""
+    from_rest: bool = False
+    """True for postures of loaded arms to which activations lead from rest, and no others."""
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""
@@ -90,7 +86,7 @@ def as_residual(residual_over_length: float) -> float:
     return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))
 
 
-def allowance(tip_map: TipMap, residual: float) -> float:
+def reach_tol(tip_map: TipMap, residual: float) -> float:
     """|tip - target| [m] within which a target is reached: the error of tips, or a wider residual.
 
     Args:

@@ -31,12 +31,16 @@ class Roots(NamedTuple):
     """Number of the target, shape (n,)."""
     gamma: Array
     """Activations [-], shape (n, m)."""
+    tip: Array
+    """Tips there [m], shape (n, 3)."""
     slope: Array
     """∂r/∂γ there [m], shape (n, 3, m)."""
     residual: Array
     """|tip - target| [m], shape (n,)."""
     cell: Index
     """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
+    sheet: Index
+    """Number of its sheet in `PreparedMap.sheets`, shape (n,)."""
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
@@ -51,7 +55,8 @@ class Roots(NamedTuple):
 def no_roots(tip_map: TipMap) -> Roots:
     """An empty set of roots."""
     none, m = np.empty(0, np.int64), tip_map.box.bundles
-    return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none)
+    places = np.empty((0, m)), np.empty((0, 3)), np.empty((0, 3, m))
+    return Roots(none, *places, np.empty(0), none, none)
 
 
 def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
@@ -65,7 +70,8 @@ def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Ro
     """
     tips, slopes = tip_map.tips_and_slopes(gamma)
     residual = np.linalg.norm(tips - targets[target], axis=1)
-    return Roots(target, gamma, slopes, residual, np.full(len(target), -1))
+    cell, sheet = np.full(len(target), -1), np.zeros(len(target), np.int64)
+    return Roots(target, gamma, tips, slopes, residual, cell, sheet)
 
 
 def placed(tip_map: TipMap, gamma: Array) -> Array:

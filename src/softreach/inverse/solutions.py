@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import TYPE_CHECKING, Self, overload
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.tip_map import Frame
+from softreach.rod.tip_map import Frame, TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
@@ -53,6 +53,9 @@ class Solution:
     """Distance to the nearest bound of a free bundle, relative to its range, shape (k,)."""
     leans: Mask
     """Mask of those whose posture leans to one of two sides, under loads, shape (k,)."""
+    sheets: Index
+    """Number of the tip map that holds each; 0 for postures that activations lead to straight from
+    rest, shape (k,)."""
     nearest: Array
     """The reachable point nearest to the target that was found [m], shape (3,)."""
     nearest_activation: Array
@@ -62,9 +65,22 @@ class Solution:
     gap_bound: float
     """A proved lower bound of the distance to all tips within the bounds [m], more than their
     error; 0 if nothing is proved."""
+    tip_maps: tuple[TipMap, ...]
+    """That of postures from rest, and those of other sheets of postures that loads leave."""
 
     def __len__(self) -> int:
         return len(self.activations)
+
+    def posture(self, number: int = 0) -> TipMap:
+        """The tip map of the arm in the posture of one of the activations.
+
+        `configuration`, `track_path` and `Drag` begin there. Without loads it is that of the arm.
+
+        Args:
+            number: Row of `activations`.
+        """
+        tip_map = self.tip_maps[self.sheets[number]]
+        return tip_map.continued_from(self.activations[number][None])
 
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.target)
@@ -81,16 +97,10 @@ class Solution:
 class Solutions(Sequence[Solution]):
     """One `Solution` for each target, stored as flat arrays so that a million cost little."""
 
-    arm: Manipulator
-    """The design."""
-    frame: Frame
-    """The frame in which places are told."""
-    bundles: tuple[str, ...]
-    """Names of the bundles that were solved for."""
     targets: Array
     """Shape (t, 3) [m]."""
-    offsets: Index
-    """Activations of target i are rows offsets[i]:offsets[i + 1], shape (t + 1,)."""
+    statuses: NDArray[np.int8]
+    """`Status` of each target, shape (t,)."""
     activations: Array
     """Shape (n, bundles) [unit of each]."""
     residuals: Array
@@ -101,8 +111,8 @@ class Solutions(Sequence[Solution]):
     """Shape (n,) [-]."""
     leans: Mask
     """Shape (n,)."""
-    statuses: NDArray[np.int8]
-    """`Status` of each target, shape (t,)."""
+    sheets: Index
+    """Numbers of tip maps, shape (n,)."""
     nearest: Array
     """The nearest reachable points, shape (t, 3) [m]."""
     nearest_activations: Array
@@ -111,6 +121,16 @@ class Solutions(Sequence[Solution]):
     """Shape (t,) [m]."""
     gap_bounds: Array
     """Proved lower bounds of the distance to all tips, 0 if nothing is proved, shape (t,) [m]."""
+    offsets: Index
+    """Activations of target i are rows offsets[i]:offsets[i + 1], shape (t + 1,)."""
+    arm: Manipulator
+    """The design."""
+    frame: Frame
+    """The frame in which places are told."""
+    bundles: tuple[str, ...]
+    """Names of the bundles that were solved for."""
+    tip_maps: tuple[TipMap, ...]
+    """That of postures from rest, and those of other sheets."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -118,15 +138,10 @@ class Solutions(Sequence[Solution]):
         if len(parts) == 1:
             return parts[0]
         counts = np.concatenate([part.counts for part in parts])
-        return cls(
-            arm=parts[0].arm,
-            frame=parts[0].frame,
-            bundles=parts[0].bundles,
+        return replace(
+            max(parts, key=lambda part: len(part.tip_maps)),
             offsets=np.concatenate([[0], np.cumsum(counts)]),
-            **{
-                name: np.concatenate([getattr(part, name) for part in parts])
-                for name in (*_PER_TARGET, *_PER_SOLUTION)
-            },
+            **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS},
         )
 
     def in_units_of(self, measures: Array) -> Self:
@@ -173,68 +188,48 @@ class Solutions(Sequence[Solution]):
         return f"<Solutions for {targets}{': ' if parts else ''}{', '.join(parts)}>"
 
     def _one(self, i: int) -> Solution:
-        rows = slice(self.offsets[i], self.offsets[i + 1])
-        return Solution(
-            target=self.targets[i],
-            status=Status(self.statuses[i]),
-            activations=self.activations[rows],
-            residuals=self.residuals[rows],
-            conditions=self.conditions[rows],
-            margins=self.margins[rows],
-            leans=self.leans[rows],
-            nearest=self.nearest[i],
-            nearest_activation=self.nearest_activations[i],
-            gap=float(self.gaps[i]),
-            gap_bound=float(self.gap_bounds[i]),
-        )
+        rows = {"target": i, "solution": slice(self.offsets[i], self.offsets[i + 1])}
+        target, status, *others = self._of(rows).values()
+        return Solution(target, Status(status), *others, tip_maps=self.tip_maps)
+
+    def _of(self, rows: Mapping[str, Any]) -> dict[str, Any]:
+        """Columns of some targets and solutions."""
+        return {name: getattr(self, name)[rows[axes[0]]] for name, (_, axes, _) in _COLUMNS.items()}
 
     def _several(self, chosen: Index) -> Solutions:
         counts = self.counts[chosen]
         offsets = np.concatenate([[0], np.cumsum(counts)])
         inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
-        rows = np.repeat(self.offsets[chosen], counts) + inside
-        return Solutions(
-            arm=self.arm,
-            frame=self.frame,
-            bundles=self.bundles,
-            offsets=offsets,
-            **{name: getattr(self, name)[chosen] for name in _PER_TARGET},
-            **{name: getattr(self, name)[rows] for name in _PER_SOLUTION},
-        )
+        rows = {"target": chosen, "solution": np.repeat(self.offsets[chosen], counts) + inside}
+        return replace(self, offsets=offsets, **self._of(rows))
 
     def to_dataset(self) -> xr.Dataset:
         """Labelled arrays over `target` and over `solution`, whose `target_of` names its target."""
         import xarray as xr
 
-        meanings = " ".join(f"{status.value}={status.name.lower()}" for status in Status)
-        per_target, per_solution = ("target", "bundle"), ("solution", "bundle")
         units = activation_attributes(self.arm, self.bundles)
-        return xr.Dataset(
-            {
-                "position": (("target", "axis"), self.targets, {"units": "m"}),
-                "status": ("target", self.statuses, {"units": "1", "meanings": meanings}),
-                "nearest": (("target", "axis"), self.nearest, {"units": "m"}),
-                "nearest_activation": (per_target, self.nearest_activations, units),
-                "gap": ("target", self.gaps, {"units": "m"}),
-                "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
-                "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
-                "activation": (per_solution, self.activations, units),
-                "residual": ("solution", self.residuals, {"units": "m"}),
-                "condition": ("solution", self.conditions, {"units": "1"}),
-                "margin": ("solution", self.margins, {"units": "1"}),
-                "leans": ("solution", self.leans),
-            },
-            {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)},
-            provenance(self.arm, self.frame),
-        )
+        variables = {
+            name: (axes, getattr(self, field), units if "bundle" in axes else about)
+            for field, (name, axes, about) in _COLUMNS.items()
+        }
+        variables["target_of"] = ("solution",), np.repeat(np.arange(len(self)), self.counts), {}
+        coordinates = {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)}
+        return xr.Dataset(variables, coordinates, provenance(self.arm, self.frame))
 
 
-_PER_TARGET = (
-    "targets",
-    "statuses",
-    "nearest",
-    "nearest_activations",
-    "gaps",
-    "gap_bounds",
-)
-_PER_SOLUTION = ("activations", "residuals", "conditions", "margins", "leans")
+_MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in Status)
+_COLUMNS: dict[str, tuple[str, tuple[str, ...], dict[str, str]]] = {
+    "targets": ("position", ("target", "axis"), {"units": "m"}),
+    "statuses": ("status", ("target",), {"units": "1", "meanings": _MEANINGS}),
+    "activations": ("activation", ("solution", "bundle"), {}),
+    "residuals": ("residual", ("solution",), {"units": "m"}),
+    "conditions": ("condition", ("solution",), {"units": "1"}),
+    "margins": ("margin", ("solution",), {"units": "1"}),
+    "leans": ("leans", ("solution",), {}),
+    "sheets": ("sheet", ("solution",), {"long_name": "0 for postures straight from rest"}),
+    "nearest": ("nearest", ("target", "axis"), {"units": "m"}),
+    "nearest_activations": ("nearest_activation", ("target", "bundle"), {}),
+    "gaps": ("gap", ("target",), {"units": "m"}),
+    "gap_bounds": ("gap_bound", ("target",), {"units": "m"}),
+}
+"""Fields of `Solutions` in the order of those of `Solution`, as they are stored."""

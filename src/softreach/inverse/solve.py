@@ -6,33 +6,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.branches import distinct, every_branch
+from softreach.inverse.branches import distinct, every_branch, with_other_sheets
 from softreach.inverse.direction import compromises
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.nearest import nearest, nearest_from
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import (
-    Request,
-    allowance,
-    as_activations,
-    as_residual,
-    as_targets,
-)
-from softreach.inverse.roots import (
-    Roots,
-    conditions,
-    nearly_singular_roots,
-    no_roots,
-    placed,
-    roots_at,
-)
+from softreach.inverse.request import Request, as_activations, as_residual, as_targets, reach_tol
+from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import as_tip_map
+from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
-from softreach.support.arguments import as_integer, as_number
+from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Mask, as_directions, joined, rows
 from softreach.support.errors import Range
 from softreach.workspace.search import Nearest
@@ -56,6 +43,7 @@ def solve_inverse(
     direction_weight: float = 0.1,
     family: int = 1,
     seed: int = 0,
+    from_rest: bool = False,
     tol: float = 1e-6,
     frame: Frame = "world",
     point: str | None = None,
@@ -69,9 +57,11 @@ def solve_inverse(
     proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
 
-    Of an arm under loads every activation given holds the arm in its posture; `leans` says where it
-    leans there to one of two sides. Nothing is proved, so that a target that no search reaches is
-    `NOT_FOUND`.
+    Of an arm under loads every activation given holds the arm in a posture; `leans` says where it
+    leans there to one of two sides. Three free bundles may hold several at one activation, which
+    the arm comes to by several ways: all are searched, those to which the activations lead straight
+    from rest come first, and `Solution.posture` is the tip map that goes on from each. Nothing is
+    proved, so that a target that no search reaches is `NOT_FOUND`.
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
@@ -93,6 +83,8 @@ def solve_inverse(
             the others being those nearest to random activations and apart by a thousandth of a
             range; fewer where no more of them are found.
         seed: Seed of these.
+        from_rest: Of an arm under loads: only postures to which activations lead straight from
+            rest, or from where the arm is in whose tip map is given.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
             keeps its own.
@@ -116,12 +108,13 @@ def solve_inverse(
     request = Request(
         targets=points,
         residual=residual,
-        allowance=max(allowance(prepared.whole, residual), within),
+        reach_tol=max(reach_tol(prepared.whole, residual), within),
         near=as_activations("near", preferred, box, len(points)) / prepared.measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
         family=as_integer("family", family, 1, 10_000),
         seed=as_integer("seed", seed, 0, 2**63),
+        from_rest=as_flag("from_rest", from_rest),
     )
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
@@ -136,6 +129,8 @@ def solve_inverse(
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     """All roots, and the nearest points to the targets that have none."""
     roots = every_branch(prepared, request)
+    if not request.from_rest:
+        roots = with_other_sheets(prepared, request, roots)
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
@@ -170,14 +165,14 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
 
 def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
     """Lower bounds of the distance of targets to all tips; 0 where they prove nothing."""
-    bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.allowance)
+    bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.reach_tol)
     # Where the position yields to a direction, the gap says nothing of what can be reached.
     yielding = request.direction is not None and prepared.dimension <= 3
     if len(out) and not yielding and (prepared.proves or not prepared.dimension):
-        gaps = request.targets[out], gap[out], request.allowance
+        gaps = request.targets[out], gap[out], request.reach_tol
         bounds[out] = gap_bounds(prepared.tip_map, prepared.coarse_cells, *gaps)
     # Within the error of the tips, what is true of them need not be true of the arm.
-    return np.where(bounds > request.allowance, bounds, 0.0)
+    return np.where(bounds > request.reach_tol, bounds, 0.0)
 
 
 def _solutions(
@@ -192,7 +187,7 @@ def _solutions(
     missing = roots.missing(count)
     if bounds is None:
         bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
-    hit = closest.distance <= request.allowance
+    hit = closest.distance <= request.reach_tol
     roots = roots.joined(roots_at(tip_map, request.targets, missing[hit], closest.gamma[hit]))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual
@@ -207,13 +202,15 @@ def _solutions(
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
     points = request.targets.copy()
-    off = reached[gaps[reached] > request.residual]
-    points[off] = placed(tip_map, gamma[off])
+    off = gaps[reached] > request.residual
+    points[reached[off]] = roots.tip[first[off]]
     points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
     activations = prepared.whole.box.with_fixed(roots.gamma)
+    maps = [prepared, *prepared.sheets] if roots.sheet.any() else [prepared]
     return Solutions(
         arm=prepared.whole.arm,
+        tip_maps=tuple(all_inputs(each.whole) for each in maps),
         frame=prepared.whole.frame,
         bundles=prepared.whole.box.names,
         targets=request.targets,
@@ -223,6 +220,7 @@ def _solutions(
         conditions=conditions(roots.slope),
         margins=tip_map.box.margin(roots.gamma),
         leans=_leans(prepared.whole, activations),
+        sheets=roots.sheet,
         statuses=statuses,
         nearest=points,
         nearest_activations=prepared.whole.box.with_fixed(gamma),

@@ -18,10 +18,9 @@ from softreach.support.arguments import as_mapping, as_number
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.quantity import quantity
-from softreach.workspace.gradient import volume_gradient
-from softreach.workspace.moving_boundary import MovingBoundary
+from softreach.workspace.gradient import MovingBoundary, volume_gradient
 from softreach.workspace.reach import reachable_set
-from softreach.workspace.solid import ReachableSolid
+from softreach.workspace.reachable import ReachableSolid
 
 _QUANTILE = 0.05  # share of arms that are worse than the number given for them
 _NORMAL = 1.6448536269514722  # the 95 % quantile of the normal distribution

@@ -23,8 +23,8 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, counted, no_warnings
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES, reachable_set
+from softreach.workspace.reachable import ReachableSolid
 from softreach.workspace.search import nearest_tips
-from softreach.workspace.solid import ReachableSolid
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -339,7 +339,7 @@ def _places(target: Target) -> Array:
 def _starts(first: FirstOrder, target: Target) -> list[Array]:
     """Places of the cube to search from: of all solutions of the design, and of a grid."""
     arm, places = first.deviations.arm, _places(target)
-    box, solutions = as_tip_map(arm).box, solve_inverse(arm, places)
+    box, solutions = as_tip_map(arm).box, solve_inverse(arm, places, from_rest=True)
     rows = [solutions.nearest_activations]
     for number in range(int(solutions.counts.max(initial=0))):
         has = solutions.counts > number

@@ -71,9 +71,6 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
         metric: Which one.
         ax: Axes to draw in; None for a new figure.
 
-    Returns:
-        The axes.
-
     Raises:
         InvalidInput: No such metric, or no two parameters.
         MissingExtra: matplotlib is not installed.

@@ -78,11 +78,11 @@ class Inputs:
             self, scale=tuple(float(measures[names.index(name)]) for name in self.own_box.names)
         )
 
-    def continued_from(self, activation: Array) -> Inputs:
-        """Those of an arm that is in its posture at an activation of the rod (1, bundles)."""
+    def continued_from(self, activation: Array, frames: Array | None = None) -> Inputs:
+        """Those of an arm in its posture at activations of the rod, see `TipMap.continued_from`."""
         if self.driving is None or self.driving.lengths is None:
             return self
-        lengths = self.driving.lengths.continued_from(activation)
+        lengths = self.driving.lengths.continued_from(activation, frames)
         return replace(self, driving=replace(self.driving, lengths=lengths))
 
     @lazy

@@ -117,14 +117,14 @@ class ArmMap(TipMap):
         if self.inputs.driving is not None:
             self.inputs.activations(self.box.low[None])
 
-    def continued_from(self, gamma: Array) -> TipMap:
+    def continued_from(self, gamma: Array, frames: Array | None = None) -> TipMap:
         if not self.supports_unstable:
             return self
         activation = self.inputs.activations(gamma)
-        rod = self.rod.continued_from(activation)
+        rod = self.rod.continued_from(activation, frames)
         if rod is self.rod:
             return self
-        return replace(self, rod=rod, inputs=self.inputs.continued_from(activation))
+        return replace(self, rod=rod, inputs=self.inputs.continued_from(activation, frames))
 
     def fill(
         self,

@@ -183,10 +183,14 @@ class TipMap(ABC):
     def prepare(self) -> None:  # noqa: B027
         """Compute what every sample needs, once for all threads."""
 
-    def continued_from(self, gamma: Array) -> TipMap:
+    def continued_from(self, gamma: Array, frames: Array | None = None) -> TipMap:
         """The map of an arm that is in its posture at γ (1, bundles), and moves straight from it.
 
         Itself for arms without loads, which have one shape at every activation.
+
+        Args:
+            gamma: Shape (k, bundles); of several postures the arm moves from that of the nearest.
+            frames: Those of `held` at these activations, for other postures than its own.
         """
         return self
 
@@ -402,6 +406,8 @@ class Held(NamedTuple):
     """Tips where these end [m], shape (e, 3)."""
     is_doubled: NDArray[np.bool_]
     """Mask of nodes at which two are held on the side of the posture, shape (nodes,)."""
+    frames: Array | None = None
+    """Of each, from which `TipMap.continued_from` goes on, shape (n, component)."""
 
 
 class Shapes(NamedTuple):

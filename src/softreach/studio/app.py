@@ -12,7 +12,6 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.jobs import JOBS
 from softreach.studio.serve import (
     LOOPBACK,
     close_sockets,
@@ -24,7 +23,7 @@ from softreach.studio.serve import (
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, vector
-from softreach.studio.tabs import furnish
+from softreach.studio.tabs import JOBS, furnish
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import SoftreachError
 

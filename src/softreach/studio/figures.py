@@ -167,7 +167,7 @@ def enclosed_area(curves: list[Array], axis: int) -> float:
 def swept_parameter(state: StudioState) -> ShownParameter | None:
     """The parameter that is chosen, the first for an unknown one; None if there is none."""
     sliders = {slider.name: slider for slider in slider_parameters(state.design)}
-    return sliders.get(state.appearance.plots.parameter) or next(iter(sliders.values()), None)
+    return sliders.get(state.appearance.swept) or next(iter(sliders.values()), None)
 
 
 def sweep_pictures(

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Lattice
-from softreach.workspace.search import ENOUGH, Flood, Nearest, nearest_tips
+from softreach.workspace.measure import Estimate
+from softreach.workspace.search import ENOUGH, Nearest, ReachedGrid, nearest_tips
 
 _PROBE = 0.01  # cells: how closely crossings are enclosed
 _ROUNDS = 24
@@ -46,9 +48,9 @@ class Crossings:
     """Place where the plane of that tip cuts the edge, between `low` and `high`, shape (n,)."""
 
     @classmethod
-    def of(cls, flood: Flood) -> Crossings:
+    def of(cls, grid: ReachedGrid) -> Crossings:
         """The crossings of all edges at the boundary of what was reached."""
-        reached, parts = flood.reached, []
+        reached, parts = grid.reached, []
         flat = np.arange(reached.size).reshape(reached.shape)
         for k in range(3):
             before, after = np.moveaxis(reached, k, 0)[:-1], np.moveaxis(reached, k, 0)[1:]
@@ -57,17 +59,17 @@ class Crossings:
             for side, places in ((1, leaving), (-1, entering)):
                 parts.append((places, np.full(len(places), k), np.full(len(places), side)))
         cell, axis, sense = (np.concatenate(column) for column in zip(*parts, strict=True))
-        n, outside = len(cell), cell + sense * flood.steps[axis]
+        n, outside = len(cell), cell + sense * grid.steps[axis]
         crossings = cls(
-            tip_map=flood.tip_map,
-            lattice=flood.lattice,
+            tip_map=grid.tip_map,
+            lattice=grid.lattice,
             cell=cell,
             axis=axis,
             sense=sense,
             low=np.zeros(n),
             high=np.ones(n),
-            gamma=flood.gamma[cell],
-            beyond=flood.gamma[outside],
+            gamma=grid.gamma[cell],
+            beyond=grid.gamma[outside],
             place=np.zeros(n),
         )
         crossings._cut(np.arange(n))
@@ -136,12 +138,12 @@ class Crossings:
         return self.place[which] - before
 
 
-def swept_crossings(flood: Flood) -> tuple[Crossings, float]:
+def swept_crossings(grid: ReachedGrid) -> tuple[Crossings, float]:
     """Crossings that no neighbor's activation leads beyond, and what may still be missed [m³]."""
     from scipy.spatial import KDTree
 
-    crossings = Crossings.of(flood)
-    volume = flood.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
+    crossings = Crossings.of(grid)
+    volume = grid.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
     gain = 0.0
     for sweep in range(1, _SWEEPS + 1):
         count = len(crossings.cell)
@@ -149,12 +151,102 @@ def swept_crossings(flood: Flood) -> tuple[Crossings, float]:
             return crossings, 0.0
         places = crossings.points(np.arange(count), crossings.place)
         others = np.asarray(KDTree(places).query(places, k=sweep + 1)[1])[:, sweep]
-        apart = np.abs(crossings.gamma[others] - crossings.gamma) / flood.tip_map.box.scales
+        apart = np.abs(crossings.gamma[others] - crossings.gamma) / grid.tip_map.box.scales
         which = np.flatnonzero((apart > _APART).any(axis=1))
         moved = crossings.advance(which, crossings.gamma[others[which]], _BEYOND)
         gain = float(moved.clip(0.0).sum()) * volume
         beyond = np.flatnonzero(crossings.low >= 1.0)
         if len(beyond):
-            flood.add(crossings.gamma[beyond], crossings.points(beyond, crossings.low[beyond]))
-            crossings = Crossings.of(flood)
+            grid.add(crossings.gamma[beyond], crossings.points(beyond, crossings.low[beyond]))
+            crossings = Crossings.of(grid)
     return crossings, gain
+
+
+class Runs(NamedTuple):
+    """Stretches of lines of sight that are reached, line by line, upwards; in cells."""
+
+    line: Index
+    """Index of the line, (i, j) as i · width + j over the other two axes, shape (n,)."""
+    first: Index
+    """Number of the first center, shape (n,)."""
+    last: Index
+    """Number of the last center, shape (n,)."""
+    start: Array
+    """Beginning of the run, before its first center, shape (n,)."""
+    end: Array
+    """End of the run, behind its last center, shape (n,)."""
+    width: int
+    """Number of lines along the last of the other two axes."""
+
+
+def runs_along(crossings: Crossings, axis: int) -> Runs:
+    """All runs along an axis."""
+    shape = crossings.lattice.shape
+    others = [a for a in range(3) if a != axis]
+    ends = []
+    for sense in (-1, 1):
+        which = np.flatnonzero((crossings.axis == axis) & (crossings.sense == sense))
+        index = np.unravel_index(crossings.cell[which], shape)
+        line = index[others[0]] * shape[others[1]] + index[others[1]]
+        order = np.lexsort((index[axis], line))
+        center = index[axis][order]
+        ends.append((line[order], center, center + sense * crossings.place[which[order]]))
+    (line, first, start), (_, last, end) = ends
+    return Runs(line, first, last, start, end, shape[others[1]])
+
+
+def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
+    """Length of what is reached on each line that has a run, in cells, from some of the centers.
+
+    A stretch shorter than the spacing s holds a center with a chance of length / s only: counted as
+    s where it does, it is right on average over where the centers lie. So are gaps.
+
+    Args:
+        runs: Stretches between crossings.
+        spacing: Every how many centers are looked at.
+        parity: Number of the first of them.
+
+    Returns:
+        Shape (runs,): what each run adds to its line.
+    """
+    length = np.maximum(runs.end - runs.start, 0.0)
+    seen = (runs.last - parity) // spacing * spacing + parity >= runs.first
+    total = np.where(seen, np.maximum(length, spacing), 0.0)
+    follows = (np.diff(runs.line) == 0) & seen[1:] & seen[:-1]
+    gap = runs.start[1:] - runs.end[:-1]
+    open_ = (runs.first[1:] - 1 - parity) // spacing * spacing + parity > runs.last[:-1]
+    change = np.where(open_, gap - np.maximum(gap, spacing), gap)
+    total[1:] += np.where(follows, change, 0.0)
+    return total
+
+
+def line_volume(crossings: Crossings) -> Estimate:
+    """Volume from the lines along all three axes [m³]; each counts by the square of its lines.
+
+    On average over where the lattice lies the sum of lengths is the volume, so that what it errs by
+    is noise. Every other line along each axis, looked at on every other center, tells how much: the
+    noise of twice the spacing, which at the spacing itself is no more than half of it; so
+    does how far the axes are apart. Two standard deviations of both together are stated.
+    """
+    lattice = crossings.lattice
+    axes = [runs_along(crossings, axis) for axis in range(3)]
+    lines = np.array([float(len(np.unique(runs.line))) for runs in axes])
+    if not lines.all():
+        return Estimate(0.0, np.inf)
+    weights = lines**2 / (lines**2).sum()
+    values = np.array([length_sum(runs).sum() for runs in axes])
+    coarse = np.array([_sparse(runs) for runs in axes])  # (axis, 8)
+    value = float(weights @ values)
+    variances = np.mean((coarse - values[:, None]) ** 2, axis=1) / 4.0
+    spread = float(weights @ (values - value) ** 2)
+    noise = 2.0 * np.sqrt(float(weights**2 @ variances) + spread / 3.0)
+    return Estimate(value * lattice.cell**3, float(noise) * lattice.cell**3)
+
+
+def _sparse(runs: Runs) -> Array:
+    """Sums of lengths from every other line along both directions and every other center, (8,)."""
+    i, j = np.divmod(runs.line, runs.width)
+    sums = (length_sum(runs, 2, parity) for parity in range(2))
+    return (
+        4.0 * np.array([np.bincount(2 * (i % 2) + j % 2, each, 4) for each in sums], float).ravel()
+    )

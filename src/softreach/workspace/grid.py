@@ -1,13 +1,26 @@
-"""Grids of the activation box, and integrals over it, asked of a tip map."""
+"""Grids over the activation box: tips and det J at their vertices, and all postures over them.
+
+Under loads an arm may hold several postures at one activation, and a branch of them may end within
+the box. Cells with one posture at each corner, all on one branch, are mapped as those of any map.
+The others have as many images as there are branches over them. A corner that a branch does not
+reach goes to where the branch ends on the way there: a sheet is mapped up to its edge.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
+from itertools import product
 
+import numpy as np
+from scipy.ndimage import binary_dilation
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from softreach.kernels.box.simplices import corner_steps
 from softreach.kernels.image.contour import stretches
 from softreach.rod.rods import refined
-from softreach.rod.tip_map import TipMap, no_stable_equilibrium
-from softreach.support.arrays import Array, Mask
+from softreach.rod.tip_map import Held, TipMap, no_stable_equilibrium
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
 
@@ -63,7 +76,7 @@ def grid_tips(
     return tips
 
 
-def grid_stretches(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
+def grid_jacobian_dets(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
     """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
 
     From differences of the tips, and by J itself where these might have the wrong sign, and
@@ -86,7 +99,7 @@ def grid_stretches(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) ->
     unsure = np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
     small = np.flatnonzero((unsure | (not tip_map.is_smooth)) & used)
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
-    determinants[small] = _stretch(tip_map, tip_map.box.from_free_cube(places))
+    determinants[small] = _jacobian_size(tip_map, tip_map.box.from_free_cube(places))
     determinants[~np.isfinite(determinants)] = 0.0
     return determinants
 
@@ -122,10 +135,10 @@ def image_measure(tip_map: TipMap, nodes: int) -> float:
     gamma = tip_map.box.from_free_cube(_product([(1.0 + x) / 2.0] * m))
     weights = np.prod(_product([w / 2.0] * m), axis=1) * tip_map.box.volume
     # Not a BLAS product, whose rounding would depend on its threads.
-    return float((weights * _stretch(refined(tip_map, _TOL), gamma)).sum())
+    return float((weights * _jacobian_size(refined(tip_map, _TOL), gamma)).sum())
 
 
-def _stretch(tip_map: TipMap, gamma: Array) -> Array:
+def _jacobian_size(tip_map: TipMap, gamma: Array) -> Array:
     """The change of measure of the map at each activation: det J where J is square."""
     slopes = tip_map.tips_and_slopes(gamma)[1][:, :, tip_map.box.free]
     with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
@@ -139,3 +152,211 @@ def _product(ticks: list[Array]) -> Array:
     if not ticks:
         return np.zeros((1, 0))
     return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(ticks))
+
+
+@dataclass(frozen=True, eq=False)
+class LiftedGrid:
+    """The mapped vertices of a grid, and the cells over it."""
+
+    tips: Array
+    """[m]: of its nodes in C order, NaN where no posture is held, then others, shape (v, 3)."""
+    is_lifted: Mask
+    """Cells in whose place those of `lifted` are, shape (n,) * m."""
+    lifted: Index
+    """Vertices at the corners of cells, in the order of their bits, shape (k, 2^m)."""
+    lost_share: float = 0.0
+    """Share of activations at which no posture is held [-]."""
+    hysteresis_share: float = 0.0
+    """Share of activations at which two are held on one side [-]."""
+
+    @classmethod
+    def of(
+        cls,
+        tip_map: TipMap,
+        n: int,
+        progress: Progress = silent,
+        ticks: list[Array] | None = None,
+    ) -> LiftedGrid:
+        """The grid of n cells along each free bundle; see `grid_tips`."""
+        m = tip_map.box.dimension
+        nodes = tip_map.box.from_free_cube(cube_grid(n, m))
+        held = tip_map.held(nodes, (n + 1,) * m) if tip_map.supports_unstable else None
+        if held is None:
+            return cls.of_one_sheet(grid_tips(tip_map, n, progress, ticks), n, m)
+        progress(0)
+        if not len(held.node):
+            raise no_stable_equilibrium(len(nodes))
+        return _lifted(held, n, m)
+
+    @classmethod
+    def of_one_sheet(cls, tips: Array, n: int, m: int) -> LiftedGrid:
+        """The grid of n cells along each of m axes whose nodes go to tips [m]."""
+        return cls(tips, np.zeros((n,) * m, bool), np.empty((0, 1 << m), np.int64))
+
+    @property
+    def is_torn(self) -> bool:
+        """True if it is not one sheet over the whole box."""
+        return bool(self.is_lifted.any())
+
+    @property
+    def cells(self) -> Index:
+        """Vertices at the corners of all cells, in the order of their bits, shape (k, 2^m)."""
+        n, m = len(self.is_lifted), self.is_lifted.ndim
+        return np.concatenate([_corners(n, m)[~self.is_lifted.ravel()], self.lifted])
+
+    def coarser(self, tip_map: TipMap, times: int = 2) -> LiftedGrid:
+        """The grid of fewer cells along each axis, for tips of a map."""
+        n, m = len(self.is_lifted), self.is_lifted.ndim
+        if self.is_torn:
+            return LiftedGrid.of(tip_map, n // times)
+        tips = self.tips.reshape(*(n + 1,) * m, 3)[(slice(None, None, times),) * m]
+        return LiftedGrid.of_one_sheet(np.ascontiguousarray(tips).reshape(-1, 3), n // times, m)
+
+
+def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
+    count = np.bincount(held.node, minlength=(n + 1) ** m)
+    order = np.argsort(held.node, kind="stable")
+    rank = np.empty_like(order)  # of each posture among those of its node
+    rank[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+    at_node = np.full((len(count), count.max()), -1)
+    at_node[held.node, rank] = np.arange(len(rank))
+    vertex = np.where(rank == 0, held.node, len(count) - 1 + np.cumsum(rank > 0))
+    tips = np.full((len(count) + np.count_nonzero(rank), 3), np.nan)
+    tips[vertex] = held.tips
+    torn = ~_is_plain(held, count == 1, n, m)
+    is_lifted = np.asarray(binary_dilation(torn, np.ones((3,) * m)), bool)
+    corners = _corners(n, m)[is_lifted.ravel()]
+    cell, states = _sheets(held, at_node[corners])
+    beyond, end_tips = _edges(held, states, corners[cell])
+    return LiftedGrid(
+        np.concatenate([tips, end_tips]),
+        is_lifted,
+        np.where(states < 0, len(tips) + beyond, vertex[states]),
+        share_of_box(count == 0, n, m),
+        share_of_box(held.is_doubled, n, m),
+    )
+
+
+def _corners(n: int, m: int) -> Index:
+    """Nodes at the corners of all cells, shape (n^m, 2^m)."""
+    first = np.arange((n + 1) ** m).reshape((n + 1,) * m)[(slice(-1),) * m]
+    return first.reshape(-1, 1) + corner_steps((n,) * m)
+
+
+def _edges_of_cell(m: int) -> list[tuple[int, int]]:
+    return [(k, k | 1 << j) for k, j in product(range(1 << m), range(m)) if not k >> j & 1]
+
+
+def _is_plain(held: Held, is_single: Mask, n: int, m: int) -> Mask:
+    """Cells with one posture at each corner, linked along all edges."""
+    corners, steps = _corners(n, m), corner_steps((n,) * m)
+    plain: Mask = np.asarray(is_single[corners].all(axis=1))
+    low, high = np.sort(held.node[held.links], axis=1).T
+    linked = {step: np.zeros(len(is_single), bool) for step in steps[1 << np.arange(m)]}
+    for step, mask in linked.items():
+        mask[low[high - low == step]] = True
+    for a, b in _edges_of_cell(m):
+        plain &= linked[steps[b] - steps[a]][corners[:, a]]
+    return plain.reshape((n,) * m)
+
+
+def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
+    """Cells of each branch over some cells.
+
+    Around a pitchfork or a cusp corners have two postures on one branch: it is parted there again.
+
+    Args:
+        held: The postures.
+        states: Numbers of those at the corners of cells, -1 for none, (cells, 2^m, postures).
+
+    Returns:
+        Numbers of the cells, and one posture or -1 for each corner, shapes (k,) and (k, 2^m).
+    """
+    corners, joined = states.shape[1], _joined(held, states)
+    cell, corner, _ = np.nonzero(states >= 0)
+    state, label = states[states >= 0], components(joined, len(cell))
+    sheet = np.full((label.max(initial=-1) + 1, corners), -1)
+    sheet[label, corner] = state
+    of_cell = np.empty(len(sheet), np.int64)
+    of_cell[label] = cell
+    forked = np.bincount(label * corners + corner)[label * corners + corner] > 1
+    part = components(joined[forked[joined].all(axis=1)], len(cell))[forked]
+    _, first, part = np.unique(part, return_index=True, return_inverse=True)
+    parted = label[forked][first]
+    parts = sheet[parted]
+    parts[part, corner[forked]] = state[forked]
+    whole = np.setdiff1d(np.arange(len(sheet)), parted)
+    every = np.concatenate([whole, parted])
+    return of_cell[every], np.concatenate([sheet[whole], parts])
+
+
+def _joined(held: Held, states: Index) -> Index:
+    """Pairs of postures of cells that are linked, numbered in order, shape (k, 2)."""
+    total, pairs = len(held.node), [np.empty((0, 2), np.int64)]
+    links = np.sort(np.append(np.sort(held.links, axis=1) @ [total, 1], -1))
+    number = np.cumsum(states >= 0).reshape(states.shape) - 1
+    places = range(states.shape[2])
+    for (a, b), i, j in product(_edges_of_cell(states.shape[1].bit_length() - 1), places, places):
+        ends = np.stack([states[:, a, i], states[:, b, j]], axis=1)
+        key = np.sort(ends, axis=1) @ [total, 1]
+        near = links[np.searchsorted(links, key).clip(max=len(links) - 1)] == key
+        rows = np.flatnonzero(near & (ends >= 0).all(axis=1))
+        pairs.append(np.stack([number[rows, a, i], number[rows, b, j]], axis=1))
+    return np.concatenate(pairs)
+
+
+def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
+    """Places where branches end on the way to corners that they do not reach.
+
+    All cells of a branch share its place beside one node, so that its sheet has no cracks.
+
+    Args:
+        held: The postures.
+        states: Numbers of those at the corners of cells, -1 for none, shape (k, 2^m).
+        corners: Their nodes, shape (k, 2^m).
+
+    Returns:
+        Number of its place for each corner without a posture, 0 for others, (k, 2^m), and places.
+    """
+    total = len(held.node)
+    row, corner = np.nonzero(states < 0)
+    slot, other = np.nonzero(states[row] >= 0)
+    key = corners[row, corner][slot] * total + states[row[slot], other]
+    keys, of_key = np.unique(key, return_inverse=True)
+    pairs = np.stack([slot, len(row) + of_key], axis=1)
+    label = components(pairs, len(row) + len(keys))
+    groups, group = np.unique(label[: len(row)], return_inverse=True)
+    found = np.searchsorted(keys, ends := held.ends @ [1, total]).clip(max=max(len(keys) - 1, 0))
+    known = np.flatnonzero(keys[found] == ends) if len(keys) else found[:0]
+    group_of_end = np.searchsorted(groups, label[len(row) + found[known]])
+    tips = _means(held.end_tips[known], group_of_end, len(groups))
+    for _ in range(corners.shape[1]):  # corners that no edge of a cell leads to
+        around = _means(tips[group], row, len(states))
+        tips = np.where(np.isnan(tips), _means(around[row], group, len(groups)), tips)
+    at_others = _means(held.tips[states[row[slot], other]], group[slot], len(groups))
+    numbers = np.zeros_like(states)
+    numbers[row, corner] = group
+    return numbers, np.where(np.isnan(tips), at_others, tips)
+
+
+def components(pairs: Index, size: int) -> Index:
+    """Number of the connected component of each of so many nodes, of pairs that are linked."""
+    graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    return connected_components(graph, directed=False)[1]
+
+
+def _means(places: Array, number: Index, size: int) -> Array:
+    """Means of the places of each number that are known, shape (size, 3); NaN where none is."""
+    known = np.isfinite(places[:, 0])
+    count = np.bincount(number[known], minlength=size)
+    sums = [np.bincount(number[known], column, size) for column in places[known].T]
+    with np.errstate(invalid="ignore"):
+        return np.stack(sums, axis=1) / count[:, None]
+
+
+def share_of_box(nodes: Mask, n: int, m: int) -> float:
+    """Share of the box in which something holds that holds at some nodes."""
+    share = nodes.reshape((n + 1,) * m).astype(float)
+    for axis in range(m):
+        share = 0.5 * (np.delete(share, -1, axis) + np.delete(share, 0, axis))
+    return float(share.mean())

@@ -21,7 +21,7 @@ from softreach.support.progress import Progress, silent
 
 DIAGONAL = math.sqrt(3.0)
 """Of a cell, in edges."""
-_STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
+_DET_BITS = 50  # of the largest det J: sums of four are exact in any order
 _BYTES = 16  # of a cell: two counts, and what questions make of them
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
 _CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
@@ -276,7 +276,7 @@ def _twice_area(a: Array, b: Array) -> Array:
 
 def image_of(
     points: Array,
-    stretches: Array,
+    jacobian_dets: Array,
     cells: tuple[int, int, int],
     lattice: Lattice,
     progress: Progress = silent,
@@ -288,7 +288,7 @@ def image_of(
 
     Args:
         points: Mapped vertices [m] in the C order of the grid, then others, shape (v, 3).
-        stretches: det J at the vertices up to a positive factor, shape (prod(cells + 1),).
+        jacobian_dets: det J at the vertices up to a positive factor, shape (prod(cells + 1),).
         cells: Number of boxes along each of the three axes.
         lattice: Cells to rasterize on.
         progress: Called with the number of vertices done since its last call.
@@ -297,7 +297,7 @@ def image_of(
         lifted: Vertices at the corners of the others, in the order of their bits, shape (k, 8).
     """
     scaled = lattice.coordinates(points)
-    grid = scaled[: len(stretches)].reshape(*(n + 1 for n in cells), 3)
+    grid = scaled[: len(jacobian_dets)].reshape(*(n + 1 for n in cells), 3)
     steps = [np.nanmax(np.abs(np.diff(grid, axis=axis))) for axis in range(3)]
     longest = max(float(np.sum(steps)), 1.0)
     longest = max(longest, float(np.ptp(scaled[lifted], axis=1).sum(axis=1).max(initial=0.0)))
@@ -305,7 +305,9 @@ def image_of(
     unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
     vertices = np.rint(scaled * unit)
     vertices[np.isnan(vertices)] = 0.0
-    triangles = _critical_triangles(vertices[: len(stretches)], stretches, is_lifted, progress)
+    triangles = _critical_triangles(
+        vertices[: len(jacobian_dets)], jacobian_dets, is_lifted, progress
+    )
     if len(lifted):
         triangles = np.concatenate([triangles, _lifted_triangles(vertices, lifted)])
     return Image(lattice=lattice, unit=unit, vertices=vertices, triangles=triangles)
@@ -334,19 +336,21 @@ def _lifted_triangles(vertices: Array, cells: Index) -> Index:
 
 
 def _critical_triangles(
-    vertices: Array, stretches: Array, is_lifted: Mask, progress: Progress
+    vertices: Array, jacobian_dets: Array, is_lifted: Mask, progress: Progress
 ) -> Index:
     star, axes = contour.stars(is_lifted.shape), np.array(is_lifted.shape)
     gaps = np.pad(is_lifted, [(0, 1)] * 3).ravel()  # of the cells whose least vertex this is
-    largest = np.abs(stretches).max() or 1.0
-    stretches = np.rint(stretches / largest * 2.0**_STRETCH_BITS)
+    largest = np.abs(jacobian_dets).max() or 1.0
+    jacobian_dets = np.rint(jacobian_dets / largest * 2.0**_DET_BITS)
     blocks = parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles)))
     parts: list[Index] = [np.empty((0, 5), np.int64)] * len(blocks)
 
     def task(number: int) -> None:
         first, last = blocks[number].start, blocks[number].stop
         out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
-        used = contour.critical_triangles(vertices, stretches, axes, gaps, first, last, star, out)
+        used = contour.critical_triangles(
+            vertices, jacobian_dets, axes, gaps, first, last, star, out
+        )
         parts[number] = out[:used].copy()
         progress(last - first)
 

@@ -1,17 +1,17 @@
-"""Volume that an image fills, by multiplicity, and its error."""
+"""Volume that an image fills, by multiplicity, and that of its convex hull, with their errors."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.geometry.hull import convex_hull
+from softreach.geometry.hull import convex_faces, convex_hull
+from softreach.geometry.surface import compact_surface, corner_areas, enclosed_volume
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index
-from softreach.workspace.crossings import Crossings
+from softreach.support.arrays import Array, Faces, Index
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.image import Image, Spans, covered_cubes
 
@@ -19,6 +19,15 @@ _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were fou
 SURE_ACCURACY = 3e-3  # down from which integrals are as exact as a raster can ever use
 FLUX_PART = 0.01  # of a larger accuracy: relative error of what flows through the faces
 _NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
+
+
+_ROUNDS = 8
+_LESS = 0.5  # of the error before, that another round must leave
+_CLIMBS = 25  # steps of a climb
+_FIRST = 0.3  # of the box, that the first step goes
+_ENOUGH = 0.05  # of the accuracy, of the size: slope that ends a climb
+_FARTHEST = 0.02  # of the size, that a climb is taken to leave at most
+_TOGETHER = 512  # facets
 
 
 class Estimate(NamedTuple):
@@ -181,91 +190,127 @@ def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
     return np.squeeze(mean * image.lattice.cell**3)
 
 
-class Runs(NamedTuple):
-    """Stretches of lines of sight that are reached, line by line, upwards; in cells."""
+class HullCorners(NamedTuple):
+    """Activations whose tips are the corners of a convex hull."""
 
-    line: Index
-    """Index of the line, (i, j) as i · width + j over the other two axes, shape (n,)."""
-    first: Index
-    """Number of the first center, shape (n,)."""
-    last: Index
-    """Number of the last center, shape (n,)."""
-    start: Array
-    """Beginning of the run, before its first center, shape (n,)."""
-    end: Array
-    """End of the run, behind its last center, shape (n,)."""
-    width: int
-    """Number of lines along the last of the other two axes."""
+    cube: Array
+    """In the unit cube of the free bundles, shape (n, dimension)."""
+    tips: Array
+    """[m], shape (n, 3)."""
+    faces: Faces
+    """Outwards, shape (f, 3)."""
+
+    hull_of = staticmethod(convex_faces)
+
+    @classmethod
+    def of(cls, tips: Array, cube: Array) -> Self:
+        """Corners of the hull of some tips at places of the cube; tips that are NaN are none."""
+        known = np.isfinite(tips[:, 0])
+        tips, cube = tips[known], cube[known]
+        every = cls.hull_of(tips)
+        vertices, faces = compact_surface(tips, every)
+        return cls(cube[np.unique(every)], vertices, faces)
+
+    @property
+    def area(self) -> Array:
+        """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
+        return corner_areas(self.tips, self.faces)
+
+    @property
+    def facets(self) -> Array:
+        """Outward area vectors of the faces [m²], shape (f, 3)."""
+        a, b, c = np.moveaxis(self.tips[self.faces], 1, 0)
+        return 0.5 * np.cross(b - a, c - a)
+
+    @property
+    def volume(self) -> float:
+        """Of the hull [m³]."""
+        return enclosed_volume(self.tips, self.faces)
 
 
-def runs_along(crossings: Crossings, axis: int) -> Runs:
-    """All runs along an axis."""
-    shape = crossings.lattice.shape
-    others = [a for a in range(3) if a != axis]
-    ends = []
-    for sense in (-1, 1):
-        which = np.flatnonzero((crossings.axis == axis) & (crossings.sense == sense))
-        index = np.unravel_index(crossings.cell[which], shape)
-        line = index[others[0]] * shape[others[1]] + index[others[1]]
-        order = np.lexsort((index[axis], line))
-        center = index[axis][order]
-        ends.append((line[order], center, center + sense * crossings.place[which[order]]))
-    (line, first, start), (_, last, end) = ends
-    return Runs(line, first, last, start, end, shape[others[1]])
+class ConvexHull(NamedTuple):
+    """A hull of tips, the one that it was climbed from, and the volume of the image's own."""
+
+    volume: Estimate
+    """The middle between two bounds, and half of what is between them [m³]."""
+    corners: HullCorners
+    before: HullCorners
 
 
-def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
-    """Length of what is reached on each line that has a run, in cells, from some of the centers.
-
-    A stretch shorter than the spacing s holds a center with a chance of length / s only: counted as
-    s where it does, it is right on average over where the centers lie. So are gaps.
+def climbed_hull(
+    tip_map: TipMap, cube: Array, accuracy: float, kind: type[HullCorners] = HullCorners
+) -> ConvexHull:
+    """The convex hull of the image of a box.
 
     Args:
-        runs: Stretches between crossings.
-        spacing: Every how many centers are looked at.
-        parity: Number of the first of them.
+        tip_map: The tip map.
+        cube: Places of the box to begin with, in the unit cube, shape (n, dimension).
+        accuracy: Relative error of the volume that ends the climbing.
+        kind: Of corners, with edges for faces in a plane.
+    """
+    corners = kind.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube)
+    before = corners
+    if not len(corners.faces):
+        return ConvexHull(Estimate(0.0, 0.0), corners, corners)
+    size, error = float(np.ptp(corners.tips, axis=0).max()), np.inf
+    for _ in range(_ROUNDS):
+        before, low = corners, corners.volume
+        vectors = corners.facets
+        area = np.linalg.norm(vectors, axis=1)
+        normals = vectors / np.maximum(area, np.finfo(float).tiny)[:, None]
+        start = corners.cube[corners.faces[:, 0]]
+        found, tips, top = _climbed(tip_map, start, normals, _ENOUGH * accuracy * size, size)
+        every = np.concatenate([corners.tips, tips])
+        for rows in range(0, len(top), _TOGETHER):
+            block = slice(rows, rows + _TOGETHER)
+            attained = np.nanmax(every @ normals[block].T, axis=0)
+            top[block] = np.fmax(top[block], attained)
+        offset = np.einsum("fi,fi->f", corners.tips[corners.faces[:, 0]], normals)
+        high = low + float(area @ (top - offset).clip(0.0))
+        corners = kind.of(every, np.concatenate([corners.cube, found]))
+        last, error = error, 0.5 * (high - corners.volume)
+        if error <= accuracy * high or error > _LESS * last:
+            break
+    return ConvexHull(Estimate(corners.volume + error, error), corners, before)
+
+
+def _climbed(
+    tip_map: TipMap, cube: Array, normals: Array, enough: float, size: float
+) -> tuple[Array, Array, Array]:
+    """Climb along a normal each, by projected gradients [BarzilaiBorwein1988].
 
     Returns:
-        Shape (runs,): what each run adds to its line.
+        Places (n, dimension), their tips (n, 3), and how far tips go along the normals at most
+        (n,), by the slope that is left.
     """
-    length = np.maximum(runs.end - runs.start, 0.0)
-    seen = (runs.last - parity) // spacing * spacing + parity >= runs.first
-    total = np.where(seen, np.maximum(length, spacing), 0.0)
-    follows = (np.diff(runs.line) == 0) & seen[1:] & seen[:-1]
-    gap = runs.start[1:] - runs.end[:-1]
-    open_ = (runs.first[1:] - 1 - parity) // spacing * spacing + parity > runs.last[:-1]
-    change = np.where(open_, gap - np.maximum(gap, spacing), gap)
-    total[1:] += np.where(follows, change, 0.0)
-    return total
-
-
-def line_volume(crossings: Crossings) -> Estimate:
-    """Volume from the lines along all three axes [m³]; each counts by the square of its lines.
-
-    On average over where the lattice lies the sum of lengths is the volume, so that what it errs by
-    is noise. Every other line along each axis, looked at on every other center, tells how much: the
-    noise of twice the spacing, which at the spacing itself is no more than half of it; so
-    does how far the axes are apart. Two standard deviations of both together are stated.
-    """
-    lattice = crossings.lattice
-    axes = [runs_along(crossings, axis) for axis in range(3)]
-    lines = np.array([float(len(np.unique(runs.line))) for runs in axes])
-    if not lines.all():
-        return Estimate(0.0, np.inf)
-    weights = lines**2 / (lines**2).sum()
-    values = np.array([length_sum(runs).sum() for runs in axes])
-    coarse = np.array([_sparse(runs) for runs in axes])  # (axis, 8)
-    value = float(weights @ values)
-    variances = np.mean((coarse - values[:, None]) ** 2, axis=1) / 4.0
-    spread = float(weights @ (values - value) ** 2)
-    noise = 2.0 * np.sqrt(float(weights**2 @ variances) + spread / 3.0)
-    return Estimate(value * lattice.cell**3, float(noise) * lattice.cell**3)
-
-
-def _sparse(runs: Runs) -> Array:
-    """Sums of lengths from every other line along both directions and every other center, (8,)."""
-    i, j = np.divmod(runs.line, runs.width)
-    sums = (length_sum(runs, 2, parity) for parity in range(2))
-    return (
-        4.0 * np.array([np.bincount(2 * (i % 2) + j % 2, each, 4) for each in sums], float).ravel()
-    )
+    box, free, n = tip_map.box, tip_map.box.free, len(cube)
+    best, tips, top, value = cube.copy(), np.full((n, 3), np.nan), np.empty(n), np.full(n, -np.inf)
+    rows, at, step = np.arange(n), cube, np.zeros(n)
+    last, last_slope = at, np.zeros_like(at)
+    for number in range(_CLIMBS):
+        moved, slopes = tip_map.tips_and_slopes(box.from_free_cube(at))
+        slope = np.einsum("ni,nij->nj", normals[rows], slopes[:, :, free]) * box.widths[free]
+        height = np.einsum("ni,ni->n", moved, normals[rows])
+        left = np.maximum(slope * (1.0 - at), -slope * at).sum(axis=1)
+        up = height > value[rows]  # not of NaN
+        which = rows[up]
+        value[which], best[which], tips[which] = height[up], at[up], moved[up]
+        top[which] = height[up] + np.minimum(left[up], _FARTHEST * size)
+        lengths = np.linalg.norm(slope, axis=1).clip(1e-300)
+        if number == 0:
+            step = _FIRST / lengths
+        else:
+            way, turn = at - last, last_slope - slope
+            both = (way * turn).sum(axis=1)
+            bent = both > 1e-12 * (way**2).sum(axis=1)
+            size_of = (way**2 if number % 2 else turn * way).sum(axis=1)
+            over = (turn * way if number % 2 else turn**2).sum(axis=1)
+            step = np.where(bent, size_of / np.where(bent, over, 1.0).clip(1e-300), 4.0 * step)
+            step = np.clip(step, 1e-3 / lengths, 1e3 / lengths)
+        ahead = (at + step[:, None] * slope).clip(0.0, 1.0)
+        go = (left > enough) & (np.abs(ahead - at).max(axis=1) > 1e-9)  # not of NaN
+        rows, last, last_slope, step = rows[go], at[go], slope[go], step[go]
+        at = ahead[go]
+        if not len(rows):
+            break
+    return best, tips, np.where(np.isfinite(value), top, -np.inf)

@@ -14,15 +14,12 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
-from softreach.workspace.abstract_set import ReachableSet
+from softreach.workspace.cells import lost_share, searched_set
 from softreach.workspace.flux import grid_faces, signed_volume
-from softreach.workspace.grid import grid_stretches
+from softreach.workspace.grid import LiftedGrid, grid_jacobian_dets
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.lifted_grid import LiftedGrid
-from softreach.workspace.planar import planar_set, plane_of_tips
-from softreach.workspace.redundant import lost_share, searched_set
-from softreach.workspace.solid import ReachableSolid
-from softreach.workspace.thin import thin_set
+from softreach.workspace.reachable import ReachableSet, ReachableSolid
+from softreach.workspace.thin import planar_set, plane_of_tips, thin_set
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26
@@ -70,12 +67,12 @@ def reachable_set(
 
     Under loads all postures count that are held without a snap from rest, on all their sheets and
     up to the edges of these: `hysteresis_share` tells where two are held, `lost_share` where none
-    is. Of more bundles than three, and in one plane, only the posture of each activation does.
+    is. Of more bundles than three only the posture to which each activation leads from rest does.
 
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
             dimension.
-        accuracy: Relative error ε allowed in the volume.
+        accuracy: Relative error ε allowed in the volume; of several sheets under loads twice that.
         cell: Edge h of a cell [m], instead of the rule's.
         tol: Largest tip error, in L.
         frame: In which places are told: that of the "world", or of the "base", whose z is along the
@@ -108,7 +105,9 @@ def reachable_set(
         return thin_set(tip_map)
     if m == 3:
         result = _of_three(tip_map, accuracy, cell, progress)
-        finer = f"a grid above {result.cells} and a smaller cell"
+        allowed = allowed_error(result, accuracy)
+        finer = f"a smaller accuracy, for a grid above {result.cells}"
+        finer += "" if cell is None else ", and a smaller cell"
     else:
         cells = searched_set(tip_map, accuracy, cell, memory, progress)
         hull = cells.hull
@@ -123,11 +122,12 @@ def reachable_set(
             route="search",
             image=cells,
         )
+        allowed = accuracy
         finer = "a smaller cell" if cell is not None else "more memory"
-    if result.volume_error > accuracy * result.volume:
+    if result.volume_error > allowed * result.volume:
         warn(
             f"volume {result.volume:.5g} m³ may be off by {result.volume_error:.2g} m³, more than "
-            f"{accuracy:g} of it; pass {finer}"
+            f"{allowed:g} of it; pass {finer}"
         )
     return result
 
@@ -155,18 +155,21 @@ def rasterized_set(
     return _by_raster(tip_map, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
 
 
-def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
-    """True if the volume errs by more than asked, and grids that memory holds may be fine enough.
+def allowed_error(solid: ReachableSolid, accuracy: float) -> float:
+    """The error of the volume that has to do, relative.
 
-    Of several sheets the error falls as 1/n and no faster: twice what is asked has to do for them,
-    but on grids that take no time.
+    Of several sheets it falls as 1/n and no faster: twice what is asked has to do for them, but on
+    grids that take no time.
     """
-    cells, wanted = 2 * solid.cells, accuracy * solid.volume
-    if solid.is_torn and solid.cells > _QUICK:
-        wanted *= _TORN
-    return solid.volume_error > wanted and (cells + 1) ** 3 <= _MOST_VERTICES / (
-        4.0 if solid.is_torn else 1.0
-    )
+    has_sheets = solid.is_torn and solid.cells > _QUICK
+    return (_TORN if has_sheets else 1.0) * accuracy
+
+
+def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
+    """True if the volume errs too much, and grids that memory holds may be fine enough."""
+    most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)
+    errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
+    return errs and (2 * solid.cells + 1) ** 3 <= most
 
 
 def _of_three(
@@ -254,7 +257,7 @@ class _Grid(NamedTuple):
     """The mapped vertices of a grid of three bundles."""
 
     lifted: LiftedGrid
-    stretches: Array
+    jacobian_dets: Array
     """det J, shape ((n + 1)³,)."""
 
     @classmethod
@@ -262,7 +265,7 @@ class _Grid(NamedTuple):
         """The grid of cells³ boxes over the activation box."""
         lifted = LiftedGrid.of(tip_map, cells, progress)
         tips = lifted.tips[: (cells + 1) ** 3]
-        return cls(lifted, grid_stretches(tip_map, tips, cells, lifted.is_lifted))
+        return cls(lifted, grid_jacobian_dets(tip_map, tips, cells, lifted.is_lifted))
 
     @property
     def cells(self) -> int:
@@ -294,21 +297,21 @@ class _Grid(NamedTuple):
         both orientations cover. Pieces that none covers may have a degree: walls thinner than the
         triangles are flat cross each other.
         """
-        return bool(self.stretches.min() * self.stretches.max() > 0.0) and all(
+        return bool(self.jacobian_dets.min() * self.jacobian_dets.max() > 0.0) and all(
             (spans.cover <= np.minimum(1, np.abs(spans.degree)))[spans.length > 0.0].all()
             for spans in image.spans
         )
 
     def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
         """Image of all cells."""
-        n, (grid, stretches) = self.cells, self
+        n, (grid, jacobian_dets) = self.cells, self
         lifted = {"is_lifted": grid.is_lifted, "lifted": grid.lifted}
-        return image_of(grid.tips, stretches, (n, n, n), lattice, progress, **lifted)
+        return image_of(grid.tips, jacobian_dets, (n, n, n), lattice, progress, **lifted)
 
     def coarser(self, tip_map: TipMap) -> _Grid:
         """The grid of half as many cells."""
         n = self.cells
         if self.lifted.is_torn:
             return _Grid.of(tip_map, n // 2)
-        every_second = self.stretches.reshape((n + 1,) * 3)[::2, ::2, ::2]
+        every_second = self.jacobian_dets.reshape((n + 1,) * 3)[::2, ::2, ::2]
         return _Grid(self.lifted.coarser(tip_map), every_second.ravel())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -16,11 +17,12 @@ from softreach.kernels.box.bounded_descent import (
 )
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
-from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.rod.tip_map import BLOCK, TipMap, no_stable_equilibrium
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
-from softreach.workspace.image import Lattice
+from softreach.workspace.image import Lattice, covered_cubes
+from softreach.workspace.postures import AllPostures
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 
@@ -28,7 +30,11 @@ ENOUGH = 1e-3
 """Distance at which a place counts as reached, in cells."""
 
 _CHUNK = 1 << 16  # places searched for at a time
+CLOUD = 1 << 16  # tips in a cloud that searches start from
+_CLOUDS = 8  # at most
 _FAR = 3.0  # cells, from which on distances are not told apart
+DISTANCE = 0.75
+"""Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
 CLEARLY = 0.02
 """Cells by which a tip must be closer to start another search."""
 
@@ -48,7 +54,7 @@ CLOSELY = Stop(settled=1e-13, most=1000)
 """For the nearest tip itself."""
 
 
-class Flood:
+class ReachedGrid:
     """Cell centers that are reached, grown from tips of a cloud to their neighbors.
 
     A center is reached if a search that starts at a neighbor's activation, or at that of a tip
@@ -108,6 +114,15 @@ class Flood:
         """Places [m] of cells given by flat index, shape (n, 3)."""
         index = np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1)
         return self.lattice.origin + self.lattice.cell * index
+
+    def add_inside(self, inside: Callable[[Array], Mask]) -> None:
+        """Take centers for reached, without a search, that are within a part known to be [m]."""
+        free = np.flatnonzero(self.gap > 0.0)
+        known = np.zeros(len(self.gap), bool)
+        known[free] = inside(self.centers(free))
+        known = covered_cubes(covered_cubes(known.reshape(self.lattice.shape)))
+        self.gap[np.pad(known, 1).ravel()] = 0.0  # what is beside has to be searched from tips
+        self.gamma[self.gap == 0.0] = self.tip_map.box.low
 
     def add(self, gamma: Array, tips: Array) -> None:
         """Search around tips that come closer to a center than all before."""
@@ -215,3 +230,79 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
         next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
     nowhere = nearest.distance >= NOWHERE
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
+
+
+def all_reached(grid: ReachedGrid, gamma: Array, tips: Array) -> ReachedGrid:
+    """All centers that searches find, from one cloud after the other until one finds no more.
+
+    And the distances of those around to the nearest tips.
+    """
+    grid.add(gamma, tips)
+    for number in range(1, _CLOUDS):
+        while not grid.fits():
+            grid = _wider(grid)
+        before = np.count_nonzero(grid.gap == 0.0)
+        grid.add(*cloud_on_faces(grid.tip_map, number))
+        if grid.fits() and np.count_nonzero(grid.gap == 0.0) == before:
+            break
+    spread(grid)
+    while not grid.fits(DISTANCE):
+        grid = _wider(grid)
+        spread(grid)
+    return grid
+
+
+def _wider(grid: ReachedGrid) -> ReachedGrid:
+    """The same on a lattice with room around what is reached."""
+    lattice = grid.lattice
+    known = np.flatnonzero(grid.near(DISTANCE))
+    room = np.full(3, 4 + max(lattice.shape) // 8)
+    room[2] *= not grid.is_flat
+    nx, ny, nz = np.array(lattice.shape) + 2 * room
+    origin = lattice.origin - room * lattice.cell
+    larger = Lattice(origin, lattice.cell, (int(nx), int(ny), int(nz)))
+    wide = ReachedGrid(grid.tip_map, larger, grid.progress, is_flat=grid.is_flat)
+    wide.add(grid.gamma[known], grid.tip_map.tips(grid.gamma[known]))
+    return wide
+
+
+def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
+    """Activations on faces of all dimensions of the box, and their tips."""
+    if isinstance(tip_map, AllPostures):
+        return tip_map.with_sheets(*cloud_on_faces(tip_map.from_rest, seed))
+    box, rng = tip_map.box, np.random.default_rng(seed)
+    m = box.dimension
+    cube = rng.random((CLOUD, m))
+    free = np.maximum(rng.integers(0, m + 1, CLOUD), 2)
+    bound = rng.random((CLOUD, m)).argsort(axis=1) >= free[:, None]
+    cube[bound] = rng.integers(0, 2, int(bound.sum()))
+    gamma = np.ascontiguousarray(box.from_free_cube(cube))
+    tips = tip_map.tips(gamma)
+    if not tip_map.supports_unstable:
+        return gamma, tips
+    stable = np.isfinite(tips[:, 0])
+    if not stable.any():
+        raise no_stable_equilibrium(len(tips))
+    return gamma[stable], tips[stable]
+
+
+def spread(grid: ReachedGrid) -> None:
+    """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
+    offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ grid.steps
+    offsets = offsets[offsets != 0]
+    near, known = (grid.gap < DISTANCE) & (grid.gap > 0.0), grid.gap <= 0.0
+    inside = covered_cubes(covered_cubes(known.reshape(grid.lattice.shape)))
+    rim = np.flatnonzero((grid.gap == 0.0) & ~np.pad(inside, 1).ravel())
+    front = np.concatenate([np.flatnonzero(near), rim])
+    while len(front):
+        tips = grid.tip_map.tips(grid.gamma[front])
+        sources, ways = np.nonzero(grid.gap[front[:, None] + offsets] > 0.0)
+        cells = front[sources] + offsets[ways]
+        away = np.linalg.norm(grid.centers(cells) - tips[sources], axis=1) / grid.lattice.cell
+        closer = np.flatnonzero(away < grid.gap[cells] - CLEARLY)
+        order = closer[np.lexsort((away[closer], cells[closer]))]
+        order = order[np.diff(cells[order], prepend=-1) > 0]
+        cells, sources = cells[order], front[sources[order]]
+        before = grid.gap[cells]
+        grid.search(cells, grid.gamma[sources])
+        front = cells[(grid.gap[cells] < before) & (grid.gap[cells] < DISTANCE)]

@@ -18,10 +18,8 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace.measure import Estimate
-from softreach.workspace.search import CLEARLY, ENOUGH, Flood, Nearest, nearest_tips
+from softreach.workspace.search import DISTANCE, ENOUGH, Nearest, ReachedGrid, nearest_tips
 
-DISTANCE = 0.75
-"""Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
 _ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
 _SHEET = 2e-3  # of its width, the root of its area, that a sheet is thinner than
 _SHEET_TOL = 1e-9  # in L, as a sheet may be no thicker than tips are exact otherwise
@@ -94,61 +92,39 @@ def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
     return ((tip_map.tips(gamma) - tips) * unit).sum(axis=1)
 
 
-def spread(flood: Flood) -> None:
-    """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
-    offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ flood.steps
-    offsets = offsets[offsets != 0]
-    near, reached = (flood.gap < DISTANCE) & (flood.gap > 0.0), np.flatnonzero(flood.gap == 0.0)
-    rim = reached[(flood.gap[reached[:, None] + offsets] > 0.0).any(axis=1)]
-    front = np.concatenate([np.flatnonzero(near), rim])
-    while len(front):
-        tips = flood.tip_map.tips(flood.gamma[front])
-        sources = np.repeat(np.arange(len(front)), len(offsets))
-        cells = (front[:, None] + offsets).ravel()
-        sources, cells = sources[flood.gap[cells] > 0.0], cells[flood.gap[cells] > 0.0]
-        away = np.linalg.norm(flood.centers(cells) - tips[sources], axis=1) / flood.lattice.cell
-        order = np.lexsort((away, cells))
-        order = order[away[order] < flood.gap[cells[order]] - CLEARLY]
-        order = order[np.diff(cells[order], prepend=-1) > 0]
-        cells, sources = cells[order], front[sources[order]]
-        before = flood.gap[cells]
-        flood.search(cells, flood.gamma[sources])
-        front = cells[(flood.gap[cells] < before) & (flood.gap[cells] < DISTANCE)]
-
-
-def drawn_tight(flood: Flood, at: Array) -> Nearest:
+def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
     """The nearest tips of places on edges of the lattice, from the tips at both ends.
 
     Args:
-        flood: What was found.
+        grid: What was found.
         at: Coordinates of the places in cells, shape (n, 3).
     """
-    lattice, n = flood.lattice, len(at)
+    lattice, n = grid.lattice, len(at)
     places = lattice.origin + lattice.cell * at
-    best = Nearest(np.zeros((n, flood.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
+    best = Nearest(np.zeros((n, grid.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
     for end in (np.floor(at), np.ceil(at)):
-        cells = end.astype(np.int64) @ flood.steps
-        found = nearest_tips(flood.tip_map, flood.gamma[cells], places, ENOUGH * lattice.cell)
+        cells = end.astype(np.int64) @ grid.steps
+        found = nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * lattice.cell)
         closer = found.distance < best.distance
         for kept, new in zip(best, found, strict=True):
             kept[closer] = new[closer]
     return best
 
 
-def wrapped(flood: Flood) -> Wrap:
+def wrapped(grid: ReachedGrid) -> Wrap:
     """The surface around what was found.
 
     Raises:
         MissingExtra: scikit-image is not installed.
     """
-    at, faces = level_set(flood.distances, DISTANCE)
-    gamma, tips, _ = drawn_tight(flood, at)
-    cell, away = flood.lattice.cell, flood.lattice.origin + flood.lattice.cell * at - tips
+    at, faces = level_set(grid.distances, DISTANCE)
+    gamma, tips, _ = drawn_tight(grid, at)
+    cell, away = grid.lattice.cell, grid.lattice.origin + grid.lattice.cell * at - tips
     away /= np.linalg.norm(away, axis=1).clip(1e-9 * cell)[:, None]
     return Wrap(
         vertices=tips + _ASIDE * cell * away,
         faces=faces,
-        tip_map=flood.tip_map,
+        tip_map=grid.tip_map,
         cell=cell,
         gamma=gamma,
         tight_volume=Surface(vertices=tips, faces=faces).volume,

@@ -78,6 +78,8 @@ class _Grid:
         good = known.is_stable
         at = np.full(len(self.gamma), _NONE)
         at[nodes[good]] = self._put(nodes[good], known.of(good))
+        if not len(self.node):
+            return
         self._link_smooth(at, postures)
         front = np.arange(first, len(self.node))
         while len(front):
@@ -90,7 +92,7 @@ class _Grid:
         end_gamma = np.concatenate([self.gamma[:0], *self.end_gamma])
         end_postures = joined([self.found.of(slice(0)), *self.end_postures])
         tips, end_tips = points(self.gamma[self.node], self.found), points(end_gamma, end_postures)
-        return Held(self.node, tips, links, ends, end_tips, is_doubled)
+        return Held(self.node, tips, links, ends, end_tips, is_doubled, self.found.frame)
 
     def _put(self, nodes: Index, found: Equilibria) -> Index:
         """Numbers of postures at nodes, known ones or new; none where a node has too many."""

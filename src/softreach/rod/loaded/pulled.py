@@ -161,9 +161,9 @@ class LoadedLengths:
         after = _State(state.tension + step, shortening, slopes)
         return after, ~_has_nan(shortening)
 
-    def continued_from(self, inner: Array) -> LoadedLengths:
-        """Those of the arm in its posture at activations with tensions, shape (1, bundles)."""
-        rod = self.rod.continued_from(inner)
+    def continued_from(self, inner: Array, frames: Array | None = None) -> LoadedLengths:
+        """Those of the arm in its posture at activations with tensions, shape (k, bundles)."""
+        rod = self.rod.continued_from(inner, frames)
         assert isinstance(rod, ArmRod)
         return replace(self, rod=rod)
 

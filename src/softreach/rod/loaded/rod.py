@@ -163,8 +163,8 @@ class LoadedRod(ArmRod):
     def _prepare(self) -> None:
         self.postures  # noqa: B018
 
-    def continued_from(self, gamma: Array) -> LoadedRod:
-        frame = self.equilibria(gamma).frame
+    def continued_from(self, gamma: Array, frames: Array | None = None) -> LoadedRod:
+        frame = self.equilibria(gamma).frame if frames is None else frames
         postures = self.postures.continued_from(gamma, frame)
         rod = _ContinuedRod(self.arm, self.tol, self.fixed_steps)
         vars(rod).update({"origin": self, **vars(self), "postures": postures})
@@ -324,6 +324,9 @@ class _ContinuedRod(LoadedRod):
 
     def __hash__(self) -> int:
         return id(self)
+
+    def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held:
+        return self.origin.held(gamma, sizes)
 
     @lazy
     def _shape_solver(self) -> Solver:

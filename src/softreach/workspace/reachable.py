@@ -1,7 +1,8 @@
-"""The solid that three free bundles or more let the tip reach."""
+"""Everything that the tip of an arm can reach, as a value to be asked; above all a solid."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
@@ -9,36 +10,179 @@ from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import Surface, without_flakes
+from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
-from softreach.support.errors import MissingExtra
+from softreach.support.errors import MissingExtra, counted
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.abstract_set import ReachableSet, Stored, with_error
 from softreach.workspace.boundary import boundary_surface, wrapped_surface
-from softreach.workspace.cells import ReachedCells
+from softreach.workspace.cells import ReachedCells, cells_of
 from softreach.workspace.flux import face_image
 from softreach.workspace.image import DIAGONAL, Image
 from softreach.workspace.measure import Estimate
-from softreach.workspace.redundant import cells_of
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Route = Literal["flux", "raster", "search"]
+_POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_MEANINGS = {
+    "volume": ("m3", "volume"),
+    "area": ("m2", "area"),
+    "curve_length": ("m", "length"),
+    "convex_volume": ("m3", "convex hull's volume"),
+    "convex_area": ("m2", "convex hull's area"),
+    "unreachability": ("1", "share of the convex hull out of reach"),
+}
+
+Stored = dict[str, tuple[tuple[()], float, dict[str, str]]]
+"""Variables of a dataset, each one number."""
+
 
 _THIN = 0.01  # of its width, the root of its area, that a shell is thinner than
 _SEEN = 2.0  # cells of a raster, below which a set is a sheet to it
 _CHORDS = 10.0  # of L over the square of the cells of a grid, whose chords leave sheets
 _NEVER_THIN = 0.05  # of L³: no sheet within reach is that large and thin
-
 _ROUTES = {
     "flux": "one to one: by flux through the faces of the activation box",
     "raster": "rasterized, as the image folds or overlaps or may do so",
     "search": "searched for in space",
 }
+
+
+def with_error(name: str, value: float, error: float, unit: str, meaning: str) -> Stored:
+    """A number and its error, as they are stored."""
+    return {
+        name: ((), value, {"units": unit, "long_name": meaning}),
+        f"{name}_error": ((), error, {"units": unit, "long_name": f"error of the {meaning}"}),
+    }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ReachableSet(ABC):
+    """The image of the activation box under the map from activations to tips.
+
+    Three bundles or more with room between their bounds fill a `ReachableSolid`; two sweep a
+    `ReachableSurface`, one draws a `ReachableCurve`, and none leaves a `ReachablePoint`.
+    """
+
+    dimension: ClassVar[int]
+    """3 for a solid, 2 for a surface, 1 for a curve, 0 for a point."""
+    _stored: ClassVar[tuple[str, ...]]
+    """Names of the numbers that are stored with an error: its size and its hull's first."""
+
+    tip_map: TipMap
+    """The map whose image this is, with its arm, activation box and tolerance; drives with dead
+    zones by inputs beyond these."""
+    cells: int = 0
+    """Cells of the activation grid along each axis; 0 where there is none."""
+    volume: float = 0.0
+    """Volume [m³]; places count once however often they are reached. 0 for all but solids."""
+    volume_error: float = 0.0
+    """Error of `volume`, estimated from two resolutions [m³]."""
+    convex_volume: float = 0.0
+    """Volume of the convex hull [m³]."""
+    convex_volume_error: float = 0.0
+    """Error of `convex_volume`, estimated from two grids [m³]."""
+    lost_share: float = 0.0
+    """Share of the activation box at which no posture is held [-], by the activation grid; where
+    there is none, by one of postures or a sample. 0 for an arm without loads."""
+    hysteresis_share: float = 0.0
+    """Share of the activation box at which two postures are held, the one or the other by the way
+    that the arm has come [-]; mirror images of those that lean do not count. 0 for more than
+    three free bundles, of which nothing tells."""
+
+    @property
+    def arm(self) -> Manipulator:
+        """The design."""
+        return self.tip_map.arm
+
+    @property
+    def unreachability(self) -> float:
+        """The part of the convex hull that is out of reach [-]; NaN for 0/0.
+
+        1 - V / V_convex, and of a region in a plane 1 - A / A_convex.
+        """
+        size, _, convex, _ = self._sizes()
+        return 1.0 - size / convex if convex > 0 else np.nan
+
+    @property
+    def unreachability_error(self) -> float:
+        """Error of `unreachability` by those of both volumes or areas [-]; NaN for 0/0."""
+        size, error, convex, convex_error = self._sizes()
+        return (error + size / convex * convex_error) / convex if convex > 0 else np.nan
+
+    @abstractmethod
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance of points to the set [m], shape (n,).
+
+        Args:
+            points: Positions [m], shape (n, 3), or (3,) for one.
+
+        Raises:
+            InvalidInput: Points of another shape or not finite.
+        """
+
+    def to_dataset(self) -> xr.Dataset:
+        """All numbers of the set with their errors and units, and where they come from."""
+        import xarray as xr
+
+        variables = self._numbers()
+        if self.tip_map.supports_unstable:
+            meanings = {"lost": "without a posture", "hysteresis": "with two postures"}
+            for name, meaning in meanings.items():
+                about = {"units": "1", "long_name": f"share of the activation box {meaning}"}
+                variables[f"{name}_share"] = ((), getattr(self, f"{name}_share"), about)
+        attrs = {**provenance(self.arm, self.tip_map.frame), "tol": self.tip_map.tol}
+        attrs |= {"activation_grid": self.cells} if self.cells else {}
+        return xr.Dataset(variables, attrs=attrs | {"dimension": self.dimension})
+
+    def __repr__(self) -> str:
+        size, *details = self._lines()
+        if self.lost_share > 0.0:
+            details.append(f"no posture is held at {100 * self.lost_share:.2g} % of activations")
+        if self.hysteresis_share > 0.0:
+            share = f"{100 * self.hysteresis_share:.2g} % of activations"
+            details.append(f"hysteresis: two postures are held at {share}")
+        box, tip_map = self.tip_map.box, self.tip_map
+        power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
+        grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
+        free = counted(box.dimension, "free bundle")
+        details.append(f"L = {tip_map.length:g} m, {free}; {grid}tip error up to {tip_map.tol:g} L")
+        return "\n  ".join([f"{type(self).__name__}: {size}", *details])
+
+    def _lines(self) -> list[str]:
+        """Lines to print: the size first."""
+        size, hull = self._stored[:2]
+        lines = [f"{_MEANINGS[size][1]} {self._text(size)}", f"convex hull {self._text(hull)}"]
+        if _MEANINGS[size][0] == _MEANINGS[hull][0] and getattr(self, hull) > 0.0:
+            lines[1] += f", of which {self._text('unreachability')} are out of reach"
+        return lines
+
+    def _numbers(self) -> Stored:
+        """Numbers to store."""
+        each = (
+            with_error(name, getattr(self, name), getattr(self, f"{name}_error"), *_MEANINGS[name])
+            for name in self._stored
+        )
+        return {name: number for numbers in each for name, number in numbers.items()}
+
+    def _sizes(self) -> tuple[float, float, float, float]:
+        """Size and error of the set, and of its convex hull."""
+        return self.volume, self.volume_error, self.convex_volume, self.convex_volume_error
+
+    def _text(self, name: str) -> str:
+        """A number with its error, shares in percent."""
+        value, error, unit = getattr(self, name), getattr(self, f"{name}_error"), _MEANINGS[name][0]
+        if unit == "1":
+            return quantity(100 * value, "%", 100 * error)
+        return quantity(value, unit.translate(_POWERS), error)
+
+
+Route = Literal["flux", "raster", "search"]
 
 
 class Shell(NamedTuple):
@@ -242,7 +386,7 @@ class ReachableSolid(ReachableSet):
         corners = self.tip_map.tips(self.tip_map.box.corners())
         outer = corners[~self._covering.are_deep(corners)]
         if (surface.distance(outer) > DIAGONAL * cell).any():  # a spike that no center is in
-            return cells_of(self.tip_map, cell).wrap
+            return cells_of(self.tip_map, cell, self._covering.are_deep).wrap
         return surface
 
     @lazy
