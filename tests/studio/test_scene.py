@@ -222,6 +222,14 @@ def test_only_the_parameters_that_differ_have_rows_and_changes_are_from_the_kept
     assert rows["taper φ [deg]"].change == pytest.approx(-2)
 
 
+@pytest.mark.parametrize(("liters", "title"), [(0.5, "volume [mL]"), (1.2, "volume [liters]")])
+def test_volumes_are_compared_in_liters_from_one_liter_on(liters, title):
+    arm = designs.lce_arm().replace(display_unit="mm")
+    row, *_ = compared((arm, reach(4e-4)), (arm, reach(1e-3 * liters))).rows
+    assert row.title == title
+    assert row.now == pytest.approx(liters * (1000 if "mL" in title else 1))
+
+
 def test_what_is_not_known_of_a_design_has_no_change():
     turned = changed(TRUNK, {"revolution": 1.0})
     comparison = compared((TRUNK, reach(0.7)), (turned, None))

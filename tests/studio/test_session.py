@@ -18,7 +18,7 @@ from softreach.studio.reach import (
     Reach,
     cloud_points,
     count_activations,
-    shown_rows,
+    shown_samples,
     stages,
     uncounted,
 )
@@ -110,7 +110,7 @@ def test_places_counted_once_for_every_activation_make_up_the_volume(revolution,
 
 
 def test_away_from_folds_points_have_the_colors_of_what_the_inverse_finds(folded):
-    rows = shown_rows(folded, 9)
+    rows = shown_samples(folded, 9)
     found = solve_inverse(folded.arm, folded.cloud.tip.values[rows])  # with its own tolerance
     worst = [one.conditions.max(initial=np.inf if not len(one) else 0.0) for one in found]
     regular = np.array(worst) < 100

@@ -15,7 +15,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
 from softreach.studio.found import Found
-from softreach.studio.reach import Reach, count_activations, shown_rows, stages, uncounted
+from softreach.studio.reach import Reach, count_activations, shown_samples, stages, uncounted
 from softreach.studio.scene.camera import is_behind
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import shows_cloud
@@ -243,7 +243,7 @@ def _count(reach: Reach, given: Given) -> None:
     look = given.state.appearance
     if not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
         return
-    missing, done = uncounted(reach, shown_rows(reach, look.level)), 0
+    missing, done = uncounted(reach, shown_samples(reach, look.level)), 0
 
     def progress(more: int) -> None:
         nonlocal done

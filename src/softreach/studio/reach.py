@@ -37,8 +37,6 @@ _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
 _LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
 _BLOCK = 1 << 13  # targets solved at a time: a tenth of a second, after which others have a turn
 
-Rows = slice | NDArray[np.int64]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
@@ -159,7 +157,7 @@ class Reach:
         inward = -_INSIDE * self.arm.length * vertex_normals(sheets.vertices, sheets.faces)
         activation = sheets.activation
         if activation is None:
-            shown = given.values[shown_rows(self, _LEVEL)]
+            shown = given.values[shown_samples(self, _LEVEL)]
             activation = shown[nearest_samples(self, sheets.vertices)].mean(axis=1)
         cloud = (
             self.cloud[["tip", "activation"]]
@@ -177,24 +175,19 @@ class Reach:
         return float((self.status == status).mean())
 
 
-def shown_samples(reach: Reach, level: int) -> Rows:
-    """Samples that a picture of 2^level points shows: those that have a tip."""
-    first = slice(0, min(1 << level, reach.samples))
-    rows = first if reach.order is None else reach.order[first]
-    settled = has_tip(reach.status[rows])
-    return rows if settled.all() else np.arange(reach.samples)[rows][settled]
-
-
-def shown_rows(reach: Reach, level: int) -> NDArray[np.int64]:
-    """The same samples by their numbers."""
-    return np.arange(reach.samples)[shown_samples(reach, level)]
+def shown_samples(reach: Reach, level: int) -> NDArray[np.int64]:
+    """Numbers of the samples that a picture of 2^level points shows: those that have a tip."""
+    rows = np.arange(min(1 << level, reach.samples))
+    if reach.order is not None:
+        rows = reach.order[rows]
+    return rows[has_tip(reach.status[rows])]
 
 
 def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Places among `shown_rows(reach, 15)` of the samples nearest to points [m], shape (n, k)."""
+    """Places of the nearest to points [m] among `shown_samples(reach, 15)`, shape (n, k)."""
     from scipy.spatial import KDTree
 
-    tips = reach.cloud.tip.values[shown_rows(reach, _LEVEL)]
+    tips = reach.cloud.tip.values[shown_samples(reach, _LEVEL)]
     count = min(_NEIGHBORS, len(tips))
     return KDTree(tips).query(points, count)[1].reshape(len(points), count)
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Pull
 from softreach.studio.jobs import Given, Job, Learned, forgotten, what_follows
-from softreach.studio.reach import cloud_points, shown_rows
+from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.scene.surfaces import in_slice
@@ -234,7 +234,7 @@ class Session:
         hit = picked_point(points[seen], origin, direction, _CLICK)
         if hit is None:
             return None
-        sample = int(shown_rows(reach, look.level)[seen[hit]])
+        sample = int(shown_samples(reach, look.level)[seen[hit]])
         return tip_positions(reach.arm, [reach.cloud.activation.values[sample]])[0]
 
     def look_from(self, view: str) -> None:

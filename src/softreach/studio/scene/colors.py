@@ -20,7 +20,6 @@ from softreach.studio.reach import (
     Reach,
     count_activations,
     nearest_samples,
-    shown_rows,
     shown_samples,
 )
 from softreach.studio.state import LEVELS, rod_of
@@ -72,7 +71,7 @@ def sample_values(reach: Reach, level: int, color: str) -> str | int | xr.DataAr
     if color == "multiplicity" and not reach.fine:
         return "rgb"  # coarse clouds last for a moment only, in which nothing is counted
     label, values_of = _SCALES[color]
-    values = values_of(reach, shown_rows(reach, level))
+    values = values_of(reach, shown_samples(reach, level))
     clipped = color != "multiplicity" and np.isfinite(values).any()
     if clipped:  # the few smallest and largest would leave the others one color
         values = np.clip(values, *np.nanpercentile(values, _PERCENTILES))

@@ -75,6 +75,7 @@ def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
 
 def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
     rows, bars = dict[str, SliderField](), dict[str, Line]()
+    before = panel.session.found.ends  # of a design with other sliders
     for each in shown:
         at = of_design(each.read, each.write)
         rows[each.name] = panel.slider(each.label, each.limits, each.step, at, each.hint)
@@ -82,7 +83,7 @@ def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
             bars[each.name] = panel.kept(Line(panel.gui))
 
     def end(_: StudioState, found: Found) -> None:
-        for name, row in rows.items():
+        for name, row in rows.items() if found.ends is not before else ():
             low, high = found.ends.get(name, row.ends)
             if (low, high) != row.ends and low < high:
                 row.ends = low, high
@@ -298,16 +299,7 @@ def loads(panel: Fields) -> None:
     """Base, gravity, a payload and a force on the tip, as they are typed."""
     loaded = panel.session.state.design.loads is not None
     with panel.folder("base and loads", expanded=loaded):
-        way = "Which way the straight arm points from its base, in the world"
-        points = of_design(
-            lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
-            lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
-        )
-        panel.dropdown("base", _WAYS, points, way)
-        where = "r(0): where the arm is clamped, as x, y, z in the world"
-        panel.vector("base at [mm]", base_field("position"), where)
-        turn = "ψ: turn of the base about the way the arm points"
-        panel.number("turn [deg]", base_field("turn"), turn)
+        _base(panel)
         names = {name: name for name in GRAVITIES} | {"": "as typed"}
         gravity = load_field("gravity")
         fall = Attribute(
@@ -337,6 +329,19 @@ def loads(panel: Fields) -> None:
             return [f"From the design file act too: {more}."] if more else []
 
         panel.text("design", content=others)
+
+
+def _base(panel: Fields) -> None:
+    way = "Which way the straight arm points from its base, in the world"
+    points = of_design(
+        lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
+        lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
+    )
+    panel.dropdown("base", _WAYS, points, way)
+    where = "r(0): where the arm is clamped, as x, y, z in the world"
+    panel.vector("base at [mm]", base_field("position"), where)
+    turn = "ψ: turn of the base about the way the arm points"
+    panel.number("turn [deg]", base_field("turn"), turn)
 
 
 def other_loads(arm: Manipulator) -> list[str]:

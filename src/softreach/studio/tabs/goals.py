@@ -310,9 +310,10 @@ def _is_free(name: str) -> Attribute:
 
 
 def _read_poses(session: Session, file: UploadedFile) -> None:
-    arm = session.state.design
+    arm, before = session.state.design, session.found.bench
     data = read_measurements(arm, read_table(io.BytesIO(file.content), file.name))
-    _pose(session, Bench(data=replace(data, source=file.name), arm=arm))
+    free = ("pose",) if before is None else before.free
+    _pose(session, Bench(data=replace(data, source=file.name), arm=arm, free=free))
 
 
 def _pose(session: Session, bench: Bench) -> None:

@@ -142,7 +142,6 @@ def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
 
 # A target, and every activation that reaches it
 
-_TARGET_HINT = "Every activation that reaches a place: drag the tip there, type it, or click."
 _HERE = "\N{CHECK MARK} "
 _NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
 
@@ -211,7 +210,7 @@ def _is_near(activation: Any, state: StudioState) -> bool:
 
 def _answer_text(answer: Solution | None, state: StudioState) -> str:
     if answer is None:
-        return _TARGET_HINT
+        return "Every activation that reaches a place: drag the tip there, type it, or click."
     arm, unit = state.design, state.design.length_unit
     place = place_text(answer.target / arm.length, arm)
     if not len(answer):
