@@ -15,8 +15,8 @@ import softreach as sr
 from softreach.exchange.activefilaments import write_cloud, write_design
 from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.plot import plot_3d, save_figure
-from softreach.support.errors import NotWritten
-from softreach.support.files.atomic import writing
+from softreach.support.errors import NotWritten, SoftreachWarning
+from softreach.support.files.atomic import place_to_read, replacing_folder, writing
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 
 pytest.importorskip("pyarrow")
@@ -185,10 +185,11 @@ def test_a_library_that_swallows_an_error_does_not_get_away_with_it(tmp_path):
 
 
 KILLED = """
-import os, signal, sys
+import os, signal, sys, warnings
 from pathlib import Path
 from softreach.support.files import atomic
 
+warnings.simplefilter("ignore")
 place, operation = Path("it"), 0
 
 def write(name, overwrite):
@@ -205,12 +206,10 @@ def fill(folder):
         (folder / name / "c").write_text(content)
 
 def found(name):
+    where = Path(atomic.place_to_read(place))
     if name == "file":
-        return place.read_text()
-    for old in Path().glob(".softreach-*"):
-        if not place.exists() and all((old / name / "c").exists() for name in "ab"):
-            old.rename(place)  # as its user would
-    (text,) = {(place / name / "c").read_text() for name in "ab"}
+        return where.read_text()
+    (text,) = {(where / name / "c").read_text() for name in "ab"}
     return text
 
 def kill_before(operation):
@@ -249,6 +248,24 @@ def test_a_kill_before_any_operation_leaves_the_old_or_the_new_whole(name, tmp_p
     assert old >= (10 if name == "folder" else 2)
     assert new >= 2
     assert left == 1
+
+
+def test_a_folder_whose_replacement_was_killed_is_found_and_comes_back(tmp_path):
+    place, new, old = (
+        tmp_path / f"a.zarr{end}" for end in ("", ".softreach-new", ".softreach-old")
+    )
+    for path in (new, old):
+        path.mkdir()
+        (path / "whole").write_text(path.name)
+    with pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new is read"):
+        assert place_to_read(place) == str(new)
+    assert not place.exists()
+    with (
+        pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new was renamed to it"),
+        replacing_folder(place, lambda _: "", overwrite=True),
+    ):
+        assert (place / "whole").read_text() == new.name
+    assert [path.name for path in tmp_path.iterdir()] == ["a.zarr"]
 
 
 TRUNK = "minimal_trunk"

@@ -42,7 +42,7 @@ def printed(stream: io.TextIOWrapper) -> str:
 @pytest.mark.parametrize(
     ("arguments", "code", "expected"),
     [
-        (["--help"], 0, "softreach demo --out out"),
+        (["--help"], 0, "softreach reach minimal_trunk"),
         (["cloud", "--help"], 0, "--sampler"),
         (["volume", "--help"], 0, "-shape radius: 0.05L"),
         (["atlas", "build", "--help"], 0, "--vary"),
@@ -113,7 +113,7 @@ def test_help_is_whole_on_terminals_of_every_width(arguments, width, streams, mo
     out, _ = streams("ascii")
     assert run(arguments) == 0
     letters = "".join(printed(out).split())
-    assert "softreachdemo--outout" in letters or "--sampler" in letters
+    assert "softreachreachminimal_trunk" in letters or "--sampler" in letters
 
 
 def test_a_backend_that_does_not_exist_is_named():

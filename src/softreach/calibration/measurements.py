@@ -107,6 +107,11 @@ class Measurements:
         )
 
 
+def marker_names(arm: Manipulator) -> tuple[str, ...]:
+    """Names of the markers of an arm, which is "tip" without any."""
+    return tuple(marker.name for marker in arm.markers) or ("tip",)
+
+
 def read_measurements(
     arm: Manipulator,
     data: Any,
@@ -374,7 +379,7 @@ def _triples(columns: list[str]) -> dict[str, list[str]]:
 def _chosen_markers(
     arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
 ) -> dict[str, str]:
-    names = [marker.name for marker in arm.markers] or ["tip"]
+    names = marker_names(arm)
     if chosen := _matched("marker", names, given, dict(zip(triples, triples, strict=True))):
         return chosen
     if len(names) != len(triples):

@@ -18,7 +18,7 @@ from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
 from softreach.calibration.free_numbers import FreeNumbers
-from softreach.calibration.measurements import Measurements
+from softreach.calibration.measurements import Measurements, marker_names
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.pulled import LoadedLengths
@@ -84,11 +84,6 @@ def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
         return np.array([arm.length]), np.zeros((1, 3))
     places = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
     return places, np.array([marker.offset for marker in arm.markers])
-
-
-def marker_names(arm: Manipulator) -> tuple[str, ...]:
-    """Names of the markers of an arm, which is "tip" without any."""
-    return tuple(marker.name for marker in arm.markers) or ("tip",)
 
 
 def marker_places(arm: Manipulator, names: Iterable[str]) -> Index:

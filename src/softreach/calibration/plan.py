@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.calibration.fit import identifiable
 from softreach.calibration.free_numbers import FreeNumbers, free_numbers
-from softreach.calibration.model import MarkerModel, marker_names, marker_places
+from softreach.calibration.measurements import marker_names
+from softreach.calibration.model import MarkerModel, marker_places
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arguments import as_integer, as_names, as_number

@@ -21,7 +21,7 @@ from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.atomic import replacing_folder
+from softreach.support.files.atomic import place_to_read, replacing_folder
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.stores import (
     ARRAYS,
@@ -145,7 +145,7 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr
 
-    location = as_path("path", path)
+    location = place_to_read(as_path("path", path))
     opened = opened_store(location, "cloud")
     if opened is None or "command" in opened.group.attrs:
         hint = f"it does not exist, or has no {ROOT}" if opened is None else "this is an atlas"

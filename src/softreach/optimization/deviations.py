@@ -250,7 +250,7 @@ class FirstOrder:
         sigmas, within = self.deviations.sigmas, max(target.within, TOL * self.solid.arm.length)
         each = (
             probabilities(depth, np.linalg.norm(speed * sigmas, axis=1))
-            for depth, speed in self.depths(target.places, within)
+            for depth, speed in self.depths(target.points, within)
         )
         return np.min([*each], axis=0)
 

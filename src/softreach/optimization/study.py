@@ -15,7 +15,6 @@ import numpy as np
 
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.support.arguments import as_one_of, as_path
 from softreach.support.errors import InvalidInput, MissingExtra, in_short
 from softreach.support.lazy import lazy
 
@@ -53,8 +52,7 @@ class Study:
             MissingExtra: Optuna is not installed.
         """
         self.problem, self._first = problem, first
-        self._sampler = as_one_of("sampler", sampler, SAMPLERS)
-        self.seed = seed
+        self._sampler, self.seed = sampler, seed
         self.candidates: list[Candidate] = []
         """All designs that were judged, in their order."""
         self._kept: dict[str, Candidate] = {}  # in the storage, by what was asked
@@ -154,7 +152,7 @@ class Study:
 
     def _opened(self, place: str) -> optuna.Study:
         try:
-            study = self._created(_storage(as_path("storage", place)))
+            study = self._created(_storage(place))
             noted = study.user_attrs.get(_PROBLEM)
             if noted is None:
                 study.set_user_attr(_PROBLEM, self.problem.digest)
@@ -180,20 +178,18 @@ class Study:
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
     def _made_sampler(self) -> Any:
-        samplers, seed = self._optuna.samplers, self.seed
-        population = max(8, min(self._first, 48))
-        return {
-            "cma": lambda: samplers.CmaEsSampler(seed=seed, warn_independent_sampling=False),
-            "tpe": lambda: samplers.TPESampler(
-                seed=seed, multivariate=True, constant_liar=True, n_startup_trials=self._first
-            ),
-            "nsga2": lambda: samplers.NSGAIISampler(seed=seed, population_size=population),
-            "nsga3": lambda: samplers.NSGAIIISampler(seed=seed, population_size=population),
-            "sobol": lambda: samplers.QMCSampler(
-                seed=seed, scramble=True, warn_independent_sampling=False
-            ),
-            "random": lambda: samplers.RandomSampler(seed=seed),
-        }[self.kind]()
+        samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
+        population = {"population_size": max(8, min(self._first, 48))}
+        after = {"multivariate": True, "constant_liar": True, "n_startup_trials": self._first}
+        make, options = {
+            "cma": (samplers.CmaEsSampler, quiet),
+            "tpe": (samplers.TPESampler, after),
+            "nsga2": (samplers.NSGAIISampler, population),
+            "nsga3": (samplers.NSGAIIISampler, population),
+            "sobol": (samplers.QMCSampler, {"scramble": True, **quiet}),
+            "random": (samplers.RandomSampler, {}),
+        }[self.kind]
+        return make(seed=self.seed, **options)
 
     @lazy
     def _space(self) -> dict[str, Any]:

@@ -333,7 +333,7 @@ def _tried(count: int) -> Index:
 
 def _places(target: Target) -> Array:
     assert target.places is not None
-    return target.places[_tried(len(target.places))]
+    return target.points[_tried(len(target.points))]
 
 
 def _starts(first: FirstOrder, target: Target) -> list[Array]:

@@ -119,7 +119,7 @@ class Check(Reported):
     @lazy
     def target_of(self) -> Index:
         """Index of the target that each place belongs to, shape (place,)."""
-        counts = [0 if t.places is None else len(t.places) for t in self.requirements.targets]
+        counts = [0 if t.places is None else len(t.points) for t in self.requirements.targets]
         return np.repeat(np.arange(len(counts)), counts)
 
     @property
@@ -364,7 +364,7 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
         own = made.target_of == index
         gaps, reached = made.gaps[:, own], made.reached[:, own]
         load, place = np.unravel_index(int(gaps.argmax()), gaps.shape)
-        met = places_text(int(reached.all(axis=0).sum()), len(target.places))
+        met = places_text(int(reached.all(axis=0).sum()), len(target.points))
         if reached.all():
             effort = float(made.effort[:, own].max())
             near = f" to {unit.text(target.within)}" if target.within else ""

@@ -106,7 +106,7 @@ def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     for target in needs.targets:
         room = longest + target.within
         if target.places is not None:
-            away = np.linalg.norm(target.places - arm.base.position, axis=1)
+            away = np.linalg.norm(target.points - arm.base.position, axis=1)
             gap = float(away.max()) - room
             text = f"{unit.text(gap)} farther from the base than the arm is ever long"
         elif target.region is not None:

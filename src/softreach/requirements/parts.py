@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softreach.requirements.regions import Region
 from softreach.support.arguments import (
@@ -41,7 +42,7 @@ class Target:
         InvalidInput: Neither places nor a region, both, or numbers out of range.
     """
 
-    places: Array | None = None
+    places: ArrayLike | None = None
     """A place, the places of a path, or a cloud of places [m], shape (n, 3)."""
     _: dataclasses.KW_ONLY
     region: Region | None = None
@@ -70,6 +71,11 @@ class Target:
             raise InvalidInput("share", self.share, "left out where there is no region")
         object.__setattr__(self, "within", as_number("within", self.within, _LENGTH))
         as_text("name", self.name)
+
+    @property
+    def points(self) -> Array:
+        """The places [m], shape (n, 3); none where there is a region."""
+        return np.empty((0, 3)) if self.places is None else np.asarray(self.places)
 
 
 @dataclass(frozen=True, eq=False)

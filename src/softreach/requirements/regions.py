@@ -359,9 +359,8 @@ class Mesh(Region):
             for block in parallel.blocks(len(points), _BLOCK // 16)
         )
         for block in parallel.blocks(len(points), _BLOCK):
-            normal, foot = self._nearest_feature(points[block], face[block])
-            outside = ((points[block] - foot) * normal).sum(axis=1)
-            out[block] = np.where(outside < 0.0, -out[block], out[block])
+            is_inside = self._outside(points[block], face[block]) < 0.0
+            out[block] = np.where(is_inside, -out[block], out[block])
         return out
 
     def wireframe(self, around: Array) -> list[Array]:
@@ -397,47 +396,37 @@ class Mesh(Region):
         return edges, beside, number.reshape(-1, 3)
 
     @lazy
-    def _edge_normals(self) -> Array:
-        return self._face_normals[self._edges[1]].sum(axis=1)
-
-    @lazy
-    def _vertex_normals(self) -> Array:
-        normals = np.zeros_like(self.vertices)
+    def _normals(self) -> Array:
+        """Of each face, of its edges, and of its corners by their angles, shape (f, 7, 3)."""
+        at_vertices = np.zeros_like(self.vertices)
         for k in range(3):
             here, after, before = (self._corners[:, (k + j) % 3] for j in range(3))
             u, v = after - here, before - here
             angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), (u * v).sum(axis=1))
-            np.add.at(normals, self.faces[:, k], angle[:, None] * self._face_normals)
-        return normals
+            np.add.at(at_vertices, self.faces[:, k], angle[:, None] * self._face_normals)
+        _, beside, edges = self._edges
+        at_edges = self._face_normals[beside].sum(axis=1)[edges]
+        own = self._face_normals[:, None]
+        return np.concatenate([own, at_edges, at_vertices[self.faces]], axis=1)
 
-    def _nearest_feature(self, points: Array, face: Index) -> tuple[Array, Array]:
-        """Normal and nearest point of the face, edge or corner of a triangle nearest to points."""
-        normal, corners = self._face_normals[face].copy(), self._corners[face]
-        a, b, c = corners.swapaxes(0, 1)
-        height = ((points - a) * normal).sum(axis=1, keepdims=True)
+    def _outside(self, points: Array, face: Index) -> Array:
+        """Heights of points over what of a triangle is nearest: the face, an edge or a corner."""
+        normal, corners = self._face_normals[face], self._corners[face]
+        along, away = np.roll(corners, -1, axis=1) - corners, points[:, None] - corners
+        height = (away[:, 0] * normal).sum(axis=1, keepdims=True)
         foot = points - height * normal
-        inside = np.ones(len(points), bool)
-        for start, end in ((a, b), (b, c), (c, a)):
-            inside &= (np.cross(end - start, foot - start) * normal).sum(axis=1) >= 0.0
-        rest = np.flatnonzero(~inside | ~normal.any(axis=1))
-        nearest = np.full(len(rest), np.inf)
-        for k in range(3):
-            start, end = corners[rest, k], corners[rest, (k + 1) % 3]
-            along = end - start
-            square = (along**2).sum(axis=1)
-            share = ((points[rest] - start) * along).sum(axis=1) / np.where(square > 0, square, 1.0)
-            share = share.clip(0.0, 1.0)
-            place = start + share[:, None] * along
-            apart = np.linalg.norm(points[rest] - place, axis=1)
-            better = apart < nearest
-            nearest[better], foot[rest[better]] = apart[better], place[better]
-            of_edge = self._edge_normals[self._edges[2][face[rest], k]]
-            of_start = self._vertex_normals[self.faces[face[rest], k]]
-            of_end = self._vertex_normals[self.faces[face[rest], (k + 1) % 3]]
-            feature = np.where(share[:, None] <= 0.0, of_start, of_edge)
-            feature = np.where(share[:, None] >= 1.0, of_end, feature)
-            normal[rest[better]] = feature[better]
-        return normal, foot
+        turns = (np.cross(along, foot[:, None] - corners) * normal[:, None]).sum(axis=2)
+        square = (along**2).sum(axis=2)
+        share = ((away * along).sum(axis=2) / np.where(square > 0.0, square, 1.0)).clip(0.0, 1.0)
+        places = corners + share[..., None] * along
+        edge = np.linalg.norm(points[:, None] - places, axis=2).argmin(axis=1)
+        row = np.arange(len(points))
+        end = share[row, edge]
+        feature = np.where(end <= 0.0, 4 + edge, np.where(end >= 1.0, 4 + (edge + 1) % 3, 1 + edge))
+        is_inside = (turns >= 0.0).all(axis=1) & normal.any(axis=1)
+        foot = np.where(is_inside[:, None], foot, places[row, edge])
+        normal = self._normals[face, np.where(is_inside, 0, feature)]
+        return ((points - foot) * normal).sum(axis=1)
 
 
 def _unit_of(name: str) -> str | None:

@@ -73,13 +73,13 @@ class Requirements:
         InvalidDesign: Parts that contradict each other; each is named.
     """
 
-    targets: tuple[Target, ...] = ()
+    targets: Sequence[Target] = ()
     """Places to reach."""
-    keeps: tuple[Keep, ...] = ()
+    keeps: Sequence[Keep] = ()
     """Regions to stay in or to avoid."""
     limits: Limits = field(default_factory=Limits)
     """Upper limits."""
-    payloads: tuple[float, ...] = ()
+    payloads: Sequence[float] = ()
     """Masses at the tip under each of which every target must be reached [kg]; none for the loads
     of the design as they are."""
     measures: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
@@ -107,13 +107,13 @@ class Requirements:
     @property
     def places(self) -> Array:
         """Places of all targets that have some, one after the other [m], shape (n, 3)."""
-        each = [target.places for target in self.targets if target.places is not None]
+        each = [target.points for target in self.targets if target.places is not None]
         return np.concatenate([np.empty((0, 3)), *each])
 
     @property
     def within(self) -> Array:
         """Distance to which each of these must be reached [m], shape (n,)."""
-        each = [np.full(len(t.places), t.within) for t in self.targets if t.places is not None]
+        each = [np.full(len(t.points), t.within) for t in self.targets if t.places is not None]
         return np.concatenate([np.empty(0), *each])
 
     def under_payloads(self, arm: Manipulator) -> list[Manipulator]:
@@ -246,7 +246,7 @@ def _contradictions(needs: Requirements) -> Iterator[Fault]:
         where = "outside" if keep.inside else "inside"
         for target in needs.targets:
             region = target.region
-            points = np.asarray(target.places if region is None else region.places(256))
+            points = np.asarray(target.points if region is None else region.places(256))
             missed = keep.missed(points) - target.within
             wrong = np.flatnonzero(missed > 1e-12 * (1.0 + np.abs(points).max()))
             if region is not None:
@@ -464,7 +464,7 @@ def _written(needs: Requirements) -> str:
     for target in needs.targets:
         lines = ["[[reach]]", *_lines({"name": target.name})]
         if target.places is not None:
-            rows = (f"  {value_text(row)}," for row in target.places.tolist())
+            rows = (f"  {value_text(row)}," for row in target.points.tolist())
             lines += ["places_m = [", *rows, "]"]
         elif target.region is not None:
             lines += [_region_line(target.region), *_lines({"share": target.share})]

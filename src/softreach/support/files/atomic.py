@@ -1,9 +1,14 @@
 """Files and folders appear whole or not at all, and what was there before is never lost.
 
 A file is written beside its place, synced, and renamed over it. No system renames a folder over a
-full one: the older one is renamed to a hidden name first, `.softreach-1a2b3c4d-NAME`, as which new
-ones are built. What a killed process leaves under such a name stays, as nothing tells it from what
-a slow one writes.
+full one, so that a folder takes four steps; each name says how far a killed process came:
+
+    .softreach-1a2b3c4d-NAME   being built: may be half
+    NAME.softreach-new         whole: the one that comes to NAME
+    NAME.softreach-old         whole: the one that was at NAME
+    NAME                       whole, or missing for an instant: then look at the two above
+
+What a killed process leaves under a hidden name stays, as nothing tells it from a slow one.
 """
 
 from __future__ import annotations
@@ -20,10 +25,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from softreach.support.errors import InvalidInput, NotWritten
+from softreach.support.errors import InvalidInput, NotWritten, warn
 
 MARK = ".softreach-"
-"""Beginning of the names of what is being written, and of what is replaced."""
+"""Beginning of the names of what is being written, and of its two names at the end."""
 
 _PATIENCE = 5.0
 """Seconds in which threads of libraries end that still write into a folder after Ctrl-C."""
@@ -51,12 +56,17 @@ def check_place(
     Raises:
         InvalidInput: Something is there that may not be replaced.
         NotWritten: Nothing can be written there.
+
+    Warns:
+        SoftreachWarning: The replacement of a folder was killed; see `mend`.
     """
     shown = os.fspath(path)
     if not shown or "\0" in shown:
         raise InvalidInput(name, repr(shown), "the name of a file")
     place = Path(os.path.realpath(shown))
     with _one_line(path):
+        if foreign is not None:
+            mend(path)
         try:
             mode = place.stat().st_mode
         except FileNotFoundError:
@@ -131,30 +141,51 @@ def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False
         overwrite: Whether what is there may be replaced.
     """
     place = check_place(path, overwrite=overwrite, foreign=foreign)
+    new, old = _siblings(place)
     with _one_line(path):
-        building, old = _beside(place), _beside(place)
+        building = _beside(place)
         building.mkdir()
         try:
             yield building
             _sync_tree(building)
             check_place(path, overwrite=overwrite, foreign=foreign)
+            _discard(new)  # of replacements that were killed: NAME is no older
+            _discard(old)
+            os.rename(building, new)  # from here on it is whole
             if os.path.lexists(place):
                 os.rename(place, old)
-            os.rename(building, place)
+            os.rename(new, place)
             sync(place.parent)  # before the old one goes
+            _discard(old)
         finally:
-            if old.exists() and not os.path.lexists(place):  # Ctrl-C came between the renames
-                os.rename(old, place)
-            _remove(building)
-            _remove(old)
+            deadline = time.monotonic() + _PATIENCE
+            while building.exists() and time.monotonic() < deadline:
+                shutil.rmtree(building, ignore_errors=True)
+            _rename_what_is_whole(place)  # after Ctrl-C between two renames
 
 
-def _remove(place: Path) -> None:
-    deadline = time.monotonic() + _PATIENCE
-    while place.is_dir() and time.monotonic() < deadline:
-        shutil.rmtree(place, ignore_errors=True)
-    if not place.is_dir():
-        place.unlink(missing_ok=True)
+def mend(path: StrPath) -> None:
+    """Bring a folder to its name if a process was killed between two renames; for writers.
+
+    Warns:
+        SoftreachWarning: That was so.
+    """
+    if whole := _rename_what_is_whole(Path(os.path.realpath(path))):
+        warn(f"{path}: its replacement was killed; {whole.name} was renamed to it")
+
+
+def place_to_read(path: StrPath) -> str:
+    """The place of a folder to be read: its name, or where a killed process left it.
+
+    Warns:
+        SoftreachWarning: It is read from there.
+    """
+    place = Path(os.path.realpath(path))
+    for whole in () if os.path.lexists(place) else _siblings(place):
+        if whole.is_dir():
+            warn(f"{path}: its replacement was killed; {whole.name} is read")
+            return os.fspath(whole)
+    return os.fspath(path)
 
 
 def sync(path: Path) -> None:
@@ -179,6 +210,29 @@ def _beside(place: Path) -> Path:
     """A new name, which keeps the suffix, as writers choose their format by it."""
     place.parent.mkdir(parents=True, exist_ok=True)
     return place.with_name(f"{MARK}{secrets.token_hex(4)}-{place.name[-40:]}")
+
+
+def _siblings(place: Path) -> tuple[Path, Path]:
+    return place.with_name(f"{place.name}{MARK}new"), place.with_name(f"{place.name}{MARK}old")
+
+
+def _rename_what_is_whole(place: Path) -> Path | None:
+    for whole in () if os.path.lexists(place) else _siblings(place):
+        if whole.is_dir():
+            os.rename(whole, place)
+            return whole
+    return None
+
+
+def _discard(whole: Path) -> None:
+    """Remove what is there, renamed first: no reader may take half of it for the whole."""
+    if os.path.lexists(whole):
+        trash = _beside(whole)
+        os.rename(whole, trash)
+        if trash.is_dir():
+            shutil.rmtree(trash, ignore_errors=True)
+        else:
+            trash.unlink()
 
 
 @contextmanager
