@@ -21,7 +21,6 @@ from softreach.studio.state import (
     Appearance,
     Camera,
     History,
-    PlotSettings,
     Slice,
     StudioState,
     TipPath,
@@ -45,7 +44,8 @@ def states(draw: st.DrawFn) -> StudioState:
         slice=Slice(axis=axis, center=draw(numbers), thickness=draw(st.floats(0.01, 1))),
         surface=draw(st.booleans()),
         mouse=draw(st.sampled_from([*MOUSE])),
-        plots=PlotSettings(shown=draw(st.sampled_from([(), ("section",)])), parameter="taper"),
+        section=draw(st.booleans()),
+        swept=draw(st.sampled_from(["", "taper"])),
     )
     return StudioState(
         design=draw(arms() | st.just(LOADED)),
