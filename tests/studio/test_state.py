@@ -45,7 +45,7 @@ def states(draw: st.DrawFn) -> StudioState:
         surface=draw(st.booleans()),
         mouse=draw(st.sampled_from([*MOUSE])),
         section=draw(st.booleans()),
-        swept="taper",
+        swept=draw(st.sampled_from(["", "taper"])),
     )
     return StudioState(
         design=draw(arms() | st.just(LOADED)),
