@@ -494,29 +494,25 @@ def test_a_loaded_cloud_counts_its_stable_samples(folder, capsys):
 
 
 class TestRestInTheSummary:
-    def facts(self, capsys, *arguments):
-        assert run(["design", *arguments, "--json"]) == 0
-        return json.loads(capsys.readouterr().out)
-
-    def test_a_loaded_arm_has_its_sag_in_l_and_m(self, capsys):
+    def test_a_loaded_arm_has_its_sag_in_l_and_m(self, printed):
         arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(9.81, 0, 0), payload=0.001))
-        facts = self.facts(capsys, "lce_arm", "--gravity", "sideways", "--payload", "1g")
+        facts = printed("design", "lce_arm", "--gravity", "sideways", "--payload", "1g")
         known = sr.rest.rest(arm)
         assert facts["sag_at_rest_L"] == known.sag_over_length
         assert facts["sag_at_rest_m"] == known.sag
         assert facts["at_rest"] == "stable"
 
     @pytest.mark.large
-    def test_an_arm_that_cannot_stand_is_said_to_be_unstable(self, capsys):
-        assert self.facts(capsys, "lce_arm", "--payload", "50g")["at_rest"] == "unstable"
+    def test_an_arm_that_cannot_stand_is_said_to_be_unstable(self, printed):
+        assert printed("design", "lce_arm", "--payload", "50g")["at_rest"] == "unstable"
 
-    def test_an_arm_too_heavy_to_be_followed_is_still_described(self, capsys):
-        facts = self.facts(capsys, "lce_arm", "--gravity", "sideways", "--payload", "100kg")
+    def test_an_arm_too_heavy_to_be_followed_is_still_described(self, printed):
+        facts = printed("design", "lce_arm", "--gravity", "sideways", "--payload", "100kg")
         assert facts["at_rest"] == "unknown: the loads are too large"
         assert facts["sag_at_rest_L"] is None
 
-    def test_an_arm_without_loads_is_judged_by_its_own_weight(self, capsys):
-        facts = self.facts(capsys, "lce_arm")
+    def test_an_arm_without_loads_is_judged_by_its_own_weight(self, printed):
+        facts = printed("design", "lce_arm")
         held = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(9.81, 0, 0)))
         assert facts["sag_at_rest_sideways_L"] == sr.rest.rest(held).sag_over_length
         assert facts["at_rest_upright"] == "stable"

@@ -87,6 +87,12 @@ def test_a_finer_grid_agrees_to_the_errors(snapping):
     assert finer.hysteresis_share == pytest.approx(snapping.hysteresis_share, abs=0.01)
 
 
+@pytest.mark.large
+def test_of_several_sheets_twice_the_error_asked_for_has_to_do_and_is_not_warned_of():
+    found = reachable_set(loaded("lce", 5), accuracy=0.01)
+    assert 0.01 < found.volume_error / found.volume <= 0.02
+
+
 @pytest.mark.parametrize(
     ("name", "grams", "points"),
     [

@@ -18,6 +18,7 @@ from softreach.picture.shading import shade
 from softreach.picture.thumbnail import png_bytes
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.support.errors import InvalidInput
+from softreach.support.palette import bundle_color
 
 UNIT = Extent(0.0, 1.0, 0.0, 1.0)
 RED, BLUE = (255, 0, 0), (0, 0, 255)
@@ -262,3 +263,11 @@ class TestThumbnails:
         assert f"volume {hull.volume:.5g} m³" in shown
         flat = convex_hull(np.eye(3))
         assert "<img" not in flat._repr_html_()
+
+
+def test_twelve_bundles_have_colors_that_are_told_apart():
+    """Differences of 2 are just seen side by side (CIEDE2000)."""
+    color = pytest.importorskip("skimage.color")
+    lab = color.rgb2lab(np.array([[bundle_color(k) for k in range(12)]]))[0]
+    apart = color.deltaE_ciede2000(lab[:, None], lab[None])
+    assert apart[~np.eye(12, dtype=bool)].min() > 18

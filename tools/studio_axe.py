@@ -17,7 +17,6 @@ from tests.studio.tab import Tab
 from softreach.arm import designs
 from softreach.studio import Studio
 from softreach.studio.start import start_on_design
-from softreach.studio.state import PlotSettings
 
 SIZES = {"laptop": (1366, 768), "phone": (390, 844)}
 GRAVE = """async () => {
@@ -62,7 +61,7 @@ def furnish(tab: Tab) -> None:
     tab.session.update(
         lambda s: s.replace(activation=(-0.7, -0.4, -0.9), target=(0.05, 0.02, 0.15))
     )
-    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section", "sweep"))))
+    tab.session.update(lambda s: s.showing(section=True, sweep=True))
     tab.settle()
     tab.open("Compare")
     tab.press("Keep this design")

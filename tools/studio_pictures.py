@@ -22,7 +22,6 @@ from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.studio import Studio
 from softreach.studio.start import start_on_design
-from softreach.studio.state import PlotSettings
 
 PICTURES = Path(__file__).parent.parent / "docs" / "images"
 LAPTOP, PHONE = (1366, 768), (390, 844)
@@ -56,8 +55,7 @@ def studio_plots(tab: Tab) -> None:
     """The section, and the volume against the taper."""
     pose(tab, CURLED)
     tab.open("Plots")
-    views = PlotSettings(shown=("section", "sweep"), parameter="taper")
-    tab.session.update(lambda state: state.showing(plots=views))
+    tab.session.update(lambda state: state.showing(section=True, sweep=True, swept="taper"))
     tab.settle()
     tab.page.get_by_text("one closed curve").wait_for()
 

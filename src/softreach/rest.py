@@ -46,17 +46,10 @@ def rest(arm: Manipulator) -> Rest:
         raise InvalidInput("loads", None, "given", "arm.replace(loads=Loads(...)) gives some")
     activation = np.clip(0.0, *arm.input_bounds.T)
     # Nothing but rest is asked for, and the steps need suit no other activation.
-    held = arm
-    if arm.bundles and not arm.drives:
-        held = arm.with_bounds(np.stack([activation, activation], axis=1))
+    plain = bool(arm.bundles) and not arm.drives
+    held = arm.with_bounds(np.stack([activation, activation], axis=1)) if plain else arm
     held_map = with_unstable(as_tip_map(held, warn=False))
     (tip,), (status,) = held_map.tips_and_status(activation[None])
     free = as_tip_map(held.replace(loads=None)).tips(activation[None])[0]
     sag = float(np.linalg.norm(tip - free))
-    return Rest(
-        activation=activation,
-        tip=tip,
-        sag=sag,
-        sag_over_length=sag / arm.length,
-        status=TipStatus(int(status)),
-    )
+    return Rest(activation, tip, sag, sag / arm.length, TipStatus(int(status)))

@@ -119,10 +119,6 @@ def _grid(n: int, dim: int, seed: int) -> Draw:
     return draw
 
 
-def _any(n: int, dim: int) -> str | None:
-    del n, dim
-
-
 def _power_of_two(n: int, dim: int) -> str | None:
     if n & (n - 1) == 0:
         return None
@@ -145,8 +141,8 @@ def _root(n: int, dim: int) -> int:
 
 
 SAMPLERS: dict[str, Sampler] = {
-    "uniform": Sampler(_uniform, _any),
-    "boundary": Sampler(_boundary, _any),
+    "uniform": Sampler(_uniform, lambda n, dim: None),
+    "boundary": Sampler(_boundary, lambda n, dim: None),
     "sobol": Sampler(_sobol, _power_of_two),
     "grid": Sampler(_grid, _whole_power),
 }

@@ -285,7 +285,7 @@ def _pose(arm: Manipulator) -> dict[str, list[float]]:
 
 
 def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
-    """The frame in which a dataset tells places.
+    """The frame of the places in a dataset.
 
     Raises:
         InvalidInput: It says none, or there is no such frame.

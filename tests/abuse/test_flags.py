@@ -34,7 +34,7 @@ REFUSED = {
     f"atlas build a.zarr --vary taper_deg=0:3:{10**9}": "a count up to 100000",
     "atlas build a.zarr --vary taper_deg=nan,1": "must be numbers",
     f"{VARY} --alpha 0.05": "like 0.05L",
-    f"{VARY} --shard 2/2": "shard = 2/2: must be i/k",
+    f"{VARY} --shard 2/2": "shard = 2/2: must be (i, k), or i/k on the command line",
     # one for each command that has numbers or words of its own
     f"volume {TRUNK} --n=1e15": "GB of memory, of which",
     f"reach {TRUNK} --accuracy nan": "accuracy = nan: must be a finite number",

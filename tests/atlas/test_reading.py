@@ -24,6 +24,7 @@ from softreach.atlas import (
     over_length,
 )
 from softreach.atlas.executor import begin_design
+from softreach.atlas.metrics import METRIC_GROUPS
 from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command
@@ -31,7 +32,7 @@ from softreach.cli.app import run
 from softreach.picture.projection import view_axes
 from softreach.plot import plot_metric_map
 from softreach.plot.sheets import box_over_length, hull_over_length, panel_extent
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import (
     SMALL,
     TINY,
@@ -84,13 +85,24 @@ def test_so_is_a_cloud(tmp_path, trunk, name):
     assert cloud.reindex(axis=["z", "none"]).tip.isnull().any()
 
 
+def test_a_metric_that_a_later_version_has_does_not_stop_an_atlas(tmp_path, monkeypatch):
+    settings = {**TINY, "metrics": ["extent"], "keep_clouds": False}
+    with monkeypatch.context() as older:
+        older.setattr("softreach.atlas.command.version", lambda _: "0.0.9")
+        older.setitem(METRIC_GROUPS, "extent", METRIC_GROUPS["extent"][:-1])
+        begun = build_atlas(small_space(), tmp_path / "a.zarr", **settings).load()
+    with pytest.warns(SoftreachWarning, match=r"begun by softreach 0\.0\.9"):
+        atlas = build_atlas(small_space(), tmp_path / "a.zarr", **settings)
+    assert_same(atlas, begun)
+
+
 def test_a_cloud_of_somebodys_own_actuator_opens_without_its_module(tmp_path, trunk):
     cloud = sr.compute_cloud(trunk, 50)
     cloud.attrs["design"] = cloud.attrs["design"].replace('kind = "fiber"', 'kind = "Magnets"')
     sr.save_cloud(cloud, tmp_path / "cloud.zarr")
     found = sr.open_cloud(tmp_path / "cloud.zarr")
     assert sr.convex_hull(found.tip).volume == sr.convex_hull(cloud.tip).volume
-    with pytest.raises(sr.InvalidDesign, match="Magnets.*--import"):
+    with pytest.raises(sr.InvalidDesign, match=r"Magnets.*--import"):
         sr.cloud.design_of(found)
 
 
@@ -373,7 +385,7 @@ def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
     atlas = varied(tmp_path / "a.zarr")
     across, up = sheet_axes(atlas)
     assert across.label == "E of rings[0].material (Pa)"
-    assert up.label == "$Z_1/L$ of left"
+    assert up.label == "Z₁/L of left"
     assert plot_metric_map(atlas, "reach_height").get_xlabel() == across.label
 
 

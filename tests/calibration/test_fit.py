@@ -147,19 +147,17 @@ def model_of(arm, free, inputs):
     return MarkerModel(free_numbers(arm, free), inputs, np.arange(count))
 
 
-@pytest.mark.parametrize("arm", [hanging_tentacle(), hanging_tentacle(HEAVY)])
-def test_places_are_those_of_the_markers(arm):
-    inputs = random_inputs(arm, 5)
-    places = model_of(arm, ["pose"], inputs).of_arm(arm).places
-    np.testing.assert_allclose(places, marker_positions(arm, inputs, 1e-9), atol=1e-8)
+ARMS = [hanging_tentacle(), hanging_tentacle(HEAVY), pulled_wire(), pulled_wire(LIGHT)]
 
 
-@pytest.mark.parametrize("loads", [None, LIGHT])
-def test_places_are_those_of_tips_pulled_by_length(loads):
-    arm = pulled_wire(loads)
-    inputs = 0.3 * random_inputs(arm, 4)
+@pytest.mark.parametrize("arm", ARMS)
+def test_places_are_those_of_the_markers_or_of_the_tip(arm):
+    inputs = (1.0 if arm.markers else 0.3) * random_inputs(arm, 5)
     places = model_of(arm, ["pose"], inputs).of_arm(arm).places
-    np.testing.assert_allclose(places[:, 0], sr.tip_positions(arm, inputs, 1e-9), atol=2e-7)
+    if arm.markers:
+        np.testing.assert_allclose(places, marker_positions(arm, inputs, 1e-9), atol=1e-8)
+    else:
+        np.testing.assert_allclose(places[:, 0], sr.tip_positions(arm, inputs, 1e-9), atol=2e-7)
 
 
 def by_differences(model, values, way):

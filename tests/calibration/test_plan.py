@@ -1,11 +1,10 @@
 """Planned poses tell more than others, and as much as they promise."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import softreach as sr
-from softreach.calibration import plan_poses, read_measurements
+from softreach.calibration import plan_poses
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.model import MarkerModel
 from softreach.support.errors import InvalidInput
@@ -13,7 +12,6 @@ from tests.calibration.arms import (
     MODULUS,
     hanging_tentacle,
     measured,
-    on_the_bench,
     random_inputs,
 )
 
@@ -58,22 +56,6 @@ def test_poses_keep_apart_and_inside_of_the_box():
     assert apart.min() > 0.5 * 12 ** (-1 / 3)
     assert cube.min() >= 0.0
     assert cube.max() <= 1.0
-
-
-def test_the_file_of_a_plan_is_read_once_it_is_filled_in(tmp_path):
-    path = tmp_path / "poses.csv"
-    plan = plan_poses(ARM, FREE, 9, candidates=64)
-    plan.save(path)
-    table = pd.read_csv(path)
-    filled = measured(on_the_bench(ARM), inputs=table.filter(like="_N").to_numpy())
-    places = {name: values for name, values in filled.items() if name.endswith("_mm")}
-    assert set(places) <= set(table)
-    assert table[list(places)].isna().all(axis=None)
-    table.assign(**places).to_csv(path, index=False)
-    data = read_measurements(ARM, path)
-    np.testing.assert_allclose(data.inputs, plan.activations, rtol=1e-5)
-    assert data.marker_names == ("half", "tool")
-    assert sr.calibrate(ARM, data, free=FREE).held_out.number == 0
 
 
 def test_a_plan_replaces_no_measurements(tmp_path):

@@ -430,13 +430,6 @@ def test_lengths_of_a_file_may_be_in_L_of_the_design(needs, capsys):
     assert run(["check", "lce_arm", "straight.toml"]) == 0
 
 
-def test_the_example_of_five_places_is_met():
-    arm = sr.Manipulator.load(EXAMPLES / "three_fibers.toml")
-    check = sr.check(arm, Requirements.load(EXAMPLES / "five_places.toml"))
-    assert check.met
-    assert check.gaps.shape == (2, 5)
-
-
 def test_reached_and_missed_places_differ_by_their_markers_and_gaps_are_lines():
     pytest.importorskip("matplotlib.pyplot")
     arm = sr.designs.minimal_trunk()

@@ -12,11 +12,11 @@ from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements
 from softreach.studio.found import Found
-from softreach.studio.job import Job, Learned, what_follows
-from softreach.studio.jobs import JOBS
+from softreach.studio.jobs import Job, Learned, what_follows
 from softreach.studio.reach import Reach
 from softreach.studio.session import Session
-from softreach.studio.state import Camera, PlotSettings, Slice, StudioState
+from softreach.studio.state import Camera, Slice, StudioState
+from softreach.studio.tabs import JOBS
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import InvalidInput
 from tests.studio.sockets import page
@@ -60,17 +60,16 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
 
 
 def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(trunk):
-    plots = PlotSettings(shown=("sweep", "section"))
     bare = StudioState(design=trunk)
     full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk, needs=NEEDS)
-    full = full.showing(plots=plots)
+    full = full.showing(section=True, sweep=True)
     other = changed(trunk, {"taper": 0.01})
     moves = {
         full.replace(design=other): {
             "reach", "slopes", "arm", "inverse", "needs", "sweep",
         },
         full.showing(slice=Slice(axis="x")): {"cloud", "reference", "surface", "section"},
-        full.showing(plots=PlotSettings()): {"sweep", "section"},
+        full.showing(section=False, sweep=False): {"sweep", "section"},
         full.replace(target=None): {"inverse"},
         full.replace(reference=None): {"reference"},
         full.replace(needs=""): {"needs"},
@@ -80,7 +79,7 @@ def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(t
 
 
 def test_what_is_found_out_makes_stale_what_is_made_of_it(trunk):
-    state = StudioState(design=trunk).showing(plots=PlotSettings(shown=("section",)))
+    state = StudioState(design=trunk).showing(section=True)
     reach = object.__new__(Reach)
     assert stale(state, state, NOTHING, Found(reach=reach)) == {"surface", "slopes", "section"}
     assert stale(state, state, Found(reach=reach), Found(reach=reach)) == set()
@@ -107,7 +106,7 @@ def test_a_job_that_fails_forgets_what_it_knew_and_takes_away_what_it_drew(studi
     def draw(given):
         given.scene.dots("/mark", np.zeros((1, 3)), (0, 0, 0), 0.01)
 
-    mark = Job("mark", ("target",), compute, draw, makes=("check_refusal",), draws=("/mark",))
+    mark = Job("mark", "target", compute, draw, makes="check_refusal", draws="/mark")
     with page(studio) as tab:
         session = Session(tab.client, studio.start, [mark])
         session.begin()

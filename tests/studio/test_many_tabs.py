@@ -16,7 +16,7 @@ import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
 from softreach.inverse.prepared import prepared_map
 from softreach.studio import Studio, work
-from softreach.studio.job import Job
+from softreach.studio.jobs import Job
 from softreach.studio.session import Session
 from tests.studio.sockets import PATIENCE, connected, page, until
 
@@ -65,7 +65,7 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
         time.sleep(0.05)
         loaded.set()
 
-    monkeypatch.setattr(softreach.studio.app, "JOBS", (Job("first", ("design",), compute),))
+    monkeypatch.setattr(softreach.studio.app, "JOBS", (Job("first", "design", compute),))
     monkeypatch.setattr(softreach.studio.app, "load_libraries", load)
     with Studio(studio.start) as other, connected(other):
         until(lambda: seen)

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 import softreach as sr
-import softreach.studio.jobs.goals as jobs
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.studio import Studio
-from softreach.studio.scene.needs import COLORS
+from softreach.studio.scene.scene import VERDICTS
 from softreach.studio.session import Session
 from softreach.studio.state import requirements_of
 from softreach.studio.tabs import click, goals
@@ -106,7 +105,7 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
         atol=1e-5,
     )
     broken = [
-        tuple(np.asarray(node.colors).ravel()[:3]) == COLORS["missed"] for node in (inside, avoid)
+        tuple(np.asarray(node.colors).ravel()[:3]) == VERDICTS["missed"] for node in (inside, avoid)
     ]
     assert broken == [False, True]
     assert "the arm keeps" in verdict(session)
@@ -114,14 +113,14 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
 
 
 def test_what_quick_poses_miss_is_looked_at_again(session, monkeypatch):
-    plain = jobs.quick_check
+    plain = goals.quick_check
 
     def blind(*arguments):
         made = plain(*arguments)
         wrong = tuple(dataclasses.replace(each, verdict="missed") for each in made.findings)
         return dataclasses.replace(made, findings=wrong, gaps=made.gaps + 0.1)
 
-    monkeypatch.setattr(jobs, "quick_check", blind)
+    monkeypatch.setattr(goals, "quick_check", blind)
     added(session, "place to reach")
     assert session.found.check.met
     assert "place 1</b>: reached" in verdict(session)

@@ -15,7 +15,7 @@ from softreach.inverse.path import PathStatus
 from softreach.studio.figures import swept_volumes
 from softreach.studio.reach import Quality
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import MOST_POINTS, PlotSettings, StudioState, TipPath
+from softreach.studio.state import MOST_POINTS, StudioState, TipPath
 from softreach.studio.tabs.move import end_text
 from softreach.support.errors import InvalidInput, SoftreachError
 
@@ -57,14 +57,6 @@ def test_a_sweep_of_a_design_on_the_same_curve_computes_its_own_volume_alone(mon
 # Paths of the tip as values: kept in a state, refused
 
 
-def test_a_state_keeps_its_path_and_its_plots():
-    path = TipPath.through([[0, 0, 1.0], [0.1, 0, 0.9]], (-0.5, 0.0, 0.0))
-    state = StudioState(design=designs.minimal_trunk(), path=path).showing(
-        plots=PlotSettings(shown=("section",), parameter="taper")
-    )
-    assert StudioState.from_json(state.to_json()) == state
-
-
 @pytest.mark.parametrize(
     "points",
     [
@@ -89,7 +81,7 @@ def test_every_end_of_a_path_is_said_in_words(end):
     assert "{" not in text
 
 
-@pytest.mark.parametrize("changes", [{"shown": (1,)}, {"parameter": None}])
+@pytest.mark.parametrize("changes", [{"section": 1}, {"swept": None}])
 def test_plot_settings_of_another_kind_are_refused(changes):
-    with pytest.raises(InvalidInput, match="plots"):
-        PlotSettings(**changes)
+    with pytest.raises(InvalidInput, match="appearance"):
+        STATE.showing(**changes)

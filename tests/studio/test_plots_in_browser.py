@@ -7,13 +7,13 @@ import pytest
 
 from softreach.geometry.surface import plane_cut
 from softreach.studio.figures import enclosed_area, section_curves
-from softreach.studio.state import PlotSettings, Slice
+from softreach.studio.state import Slice
 
 
 @pytest.fixture(autouse=True)
 def _nothing_beside_the_scene(tab):
     yield
-    tab.session.update(lambda s: s.showing(plots=PlotSettings(), slice=Slice()))
+    tab.session.update(lambda s: s.showing(section=False, sweep=False, slice=Slice()))
     tab.settle()
 
 
@@ -35,13 +35,13 @@ def test_the_section_is_that_of_the_exact_set(tab):
 
 @pytest.mark.large
 def test_the_section_follows_the_slice_and_the_design(tab):
-    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
+    tab.session.update(lambda s: s.showing(section=True))
     tab.settle()
     before = tab.page.locator("img").first.get_attribute("src")
     cut = Slice(axis="z", center=0.5, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut))
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
-    assert tab.page.locator("img").first.get_attribute("src") != before
+    tab.wait(lambda: tab.page.locator("img").first.get_attribute("src") != before, "it follows")
     area = enclosed_area(section_curves(tab.session.found.reach, cut), 2)
     tab.page.get_by_text(f"{area:.4g} m²").wait_for()
     tab.open("Design")
@@ -70,7 +70,7 @@ def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
     tab.page.get_by_label("V against parameter").check()
     tab.settle()
     tab.choose("parameter", "taper φ [deg]")
-    tab.wait(lambda: tab.session.state.appearance.plots.parameter == "taper", "it is chosen")
+    tab.wait(lambda: tab.session.state.appearance.swept == "taper", "it is chosen")
     tab.page.get_by_text("values make no design").wait_for()
     before = tab.page.locator("img").first.get_attribute("src")
     tab.open("Design")

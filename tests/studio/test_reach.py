@@ -173,6 +173,16 @@ def test_a_surface_of_four_bundles_has_the_colors_of_the_samples_nearby():
         assert len(surface_colors(reach, color).rgb) == len(reach.sheets.vertices)
 
 
+def test_samples_without_a_tip_tell_nothing_of_a_boundary():
+    *_, reach = stages(designs.redundant_trunk(), 11, SMALL, lambda: None)
+    lost = np.arange(reach.samples) % 3 == 0
+    status = np.where(lost, TipStatus.NO_EQUILIBRIUM, TipStatus.STABLE).astype(np.int8)
+    marked = replace(reach, cloud=schema.with_status(reach.cloud, status))
+    others = replace(reach, cloud=reach.cloud.isel(sample=~lost))
+    wanted = others.boundary.cloud.activation.values
+    np.testing.assert_array_equal(marked.boundary.cloud.activation.values, wanted)
+
+
 def test_a_surface_is_read_back_from_its_file():
     import trimesh
 
@@ -339,11 +349,6 @@ def test_a_payload_that_cannot_be_is_refused_in_grams(lce, wrong):
 def test_a_vector_that_cannot_be_is_refused(lce, field, wrong):
     with pytest.raises(InvalidInput, match=r"must be -1,000,000 to 1,000,000"):
         loaded(lce, **{field: (0.0, wrong, 0.0)})
-
-
-def test_a_state_keeps_its_loads(lce):
-    state = StudioState(design=hanging(lce, 5.0))
-    assert StudioState.from_json(state.to_json()) == state
 
 
 def test_a_loaded_cloud_comes_before_its_volume(lce):

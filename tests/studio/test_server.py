@@ -17,7 +17,6 @@ from softreach.studio.serve import (
     headed,
     page_address,
     page_headers,
-    page_url,
     reachable_hosts,
     refusal,
     same_origin,
@@ -34,9 +33,13 @@ def server():
     stop_server(running)
 
 
+def address_of(server):
+    return page_address(server.get_host(), server.get_port())
+
+
 def test_only_this_machine_can_connect(server):
     assert server.get_host() == "127.0.0.1"
-    assert page_url(server) == f"http://127.0.0.1:{server.get_port()}"
+    assert address_of(server) == f"http://127.0.0.1:{server.get_port()}"
 
 
 def test_nobody_can_open_a_tunnel(server):
@@ -73,7 +76,7 @@ def test_a_page_from_elsewhere_gets_no_data(server):
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
 
-    address = page_url(server).replace("http", "ws")
+    address = address_of(server).replace("http", "ws")
     version = [f"viser-v{viser.__version__}"]
     with connect(address, subprotocols=version, max_size=None) as ours:
         assert ours.recv(timeout=600)
@@ -156,7 +159,7 @@ def test_without_the_token_there_is_no_socket(guarded):
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
 
-    address = page_url(guarded).replace("http", "ws")
+    address = address_of(guarded).replace("http", "ws")
     version = [f"viser-v{viser.__version__}"]
     with pytest.raises(InvalidStatus, match="403"), connect(address, subprotocols=version):
         pass

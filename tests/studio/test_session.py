@@ -13,7 +13,6 @@ from softreach.arm.parameters import changed
 from softreach.cli.studio import _start, _work
 from softreach.inverse import solve_inverse
 from softreach.rod.rods import as_tip_map
-from softreach.studio.files import LARGEST
 from softreach.studio.reach import (
     Quality,
     Reach,
@@ -167,11 +166,6 @@ def test_kept_work_that_is_none_of_ours_is_named_in_one_line(text, tmp_path):
     assert work.latest is None
     assert "latest.json" in work.complaint
     assert len(work.complaint.splitlines()) == 1
-
-
-def test_a_file_that_is_too_large_is_not_read(tmp_path):
-    (tmp_path / "latest.json").write_text(STATE.to_json() + " " * LARGEST)
-    assert "at most" in KeptWork(tmp_path).complaint
 
 
 def test_work_is_found_again(tmp_path):

@@ -221,30 +221,16 @@ class Gui:
     def __init__(self) -> None:
         self.widgets: list[Widget] = []
 
-    def _kept(self, widget: Widget) -> Widget:
-        self.widgets.append(widget)
-        return widget
+    def __getattr__(self, adds: str) -> Callable[..., Widget]:
+        def add(label, *given, **options) -> Widget:
+            value = options.pop("initial_value", given[-1] if given else None)
+            kind = Form if adds == "add_form" else Widget
+            widget = kind(label=label, content=label, value=value, **options)
+            widget.options = given[0] if adds == "add_dropdown" else ()
+            self.widgets.append(widget)
+            return widget
 
-    def add_checkbox(self, label, value, hint):
-        return self._kept(Widget(label=label, value=value, hint=hint))
-
-    def add_dropdown(self, label, options, initial_value, hint):
-        return self._kept(Widget(label=label, options=options, value=initial_value, hint=hint))
-
-    def add_slider(self, label, low, high, step, value, hint):
-        return self._kept(Widget(label=label, ends=(low, high), step=step, value=value, hint=hint))
-
-    def add_text(self, label, value, hint):
-        return self._kept(Widget(label=label, value=value, hint=hint))
-
-    def add_button(self, label, hint):
-        return self._kept(Widget(label=label, hint=hint))
-
-    def add_form(self, label):
-        return self._kept(Form(label=label))
-
-    def add_html(self, content, visible):
-        return self._kept(Widget(content=content, visible=visible))
+        return add
 
 
 class Tab:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.loads import Loads
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.studio.state import (
@@ -20,14 +21,18 @@ from softreach.studio.state import (
     Appearance,
     Camera,
     History,
+    PlotSettings,
     Slice,
     StudioState,
+    TipPath,
 )
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.laws import arm_of, arms
 
 numbers = st.floats(-3, 3)
 vectors = st.tuples(numbers, numbers, numbers)
+LOADED = designs.lce_arm().replace(loads=Loads(gravity=(0.0, 0.0, 9.81), payload=0.005))
+PATH = TipPath.through([[0, 0, 1.0], [0.1, 0, 0.9]], (-0.5, 0.0, 0.0))
 NEEDS = Requirements(targets=(Target([(0.1, 0.0, 0.8)]),), payloads=(0.2,)).to_toml()
 
 
@@ -40,15 +45,17 @@ def states(draw: st.DrawFn) -> StudioState:
         slice=Slice(axis=axis, center=draw(numbers), thickness=draw(st.floats(0.01, 1))),
         surface=draw(st.booleans()),
         mouse=draw(st.sampled_from([*MOUSE])),
+        plots=PlotSettings(shown=draw(st.sampled_from([(), ("section",)])), parameter="taper"),
     )
     return StudioState(
-        design=draw(arms()),
+        design=draw(arms() | st.just(LOADED)),
         activation=tuple(draw(st.lists(numbers, max_size=4))),
         appearance=look,
         target=draw(st.none() | vectors),
         reference=draw(st.none() | st.just(designs.redundant_trunk())),
         camera=draw(st.none() | st.builds(Camera, position=vectors, look_at=vectors)),
         needs=draw(st.sampled_from(["", NEEDS])),
+        path=draw(st.none() | st.just(PATH)),
     )
 
 

@@ -52,7 +52,7 @@ def test_a_state_is_saved_and_loaded(tab, tmp_path):
     tab.open("Export")
     kept = tab.session.state
     file = tab.save("Save this work", tmp_path)
-    assert json.loads(file.read_text())["softreach_studio"] == 3
+    assert json.loads(file.read_text())["softreach_studio"] == 4
     tab.choose("data", "design (.toml)")
     design = tab.save("Save data", tmp_path)
     assert tomllib.loads(design.read_text())["profile"]["length_m"] == 1.0

@@ -106,8 +106,7 @@ class Base(Part):
         return _turned(self.rotation.T, np.asarray(vectors, float))
 
     def __str__(self) -> str:
-        x, y, z = self.position
-        place = f", at ({x:g}, {y:g}, {z:g}) m" if any(self.position) else ""
+        place = ", at ({:g}, {:g}, {:g}) m".format(*self.position) if any(self.position) else ""
         turn = f", turned by {np.degrees(self.turn):.6g}°" if self.turn else ""
         way = self.points
         if not isinstance(way, str):

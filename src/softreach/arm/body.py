@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN, Actuator, Outline, Resultants
 from softreach.arm.along import Samples, values_along
-from softreach.arm.loads import GRAVITY, Loads
+from softreach.arm.loads import Loads
 from softreach.arm.number import number
 from softreach.arm.part import Part, faults_under
 from softreach.arm.profile import Profile
@@ -77,31 +77,15 @@ STRAIGHT = RestShape()
 class RestStrains(Actuator):
     """The rest shape as a bundle that is held at an activation of 1, for tables and kernels."""
 
-    unit: ClassVar[str] = "1"
-    symbol: ClassVar[str] = "1"
-    activation: ClassVar[str] = "share"
-    is_force: ClassVar[bool] = False
-    default_name: ClassVar[str] = "rest shape"
-
     shape: RestShape
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         return Resultants(np.zeros((len(z), 1)), np.zeros((len(z), 3, 1)))
 
-    def curvature(self, profile: Profile, z: Array) -> Array:
-        """û [1/m], shape (station, 3)."""
-        return self.shape.curvature(z / profile.length)
-
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        zero = np.zeros((len(z), 1))
-        return Outline(
-            center=zero,
-            extent=np.zeros(1),
-            inner_ratio=zero,
-            outer_ratio=zero,
-            shape=("line",),
-            acts=self.acts(profile, z),
-        )
+        axis = dict.fromkeys(("center", "inner_ratio", "outer_ratio"), np.zeros((len(z), 1)))
+        acts = self.acts(profile, z)
+        return Outline(**axis, extent=np.zeros(1), shape=("line",), acts=acts)
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -143,16 +127,10 @@ class Body:
             "rest": (RestShape, "must be a RestShape, such as RestShape(curvature_x=2.0)"),
             "loads": (Loads | None, "must be Loads or None"),
         }
-        wrong = [
-            Fault(field, value, allowed)
-            for field, (kind, allowed) in kinds.items()
-            if not isinstance(value := getattr(self, field), kind)
-        ]
-        return [
-            *wrong,
-            *kinds_in_a_sequence("rigid_pieces", self.rigid_pieces, RigidPiece),
-            *kind_faults(self.actuators),
-        ]
+        given = [(field, getattr(self, field), *kind) for field, kind in kinds.items()]
+        wrong = [Fault(name, x, text) for name, x, kind, text in given if not isinstance(x, kind)]
+        pieces = kinds_in_a_sequence("rigid_pieces", self.rigid_pieces, RigidPiece)
+        return [*wrong, *pieces, *kind_faults(self.actuators)]
 
     def _settle(self) -> list[Fault]:
         """Give actuators names, and parts the places of the stations that they name."""
@@ -264,10 +242,8 @@ class Body:
         if not self.rigid_pieces:
             return stiffness
         spans = [piece.span(self.length) for piece in self.rigid_pieces]
-        inside = [
-            (stations >= start) & ((stations < end) | (end >= self.length)) for start, end in spans
-        ]
-        rigid = np.any(inside, axis=0)
+        to_tip = [(start, end if end < self.length else np.inf) for start, end in spans]
+        rigid = np.any([(stations >= start) & (stations < end) for start, end in to_tip], axis=0)
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
     @property
@@ -372,8 +348,7 @@ def load_number(arm: Body) -> float:
     """
     if faults := load_number_faults(arm):
         raise InvalidDesign(faults)
-    own = Loads(gravity=(0.0, 0.0, -GRAVITY))
-    per_length, force = (arm.loads or own).sizes(arm.section, arm.profile)
+    per_length, force = (arm.loads or Loads()).sizes(arm.section, arm.profile)
     stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
 

@@ -66,11 +66,9 @@ class Drive(Part):
         pulls: str,
         releases: str,
         *,
-        bounds: tuple[float, float],
         gain: float = 1.0,
         offset: float = 0.0,
-        unit: str = "1",
-        dead_zone: float = 0.0,
+        **others: Any,
     ) -> Self:
         """One input for two bundles: a positive one pulls the first and releases the second.
 
@@ -78,11 +76,9 @@ class Drive(Part):
             name: Of the input.
             pulls: Name of the bundle with the gain.
             releases: Name of the bundle with the opposite gain.
-            bounds: (lower, upper) of u [unit].
             gain: Activation per u.
             offset: Activation of both at u = 0, such as a pretension.
-            unit: Of u.
-            dead_zone: Largest |u| without effect [unit].
+            others: Other fields of the drive: `bounds`, `unit`, `dead_zone`.
 
         Raises:
             InvalidInput: Both bundles are the same.
@@ -90,10 +86,7 @@ class Drive(Part):
         if pulls == releases:
             raise InvalidInput("releases", as_given(releases), "another bundle than it pulls")
         offsets = {pulls: offset, releases: offset} if offset else {}
-        gains = {pulls: gain, releases: -gain}
-        return cls(
-            name=name, unit=unit, bounds=bounds, gains=gains, offsets=offsets, dead_zone=dead_zone
-        )
+        return cls(name=name, gains={pulls: gain, releases: -gain}, offsets=offsets, **others)
 
     def effective(self, u: Array) -> tuple[Array, Array]:
         """dz(u) [unit], and its derivative [-], both of the shape of u."""

@@ -83,9 +83,9 @@ class Driving:
     @lazy
     def is_smooth(self) -> bool:
         """True if γ(x) has no kinks within the bounds: is affine, or all lengths stay taut."""
-        if self._has_kinked_drives or not self.has_length_tendons:
-            return not self._has_kinked_drives
-        if self.arm.loads is not None or self.law.changes_rest_length:
+        if self.is_affine:
+            return True
+        if self._has_kinked_drives or self.arm.loads is not None or self.law.changes_rest_length:
             return False
         low, high = self.driven.input_bounds.T
         tensions = self.law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))
@@ -123,13 +123,12 @@ class Driving:
     @lazy
     def gains(self) -> Array:
         """Activation of each bundle of the inner arm per effective input, (bundle, input)."""
-        names = self.arm.bundle_names
+        names, alone = self.arm.bundle_names, list(self.arm.undriven)
         gains = np.zeros((self.law.arm.bundles, self.arm.inputs))
         for k, drive in enumerate(self.arm.drives):
             for name, gain in drive.gains.items():
-                gains[names.index(name), k] += gain
-        for k, bundle in enumerate(self.arm.undriven, start=len(self.arm.drives)):
-            gains[bundle, k] = 1.0
+                gains[names.index(name), k] = gain
+        gains[alone, len(self.arm.drives) + np.arange(len(alone))] = 1.0
         return gains
 
     @lazy

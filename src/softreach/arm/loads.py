@@ -130,13 +130,11 @@ class Loads(Part):
         """The same in the frame of a base: everything that does not follow the tip is turned."""
         if base.is_identity:
             return self
+        turn = base.directions_to_base
         points = tuple(
-            load.replace(
-                force=base.directions_to_base(load.force),
-                moment=base.directions_to_base(load.moment),
-            )
+            load.replace(force=turn(load.force), moment=turn(load.moment))
             for load in self.point_loads
         )
         dead = ("gravity", "tip_force", "tip_moment", "force_per_length")
-        turned = {name: base.directions_to_base(getattr(self, name)) for name in dead}
+        turned = {name: turn(getattr(self, name)) for name in dead}
         return self.replace(point_loads=points, **turned)

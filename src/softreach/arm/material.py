@@ -115,20 +115,18 @@ def material_faults(field: str, value: object, *, optional: bool = False) -> lis
 @cache
 def _library() -> Mapping[str, MaterialRecord]:
     text = files("softreach.arm").joinpath("materials.toml").read_text(encoding="utf-8")
-    records = [_record(name, row) for name, row in tomllib.loads(text).items()]
+    records: list[MaterialRecord] = []
+    for name, row in tomllib.loads(text).items():
+        numbers = {
+            "young_modulus": row["young_modulus_pa"],
+            "poisson_ratio": row["poisson_ratio"],
+            "density": row.get("density_kg_m3"),
+        }
+        sources = MappingProxyType(row["sources"])
+        material = Material(**numbers, name=name)
+        records.append(MaterialRecord(material, row["modulus"], sources, row["note"]))
     records.sort(key=lambda record: record.material.young_modulus or 0.0)
     return MappingProxyType({record.material.name: record for record in records})
-
-
-def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
-    material = Material(
-        young_modulus=row["young_modulus_pa"],
-        poisson_ratio=row["poisson_ratio"],
-        density=row.get("density_kg_m3"),
-        name=name,
-    )
-    sources = MappingProxyType(row["sources"])
-    return MaterialRecord(material, row["modulus"], sources, row["note"])
 
 
 def _hint(name: object, names: tuple[str, ...]) -> str:

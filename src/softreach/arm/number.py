@@ -91,9 +91,7 @@ class Station(float):
 
     def __eq__(self, other: object) -> bool:
         """The name counts: the parts that have it follow when it moves."""
-        return (
-            isinstance(other, Station) and self.name == other.name and float(self) == float(other)
-        )
+        return isinstance(other, Station) and (self.name, +self) == (other.name, +other)
 
     def __hash__(self) -> int:
         return hash((self.name, float(self)))

@@ -12,7 +12,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.along import AlongArm
@@ -325,17 +325,8 @@ def find_parameters(
 # Arms with other values.
 
 
-class _Edit(NamedTuple):
-    """A new value of a number of a part, and the parameter with its value that led to it."""
-
-    value: float
-    name: str
-    asked: float
-    own: bool
-    """It is a parameter of the part itself."""
-
-
-_Edits = dict[PartKey, dict[str, _Edit]]
+_Edits = dict[PartKey, dict[str, tuple[float, Parameter]]]
+"""New values of numbers of parts, each with the parameter that led to it."""
 
 
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
@@ -371,8 +362,9 @@ def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipula
         raise InvalidDesign(faults)
     edits: _Edits = {}
     for each, value in asked.items():
-        _asks(edits, arm, each, value, lambda _, value=value: value)
-    return _made(arm, edits) if edits else arm
+        _add_edits(edits, arm, each, lambda _, value=value: value)
+    names = {each.name: value for each, value in asked.items()}
+    return _made(arm, edits, names) if edits else arm
 
 
 def shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
@@ -387,30 +379,30 @@ def shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulato
         InvalidDesign: No such arm can exist.
     """
     edits: _Edits = {}
-    value = parameter.value(arm) + amount
-    _asks(edits, arm, parameter, value, lambda old: old + amount)
-    return _made(arm, edits)
+    _add_edits(edits, arm, parameter, lambda old: old + amount)
+    return _made(arm, edits, {parameter.name: parameter.value(arm) + amount})
 
 
-def _asks(edits: _Edits, arm: Manipulator, by: Parameter, asked: float, new: Rule) -> None:
-    """Add what a parameter asks: a part's own wins over what the whole arm asked before."""
-    own = bool(by.owner)
+def _add_edits(edits: _Edits, arm: Manipulator, by: Parameter, new: Rule) -> None:
+    """A part's own parameter wins over those of the whole arm that were there before."""
     for (key, called), value in by.edits(arm, new).items():
         numbers = edits.setdefault(key, {})
-        if own:
-            other = alternatives(type(parts(arm)[key])).get(called, "")
-            if other in numbers and not numbers[other].own:
-                del numbers[other]
-            numbers[called] = _Edit(value, by.name, asked, own)
-        else:
-            numbers.setdefault(called, _Edit(value, by.name, asked, own))
+        if not by.owner:
+            numbers.setdefault(called, (value, by))
+            continue
+        other = alternatives(type(parts(arm)[key])).get(called, "")
+        if other in numbers and not numbers[other][1].owner:
+            del numbers[other]
+        numbers[called] = value, by
 
 
-def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
+def _made(arm: Manipulator, edits: _Edits, asked: Mapping[str, float]) -> Manipulator:
     """The arm with changed parts; faults under the names and with the values that were asked."""
-    new, faults, inside = dict(parts(arm)), [], edits.get(("section",), {})
-    for key in (key for key in edits if key != ("section",)):
-        part, values = new[key], {name: edit.value for name, edit in edits[key].items()}
+    new, faults = dict(parts(arm)), list[Fault]()
+    changes = {key: {name: x for name, (x, _) in each.items()} for key, each in edits.items()}
+    inside = changes.pop(("section",), {})
+    for key, values in changes.items():
+        part = new[key]
         if "bundles" in values and values["bundles"] != part.bundles:  # all have the first's bounds
             values = dict(zip(("lower", "upper"), part.bounds[0].tolist(), strict=True)) | values
         try:
@@ -420,11 +412,11 @@ def _made(arm: Manipulator, edits: _Edits) -> Manipulator:
             faults += error.faults
     try:
         if not faults:
-            return _assembled(arm, new, {name: edit.value for name, edit in inside.items()})
+            return _assembled(arm, new, inside)
     except InvalidDesign as error:
         faults = [*error.faults]
-    asked = [_as_asked(fault, edits) for fault in faults]
-    raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in asked}.values()])
+    named = [_as_asked(fault, edits, asked) for fault in faults]
+    raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in named}.values()])
 
 
 def _assembled(
@@ -444,18 +436,18 @@ def _assembled(
     return arm.replace(section=section, **changes)
 
 
-def _as_asked(fault: Fault, edits: _Edits) -> Fault:
-    by = [
-        edit
+def _as_asked(fault: Fault, edits: _Edits, asked: Mapping[str, float]) -> Fault:
+    names = {
+        by.name: None
         for path in fault.path.split(", ")
         for key, numbers in edits.items()
-        for called, edit in numbers.items()
+        for called, (_, by) in numbers.items()
         if path in _paths(key, called)
-    ]
-    names = dict.fromkeys(edit.name for edit in by)
+    }
     if not names:
         return fault
-    return Fault(", ".join(names), by[0].asked if len(names) == 1 else fault.value, fault.allowed)
+    value = asked[next(iter(names))] if len(names) == 1 else fault.value
+    return Fault(", ".join(names), value, fault.allowed)
 
 
 def _paths(key: PartKey, called: str) -> tuple[str, ...]:

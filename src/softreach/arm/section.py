@@ -150,13 +150,13 @@ class Section(Part):
         rings = tuple(self.rings) if isinstance(self.rings, tuple | list) else ()
         if not rings or not all(isinstance(ring, Ring) for ring in rings):
             raise InvalidDesign([Fault("section.rings", self.rings, "must hold one Ring or more")])
-        object.__setattr__(self, "core", as_material(self.core))
-        if faults := material_faults("section.core", self.core, optional=True):
-            raise InvalidDesign(faults)
         object.__setattr__(self, "rings", rings)
-        if not isinstance(self.measured, Measured | None):
-            allowed = "must be Measured or None"
-            raise InvalidDesign([Fault("section.measured", self.measured, allowed)])
+        object.__setattr__(self, "core", as_material(self.core))
+        faults = material_faults("section.core", self.core, optional=True)
+        if not faults and not isinstance(self.measured, Measured | None):
+            faults = [Fault("section.measured", self.measured, "must be Measured or None")]
+        if faults:
+            raise InvalidDesign(faults)
         super().__post_init__()
 
     def _faults(self) -> list[Fault]:
@@ -175,7 +175,11 @@ class Section(Part):
         return [] if same else self.modulus_faults("where materials differ")
 
     def ring(self, which: int | str) -> Ring:
-        """A ring by its index or name; raises as `ring_index`."""
+        """A ring by its index or name.
+
+        Raises:
+            InvalidDesign: There is none.
+        """
         return self.rings[self.ring_index(which)]
 
     def ring_index(self, which: int | str) -> int:

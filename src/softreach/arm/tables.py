@@ -8,6 +8,7 @@ nothing that reads them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -69,7 +70,7 @@ def tables(arm: Body, stations: ArrayLike) -> Tables:
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
     for k, actuator in enumerate(arm.bundle_actuators):
         if isinstance(actuator, RestStrains):
-            curvature[..., k] = actuator.curvature(arm.profile, z)
+            curvature[..., k] = actuator.shape.curvature(z / arm.length)
     is_force = [actuator.is_force for actuator in arm.bundle_actuators]
     resting = np.where(is_force, 0.0, extension) if any(is_force) else extension
     return Tables(z, extension, curvature, resting)
@@ -137,9 +138,9 @@ def _winding_faults(arm: Body) -> Iterator[Fault]:
     for actuator in arm.actuators:
         if "revolution" in fields_of(type(actuator)):
             with np.errstate(all="ignore"):
-                turns = abs(actuator.value_on("revolution", arm.profile, arm.section)) / (2 * np.pi)
-            if not turns <= MOST_TURN / (2 * np.pi):
-                allowed = f"must be at most {MOST_TURN / (2 * np.pi):g}: give a smaller angle"
+                turns = abs(actuator.value_on("revolution", arm.profile, arm.section)) / math.tau
+            if not turns <= (most := MOST_TURN / math.tau):
+                allowed = f"must be at most {most:g}: give a smaller angle"
                 yield Fault(f"turns of {actuator.name}", float(turns), allowed)
 
 

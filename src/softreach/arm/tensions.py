@@ -142,11 +142,8 @@ class LengthLaw:
         inner = activations.copy()
         inner[:, self.columns] = 0.0
         excess = activations[:, self.columns] - self.taut_from - self.shortening(inner)
-        return self.complementary(self.stiffening(inner), excess)
-
-    def stiffening(self, inner: Array) -> Array:
-        """∂s/∂τ + 1/k [m/N], shape (n or 1, tendon, tendon)."""
-        return self._work(inner)[..., self.columns] + np.diag(self.compliance)
+        matrix = self._work(inner)[..., self.columns] + np.diag(self.compliance)
+        return self.complementary(matrix, excess)
 
     def complementary(self, matrix: Array, excess: Array) -> Tensions:
         """Tensions τ >= 0 with w = matrix τ - excess >= 0 and τ·w = 0.

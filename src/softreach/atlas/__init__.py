@@ -3,15 +3,16 @@
 from softreach.atlas.build import build_atlas
 from softreach.atlas.metric import Metric, MetricFailed, Need
 from softreach.atlas.metrics import METRIC_GROUPS
-from softreach.atlas.questions import (
+from softreach.atlas.reading import (
     AtlasStatus,
     atlas_cloud,
     atlas_design,
     atlas_status,
     best_designs,
+    open_atlas,
+    over_length,
     verify_atlas,
 )
-from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.support.files.stores import DamagedStore, StoreFailed
 

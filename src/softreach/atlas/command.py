@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from importlib.metadata import version
 from typing import Any, Self
 
@@ -100,6 +100,14 @@ class Command:
         values["space"] = DesignSpace.from_dict(values["space"])
         return cls(**values)
 
+    def continuing(self, begun: Command) -> Self:
+        """This command for a store that another version began: without metrics added since."""
+        if begun.softreach_version == self.softreach_version:
+            return self
+        names = {metric.name for metric in begun.metrics}
+        kept = (m for m in self.metrics if m.name in names or not known_metric(m.name))
+        return replace(self, metrics=tuple(kept), softreach_version=begun.softreach_version)
+
     def differences(self, other: Command) -> list[str]:
         """Differences between this command and another, one line each."""
         own, its = ({m.name: m.to_dict() for m in each.metrics} for each in (self, other))
@@ -121,6 +129,10 @@ def _faults(command: Command) -> Iterator[InvalidInput]:
         if metric.name in _RESERVED or metric.name in space.names:
             allowed = "a name that the atlas does not use itself"
             yield InvalidInput("name of a metric", metric.name, allowed)
+    for name in space.names:
+        if {"/", "\\"} & {*name}:
+            allowed = "without / and \\, which would name folders of the store"
+            yield InvalidInput("parameter", name, allowed, "rename the part")
     if not space.bundles:
         why = next(iter(space.gaps.values()))
         designs = counted(space.size, "design")

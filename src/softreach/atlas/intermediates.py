@@ -31,16 +31,11 @@ _SPACINGS = 1.6  # of samples that fill the box evenly, over L: radius of the al
 class Settings(NamedTuple):
     """Settings for the metrics of a single design, as a `Command` has them for many."""
 
-    tol: float
-    """Error of tips over L."""
-    accuracy: float
-    """Relative error of volumes of reachable sets."""
-    alpha_over_length: float
-    """Radius of alpha shapes over L."""
-    stations: tuple[float, ...] = (1.0,)
-    """Over L, where curvatures are taken."""
-    quantiles: tuple[float, ...] = (0.5,)
-    """Of these."""
+    tol: float  # Error of tips over L
+    accuracy: float  # Relative error of volumes of reachable sets
+    alpha_over_length: float  # Radius of alpha shapes over L
+    stations: tuple[float, ...] = (1.0,)  # Over L, where curvatures are taken
+    quantiles: tuple[float, ...] = (0.5,)  # Of these
 
 
 class Intermediates:

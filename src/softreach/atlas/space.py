@@ -43,12 +43,9 @@ def column(name: str, values: ArrayLike) -> tuple[float, ...]:
 class _Survey(NamedTuple):
     """What is known of a space once each of its designs has been made."""
 
-    gaps: dict[int, str]
-    """Combinations that no arm can have: number -> why not."""
-    bundles: int
-    """The largest number of bundles of any design; 0 if there is no design."""
-    length_range: tuple[float, float]
-    """Length of the shortest and of the longest design [m]."""
+    gaps: dict[int, str]  # Combinations that no arm can have: number -> why not
+    bundles: int  # The largest number of bundles of any design; 0 if there is no design
+    length_range: tuple[float, float]  # Length of the shortest and of the longest design [m]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,7 +27,7 @@ from softreach.atlas.command import Command
 from softreach.atlas.layout import CUBE, MISSING, PER_DESIGN, Plan, array_plans
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, warn
 from softreach.support.files.atomic import sync
 from softreach.support.files.stores import (
     ARRAYS,
@@ -107,6 +107,9 @@ class AtlasStore:
                 _write_root(location, command, durable)
                 opened = opened_store(location, "atlas", "r+", durable=durable)
         stored = _command_of(opened, location, "a new folder, or an atlas; it holds something else")
+        if (begun := stored.softreach_version) != (now := command.softreach_version):
+            command = command.continuing(stored)
+            warn(f"{location} was begun by softreach {begun}, and goes on with {now}")
         if differences := command.differences(stored):
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)

@@ -1,4 +1,4 @@
-"""Calibration: from measured poses to the arm on the bench, with honest errors."""
+"""Calibration: from measured poses to the arm on the bench, and laws without a rod beside it."""
 
 from __future__ import annotations
 

@@ -64,11 +64,10 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.serve import check_address, is_local, new_token
+    from softreach.studio.serve import is_local, new_token
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
-    check_address(host, port or 0)
     with_token = not is_local(host) if token is None else token
     start = _start(source)
     secret, work = new_token() if with_token else "", _work(start, source, fresh=fresh)

@@ -153,9 +153,9 @@ _JOBS = {"free": _free, "loaded": _loaded}
 
 
 def doctor(*, json: AsJson = False) -> None:
-    """Print versions, cores, memory and caches, to go with the report of a fault.
+    """Print versions, cores, memory and caches, for the report of a fault.
 
-    Example: softreach doctor
+    Example: softreach doctor --json
     """
     from softreach.support.memory import free_memory
     from softreach.support.parallel import thread_count

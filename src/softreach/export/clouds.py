@@ -40,18 +40,12 @@ _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 class CloudTable(NamedTuple):
     """Tips and activations as plain arrays."""
 
-    tip: Array
-    """In the unit of the table, shape (sample, 3)."""
-    activation: Array
-    """γ, shape (sample, bundle)."""
-    bundles: tuple[str, ...]
-    """Names of the bundles as the cloud has them."""
-    units: tuple[str, ...]
-    """Unit of the activation of each bundle."""
-    status: NDArray[np.uint8] | None
-    """`TipStatus` of an arm under loads, shape (sample,)."""
-    metadata: dict[str, str | int | float]
-    """Design (TOML), seed, tolerance, versions and units."""
+    tip: Array  # In the unit of the table, shape (sample, 3)
+    activation: Array  # γ, shape (sample, bundle)
+    bundles: tuple[str, ...]  # Names of the bundles as the cloud has them
+    units: tuple[str, ...]  # Unit of the activation of each bundle
+    status: NDArray[np.uint8] | None  # `TipStatus` of an arm under loads, shape (sample,)
+    metadata: dict[str, str | int | float]  # Design (TOML), seed, tolerance, versions and units
     unit: LengthUnit
 
     def columns(self, rows: slice = slice(None), suffix: str = "") -> dict[str, NDArray[Any]]:

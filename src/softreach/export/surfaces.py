@@ -43,10 +43,8 @@ class Part(NamedTuple):
     """One surface of a scene."""
 
     name: str
-    vertices: Array
-    """In the unit of the scene, shape (v, 3)."""
-    faces: Faces
-    """Shape (f, 3)."""
+    vertices: Array  # In the unit of the scene, shape (v, 3)
+    faces: Faces  # Shape (f, 3)
     color: Color = BODY
     opacity: float = 1.0
 

@@ -163,12 +163,9 @@ def alpha_hull(
 class _Piece(NamedTuple):
     """The tetrahedra of a shape whose centers are in one box."""
 
-    faces: Faces
-    """Those between them and the rest, as indices of points."""
-    sets: Index
-    """Set of connected tetrahedra at each face, counted from 0."""
-    solid: Mask
-    """Whether each set is a region: not all of it is flat."""
+    faces: Faces  # Those between them and the rest, as indices of points
+    sets: Index  # Set of connected tetrahedra at each face, counted from 0
+    solid: Mask  # Whether each set is a region: not all of it is flat
     volumes: tuple[Array, Array] = (np.empty(0), np.empty(0))
     """Of the tetrahedra, and of those that a part of the points has by itself [m³]."""
 

@@ -80,12 +80,9 @@ def mean_value_distance(
 class _Sample(NamedTuple):
     """Points sorted by key, each component contiguous."""
 
-    keys: Index
-    """Shape (n,)."""
-    points: Array
-    """Shape (3, n); the last axis runs along the columns."""
-    values: Array
-    """Shape (m, n)."""
+    keys: Index  # Shape (n,)
+    points: Array  # Shape (3, n); the last axis runs along the columns
+    values: Array  # Shape (m, n)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

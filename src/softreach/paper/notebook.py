@@ -45,22 +45,14 @@ def judged(text: str, agrees: object, nearly: object = False) -> Finding:
 class Settings:
     """Sizes of the paper's clouds and sweeps, or smaller ones."""
 
-    designs: int
-    """Designs along each edge of the atlas."""
-    samples: int
-    """Activations of each design of the atlas."""
-    alpha: float
-    """Radius of the α-shapes, in L; the paper states none."""
-    panels: int
-    """Designs along each edge of the sheets."""
-    accuracy: float
-    """Relative error asked of exact volumes."""
-    redundant_samples: int
-    """Activations of the clouds that are compared for redundancy."""
-    queries: int
-    """Points at which D̄ is evaluated."""
-    seed: int = 0
-    """Seed of every cloud."""
+    designs: int  # Designs along each edge of the atlas
+    samples: int  # Activations of each design of the atlas
+    alpha: float  # Radius of the α-shapes, in L; the paper states none
+    panels: int  # Designs along each edge of the sheets
+    accuracy: float  # Relative error asked of exact volumes
+    redundant_samples: int  # Activations of the clouds that are compared for redundancy
+    queries: int  # Points at which D̄ is evaluated
+    seed: int = 0  # Seed of every cloud
 
 
 FULL = Settings(16, 400_000, 0.05, 7, 3e-3, 2_000_000, 10_000)
@@ -73,10 +65,8 @@ QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)
 class Picture(NamedTuple):
     """A figure of the report."""
 
-    label: str
-    """Number of the figure in the paper, such as "2a"; empty for one of our own."""
-    name: str
-    """Of its files, without suffix."""
+    label: str  # Number of the figure in the paper, such as "2a"; empty for one of our own
+    name: str  # Of its files, without suffix
     caption: str
 
 

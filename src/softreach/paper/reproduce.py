@@ -48,17 +48,12 @@ PARTS: dict[str, Callable[[Settings, Notebook], dict[str, Any]]] = {
 class Claim:
     """A statement of the paper and its check."""
 
-    section: str
-    """Its section of the paper."""
-    says: str
-    """The statement, in the paper's words or nearly so."""
-    how: str
-    """How it is checked."""
-    part: str
-    """The part of the report that computes the numbers."""
+    section: str  # Its section of the paper
+    says: str  # The statement, in the paper's words or nearly so
+    how: str  # How it is checked
+    part: str  # The part of the report that computes the numbers
     judge: Callable[[Numbers], Finding]
-    full: bool = False
-    """True if only the full sizes test it."""
+    full: bool = False  # True if only the full sizes test it
 
     def check(self, numbers: Mapping[str, Any]) -> Finding:
         """Finding from the numbers of its part."""

@@ -74,9 +74,6 @@ def plot_arm(
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
         unit: Of the axes: "m", "cm", "mm" or "L"; None for L.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: Unknown view or unit.
         MissingExtra: matplotlib is not installed.
@@ -241,9 +238,6 @@ def plot_check(
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
         unit: Of the axes: "m", "cm", "mm" or "L"; None for that of the design, as in the report.
-
-    Returns:
-        The axes, in that unit.
 
     Raises:
         InvalidInput: Unknown view or unit, or no check.

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 
 _UNITS = {"rad": "°", "1": ""}
-_INDEXED = re.compile(r"(?<![a-z])([ERZaρθ])([0-9tc])")
+_INDEXED = re.compile(r"(?<![a-z])[ERZaρθγ][0-9]+")
+_LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _METRICS = {
     "volume": "V/L³ (α-shape)",
     "exact_volume": "V/L³ (exact)",
@@ -70,9 +71,6 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
         metric: Which one.
         ax: Axes to draw in; None for a new figure.
 
-    Returns:
-        The axes.
-
     Raises:
         InvalidInput: No such metric, or no two parameters.
         MissingExtra: matplotlib is not installed.
@@ -97,11 +95,10 @@ def _axis(values: xr.DataArray) -> SheetAxis:
     si_unit = values.attrs.get("units", "1")
     unit = _UNITS.get(si_unit, si_unit)
     shown = np.degrees(values.values) if si_unit == "rad" else values.values
-    name = values.attrs.get("symbol", _plain(str(values.name)))
-    if "symbol" in values.attrs and _INDEXED.search(name):
-        name = "$" + _INDEXED.sub(r"\1_\2", name) + "$"
-    if "symbol" in values.attrs and (part := values.attrs.get("part")):
-        name += f" of {_plain(part)}"
+    name = _plain(str(values.name))
+    if symbol := values.attrs.get("symbol"):
+        name = _INDEXED.sub(lambda found: found[0].translate(_LOWERED), symbol)
+        name += f" of {part}" if (part := values.attrs.get("part")) else ""
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -75,9 +76,6 @@ def plot_cloud(
         box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
         unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the cloud knows it, else m.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: Unknown view, bundle, color or unit, or no finite tip.
         MissingExtra: matplotlib is not installed.
@@ -146,9 +144,6 @@ def plot_slab(
         key: As in `plot_cloud`.
         box: As in `plot_cloud`.
         unit: As in `plot_cloud`.
-
-    Returns:
-        The axes, in that unit.
 
     Raises:
         InvalidInput: Not a view along an axis, unknown color, or no tip in the slab.
@@ -230,15 +225,14 @@ def plot_views(
         axes[1, 1].set_position(low.translated(0.0, -_LOWER / height))
         pairs = zip(axes.ravel().tolist(), _VIEWS, strict=True)
         panels = [Panel(ax, box, view, counted) for ax, view in pairs]
-        images: list[list[Images]] = [[] for _ in panels]
 
-        def draw(panel: Panel, drawn: list[Images]) -> None:
-            drawn.append((cloud_image(panel, tips, coloring.rgb, None), None))
+        def images(panel: Panel) -> Iterator[Images]:
+            yield cloud_image(panel, tips, coloring.rgb, None), None
             if arm is not None:
-                drawn.append(arm_images(panel, arm, shapes, range(arm.bundles)))
+                yield arm_images(panel, arm, shapes, range(arm.bundles))
 
-        parallel.run(partial(draw, *each) for each in zip(panels, images, strict=True))
-        for panel, drawn in zip(panels, images, strict=True):
+        tasks = (partial(list[Images], images(panel)) for panel in panels)
+        for panel, drawn in zip(panels, parallel.in_order(tasks), strict=True):
             for image, within in drawn:
                 panel.show(image, within)
             if arm is not None:

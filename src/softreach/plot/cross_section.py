@@ -63,19 +63,13 @@ def plot_cross_section(
             materials, or bundles other than fibers.
         unit: As in `plot_arm`.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: A station off the arm.
         MissingExtra: matplotlib is not installed.
     """
     arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
     half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
-    if legend is None:  # where colors alone leave open what is what
-        plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.fiber_directions) == {"along"}
-        legend = not plain or len(_section_materials(arm.section)) > 1
-    legend = as_flag("legend", legend)
+    legend = _needs_legend(arm) if legend is None else as_flag("legend", legend)
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     counted = unit_for(arm.length, unit)
@@ -102,6 +96,12 @@ def plot_cross_section(
             handles = [artist for artist, _ in entries[:_MOST]]
             ax.legend(handles, labels, frameon=False, fontsize=7, **place)
     return ax
+
+
+def _needs_legend(arm: Manipulator) -> bool:
+    """True where colors alone leave open what is what."""
+    plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.fiber_directions) == {"along"}
+    return not plain or len(_section_materials(arm.section)) > 1
 
 
 def section_reach(arm: Manipulator, z: float) -> float:

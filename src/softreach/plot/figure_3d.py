@@ -103,12 +103,9 @@ def plot_3d(
 class Detail(NamedTuple):
     """Fineness of surfaces on a page."""
 
-    triangles: int = 120_000
-    """The most of a surface; so many take 1.4 MB of the page."""
-    sides: int = 48
-    """Corners around an arm."""
-    stations: int = 101
-    """Corners along one that is not activated."""
+    triangles: int = 120_000  # The most of a surface; so many take 1.4 MB of the page
+    sides: int = 48  # Corners around an arm
+    stations: int = 101  # Corners along one that is not activated
 
 
 _DETAIL = Detail()

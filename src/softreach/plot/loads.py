@@ -62,9 +62,6 @@ def plot_equilibria(
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
         unit: As in `plot_arm`.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: Unknown view.
         MissingExtra: matplotlib is not installed.
@@ -125,9 +122,6 @@ def plot_compliance(
         force: Size of the force [N]; None for a round one.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
         unit: As in `plot_arm`.
-
-    Returns:
-        The axes, in that unit.
 
     Raises:
         InvalidInput: Unknown view, a force that is not positive, or another number of compliances.

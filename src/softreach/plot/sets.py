@@ -65,9 +65,6 @@ def plot_hull(
         unit: Of the axes: "m", "cm", "mm", or "L" with `length`; None for L if `length` is given,
             else m.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: Unknown view or unit, or no vertices.
         MissingExtra: matplotlib is not installed.
@@ -105,9 +102,6 @@ def plot_volume_curve(
         exact: Volume of the reachable set [m³], drawn as a line.
         convex: Volume of its convex hull [m³], likewise.
         unit: As in `plot_hull`; volumes in liters beside cm, in mL beside mm.
-
-    Returns:
-        The axes, in that unit.
 
     Raises:
         InvalidInput: Radii and volumes of different shapes.
@@ -156,9 +150,6 @@ def plot_slice(
         key: Whether to explain the colors.
         unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the grid knows it (attribute
             `length`), else m.
-
-    Returns:
-        The axes, in that unit.
 
     Raises:
         InvalidInput: Not a view along an axis, or a plane that misses the grid.

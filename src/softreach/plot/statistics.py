@@ -89,9 +89,6 @@ def plot_distance(
         box: As in `plot_cloud`.
         unit: As in `plot_cloud`.
 
-    Returns:
-        The axes, in that unit.
-
     Raises:
         InvalidInput: Unknown view, or no finite tip.
         MissingExtra: matplotlib is not installed.

@@ -29,7 +29,6 @@ from softreach.requirements.poses import (
     chosen,
     descended,
     solved,
-    worst_pose,
 )
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
@@ -413,7 +412,7 @@ def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Ite
         if keep.when == "always" or not made.requirements.targets:
             worst: list[tuple[float, float, float, str]] = []
             for payload, own in zip(made.payloads, rules, strict=True):
-                gamma, judged = worst_pose(replace(own, keeps=(keep,), limits={}))
+                gamma, judged = replace(own, keeps=(keep,), limits={}).worst_pose()
                 inputs = ", ".join(f"{x:.4g}" for x in gamma)
                 where = f"in the worst pose found, ({inputs}){_under(payload)}"
                 value, excess, error = (float(column[0, 0]) for column in judged)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -105,7 +105,7 @@ class PoseRules:
         error = np.where(error > 1e-9 * self.arm.length, error, 0.0)
         return Judged(value, np.where(excess > 1e-9, excess, 0.0), error)
 
-    def _kept(self, gamma: Array) -> tuple[Array, Array]:
+    def _kept(self, gamma: Array, levels: Sequence[int] = _LEVELS) -> tuple[Array, Array]:
         """Distances by which regions are missed [m], and what may come on top, (n, keep) each."""
         value = np.empty((len(gamma), len(self.keeps)))
         error = np.zeros_like(value)
@@ -115,7 +115,7 @@ class PoseRules:
                 value[:, column] = _tips_missed(keep, self.rod.tips(gamma))
             else:
                 left[column] = np.arange(len(gamma))
-        for parts in _LEVELS:
+        for parts in levels:
             rows = np.unique(np.concatenate([np.empty(0, int), *left.values()]))
             if not len(rows):
                 break
@@ -148,6 +148,17 @@ class PoseRules:
             by_length = [unit == "m" for unit in self.arm.bundle_units]
             sizes = np.concatenate([sizes, np.abs(tension[:, by_length])], axis=1)
         return sizes.max(axis=1, initial=0.0)
+
+    def worst_pose(self) -> tuple[Array, Judged]:
+        """The pose within the bounds that misses the one region by most, by search."""
+
+        def missed(gamma: Array) -> Array:
+            blocks = parallel.blocks(len(gamma), _BLOCK)
+            each = [self._kept(gamma[block], _LEVELS[:1])[0] for block in blocks]
+            return np.nan_to_num(np.concatenate(each), nan=-np.inf)
+
+        worst, _ = worst_inputs(self.rod, missed)
+        return worst[0], self.judged(worst)
 
     def of_bounds(self, name: str) -> float:
         """Value of a limit of poses other than bending over all of the bounds, by search."""
@@ -229,23 +240,6 @@ def _tips_missed(keep: Keep, tips: Array) -> Array:
     missed = keep.missed(np.where(np.isnan(tips), 0.0, tips))
     missed[np.isnan(tips).any(axis=1)] = np.nan
     return missed
-
-
-def worst_pose(rules: PoseRules) -> tuple[Array, Judged]:
-    """The pose within the bounds that misses the one region of some rules by most, by search."""
-    (keep,) = rules.keeps
-
-    def missed(gamma: Array) -> Array:  # at few stations
-        if keep.of == "tip":
-            values = [_tips_missed(keep, rules.rod.tips(gamma))]
-        else:
-            blocks = parallel.blocks(len(gamma), _BLOCK)
-            bodies = (Body.of(rules.rod, gamma[block], _LEVELS[0]) for block in blocks)
-            values = [body.missed(keep, np.arange(len(body.lost)))[0] for body in bodies]
-        return np.nan_to_num(np.concatenate(values), nan=-np.inf)[:, None]
-
-    worst, _ = worst_inputs(rules.rod, missed)
-    return worst[0], rules.judged(worst)
 
 
 class Posed(NamedTuple):

@@ -192,14 +192,12 @@ class Requirements:
         write_text(path, self.to_toml(), overwrite=overwrite)
 
     def __repr__(self) -> str:
-        parts = [
-            f"{len(self.targets)} targets with {len(self.places):,} places",
-            f"{len(self.keeps)} regions to keep to",
-            f"{len(self.limits.given)} limits",
-            f"payloads {', '.join(f'{x:g}' for x in self.payloads) or 'none'} kg",
-            f"{len(self.measures)} measures",
-        ]
-        return f"Requirements: {'; '.join(parts)}"
+        payloads = ", ".join(f"{x:g}" for x in self.payloads) or "none"
+        return (
+            f"Requirements: {len(self.targets)} targets with {len(self.places):,} places; "
+            f"{len(self.keeps)} regions to keep to; {len(self.limits.given)} limits; "
+            f"payloads {payloads} kg; {len(self.measures)} measures"
+        )
 
 
 def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
@@ -341,9 +339,10 @@ class _Reader(FaultReader):
             return self._refuse(path, table, "must be a table" + " or a file" * (shape == "mesh"))
         kind, numbers = _SHAPES[shape]
         values = self._numbers(table, path, numbers)
-        if lacking := [name for name in numbers if name not in values]:
-            key = [*_keys(lacking[0], numbers[lacking[0]])][numbers[lacking[0]] != ""]
-            return self._refuse(f"{path}.{key}", None, "required key is missing")
+        for name, unit in numbers.items():
+            if name not in values:
+                key = [*_keys(name, unit)][unit != ""]
+                return self._refuse(f"{path}.{key}", None, "required key is missing")
         return self._made(kind, table, path, values)
 
     def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
@@ -406,16 +405,15 @@ class _Reader(FaultReader):
             if len(keys) > 1:
                 allowed = f"has {' and '.join(keys)}: give one"
                 values[name] = self._refuse(start + name, None, allowed)
-            for key in keys if len(keys) == 1 else ():
-                symbol, value = known[name][key], raw[key]
-                if name in _LISTS and not isinstance(value, list | str):
-                    values[name] = self._refuse(start + key, value, "must be a list")
-                    continue
+            elif keys:
+                value, symbol = raw[keys[0]], known[name][keys[0]]
+                fits = name not in _LISTS or isinstance(value, list | str)
                 try:
-                    values[name] = self._read(value, unit, symbol, plain or not unit)
+                    own = value if fits else None
+                    values[name] = self._read(own, unit, symbol, plain or not unit)
                 except ValueError:
-                    allowed = self._allowed(unit, symbol, name)
-                    values[name] = self._refuse(start + key, value, allowed)
+                    allowed = self._allowed(unit, symbol, name) if fits else "must be a list"
+                    values[name] = self._refuse(start + keys[0], value, allowed)
         return values
 
     def _read(self, value: Any, unit: str, symbol: str, plain: bool) -> Any:
@@ -424,21 +422,17 @@ class _Reader(FaultReader):
         Raises:
             ValueError: Anything else.
         """
+        if isinstance(value, str) and "," in value:
+            value = value.split(",")
         if isinstance(value, list):
             return [self._read(item, unit, symbol, plain) for item in value]
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise ValueError(value)
-        if isinstance(value, str):
-            if symbol or not unit:
-                raise ValueError(value)
-            if "," in value:
-                return [self._read(item, unit, symbol, plain) for item in value.split(",")]
+        if isinstance(value, str) and unit and not symbol:
             return self._quantity(value, unit)
-        if not symbol and not plain and value != 0:
+        if isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError(value)
-        if symbol in ("", unit):
-            return value
-        return self._quantity(f"{value!r}{symbol}", unit)
+        if not (symbol or plain) and value != 0:
+            raise ValueError(value)
+        return value if symbol in ("", unit) else self._quantity(f"{value!r}{symbol}", unit)
 
     def _quantity(self, text: str, unit: str) -> float:
         is_relative = unit == "m" and text.strip().endswith("L")

@@ -12,21 +12,18 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.jobs import JOBS
 from softreach.studio.serve import (
     LOOPBACK,
     close_sockets,
     page_address,
-    page_url,
     reachable_hosts,
     start_server,
     stop_server,
-    with_token,
 )
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, vector
-from softreach.studio.tabs import furnish
+from softreach.studio.tabs import JOBS, furnish
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import SoftreachError
 
@@ -84,14 +81,13 @@ class Studio:
     @property
     def url(self) -> str:
         """Address of the page, with its token."""
-        return with_token(page_url(self.server), self._token)
+        return page_address(self.server.get_host(), self.server.get_port(), self._token)
 
     @property
     def urls_for_others(self) -> list[str]:
         """Addresses of the page for other machines; none if it is for this one alone."""
         host, port = self.server.get_host(), self.server.get_port()
-        hosts = reachable_hosts(host)
-        return [with_token(page_address(name, port), self._token) for name in hosts]
+        return [page_address(name, port, self._token) for name in reachable_hosts(host)]
 
     def stop(self) -> None:
         """Stop serving. Tabs go first: viser ends its pool before it reports their closing."""

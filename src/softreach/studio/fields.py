@@ -73,7 +73,7 @@ class Fields:
         self.session, self.gui = session, session.client.gui
         self.message: Line | None = None
         """Where refusals of widgets stand that have no line of their own; else above all tabs."""
-        self._words = words
+        self.words = words
         self._followers: list[_Follower] = []
         self._bindings: list[_Binding] = []
         self._groups: list[_Group] = []
@@ -133,9 +133,9 @@ class Fields:
 
     @contextmanager
     def folder(
-        self, label: str, shown: Shown | None = None, *, expanded: bool = True
+        self, label: str, shown: Shown | str = "", *, expanded: bool = True
     ) -> Iterator[Any]:
-        """A folder for what is declared inside the block."""
+        """A folder for what is declared inside the block, shown as `button` is."""
         folder = self._seen_where(self.gui.add_folder(label, expand_by_default=expanded), shown)
         self._depth += 1
         with folder:
@@ -220,16 +220,16 @@ class Fields:
         label: str,
         action: Callable[[], object],
         hint: str,
-        shown: Shown | None = None,
+        shown: Shown | str = "",
         **looks: Any,
     ) -> Any:
-        """Add a button that acts; it is there only where `shown` is true."""
+        """Add a button that acts; it is there where `shown`, or what is at that path, is true."""
         button = self._seen_where(self.gui.add_button(label, hint=hint, **looks), shown)
         button.on_click(lambda _: attempt(self.session, action))
         return button
 
     def change(
-        self, label: str, change: Change, hint: str, shown: Shown | None = None, **looks: Any
+        self, label: str, change: Change, hint: str, shown: Shown | str = "", **looks: Any
     ) -> Any:
         """Add a button that changes the state."""
         return self.button(label, lambda: self.apply(change), hint, shown, **looks)
@@ -270,7 +270,7 @@ class Fields:
         try:
             session.update(change, by_widget=widget is not None, goes_on=dragged)
         except SoftreachError as error:
-            refusal = self._words(error)
+            refusal = self.words(error)
             if place is None:
                 session.fail(error)
         with session.lock:
@@ -294,14 +294,21 @@ class Fields:
             self._widgets.append(widget)
         return widget
 
-    def _seen_where(self, widget: Any, shown: Shown | None) -> Any:
+    def _seen_where(self, widget: Any, shown: Shown | str) -> Any:
         def follow(state: StudioState, found: Found) -> None:
-            if widget.visible != (wanted := bool(shown and shown(state, found))):
+            if widget.visible != (wanted := bool(at(state, found))):
                 widget.visible = wanted
 
-        if shown is not None:
+        if shown:
+            at = shown if callable(shown) else _value(shown)
             self.follow("state", "found", show=follow)
         return self.kept(widget)
+
+
+def _value(path: str) -> Shown:
+    read = attrgetter(path.removeprefix("found."))
+    of_found = path.startswith("found.")
+    return lambda state, found: read(found if of_found else state)
 
 
 class _Follower:

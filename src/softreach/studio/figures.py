@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, cast
 
@@ -98,6 +99,8 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
     Raises:
         InvalidInput: As `section_curves`.
     """
+    from matplotlib.path import Path
+
     arm, plane = reach.arm, _plane(cut, reach.arm)
     view, at, unit = _VIEWS[plane.axis], plane.center * arm.length, arm.length_unit
     with all_cores:
@@ -114,6 +117,9 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
     for line in lines:
         ax.plot(*line.T, color=_LINE, lw=1.4)
     if lines:
+        inside = Path.make_compound_path(*map(Path, lines))
+        for cells in ax.images:  # which reach beyond the boundary by up to half of one
+            cells.set_clip_path(inside, ax.transData)
         points = np.concatenate(lines)
         room = 0.06 * np.ptp(points, axis=0).max()
         low, high = points.min(axis=0) - room, points.max(axis=0) + room
@@ -161,7 +167,7 @@ def enclosed_area(curves: list[Array], axis: int) -> float:
 def swept_parameter(state: StudioState) -> ShownParameter | None:
     """The parameter that is chosen, the first for an unknown one; None if there is none."""
     sliders = {slider.name: slider for slider in slider_parameters(state.design)}
-    return sliders.get(state.appearance.plots.parameter) or next(iter(sliders.values()), None)
+    return sliders.get(state.appearance.swept) or next(iter(sliders.values()), None)
 
 
 def sweep_pictures(
@@ -174,10 +180,19 @@ def sweep_pictures(
         parameter: What the slider changes.
         quality: How coarse, and how far off the tips may be.
     """
-    known = dict[float, float | None]()
+    unit, known = arm.length_unit, dict[float, float | None]()
     for value, volume in swept_volumes(arm, parameter, quality):
         known[value] = volume
-        yield _sweep_picture(arm, parameter, known)
+        volumes = {each: known[each] for each in sorted(known) if known[each] is not None}
+        ax = _axes(3.0)
+        ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
+        ax.axvline(parameter.shown, color=_HERE, lw=1.2, ls="--")
+        ax.set(xlabel=parameter.label, ylabel=unit.label("V", 3), xlim=parameter.limits)
+        here, missing = volumes.get(parameter.shown), len(known) - len(volumes)
+        text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
+        if missing:
+            text += f" · {missing} values make no design or take too long"
+        yield Picture(arm, _pixels(ax), text)
 
 
 def swept_volumes(
@@ -193,39 +208,18 @@ def swept_volumes(
     values = {round(float(value), 9) for value in steps} | {parameter.shown}
     for value in sorted(values, key=lambda value: abs(value - parameter.shown)):
         check_wanted()
-        try:
+        volume = None
+        with suppress(SoftreachError, OverBudget, MemoryError):
             design = changed(arm, {parameter.name: value * parameter.scale})
-        except SoftreachError:
-            yield value, None
-        else:
-            yield value, _volume(design, quality.coarse_accuracy, quality.tol)
+            volume = _volume(design, quality.coarse_accuracy, quality.tol)
+        yield value, volume
 
 
 @lru_cache(maxsize=512)
-def _volume(design: Manipulator, accuracy: float, tol: float) -> float | None:
-    try:
-        with all_cores:
-            solvable_rod(design)
-            return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
-    except (SoftreachError, OverBudget, MemoryError):
-        return None
-
-
-def _sweep_picture(
-    arm: Manipulator,
-    parameter: ShownParameter,
-    known: Mapping[float, float | None],
-) -> Picture:
-    unit, ax = arm.length_unit, _axes(3.0)
-    volumes = {value: known[value] for value in sorted(known) if known[value] is not None}
-    ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
-    ax.axvline(parameter.shown, color=_HERE, lw=1.2, ls="--")
-    ax.set(xlabel=parameter.label, ylabel=unit.label("V", 3), xlim=parameter.limits)
-    here, missing = volumes.get(parameter.shown), len(known) - len(volumes)
-    text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
-    if missing:
-        text += f" · {missing} values make no design or take too long"
-    return Picture(arm, _pixels(ax), text)
+def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
+    with all_cores:
+        solvable_rod(design)
+        return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
 
 
 # The activations along a path of the tip.

@@ -87,8 +87,7 @@ def page_file(reach: Reach, state: StudioState) -> bytes:
     cloud, color = _shown(reach, look)
     what = reach.exact if reach.has_surface and look.surface and not look.cloud else cloud
     unit, text = state.design.length_unit.name, ". ".join(_caption(state, reach))
-    page = plot.plot_3d([what, shape], color=color, unit=unit, caption=text)
-    return _written("page.html", lambda path: plot.save_figure(page, path))
+    return plot.plot_3d([what, shape], color=color, unit=unit, caption=text).html.encode()
 
 
 def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.DataArray]:

@@ -27,13 +27,7 @@ from softreach.studio.work import (
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput, no_warnings
 from softreach.support.progress import Progress, silent
-from softreach.workspace import (
-    ReachableCurve,
-    ReachableSet,
-    ReachableSolid,
-    ReachableSurface,
-    reachable_set,
-)
+from softreach.workspace import ReachableSet, ReachableSolid, ReachableSurface, reachable_set
 from softreach.workspace.sheets import Sheets
 
 if TYPE_CHECKING:
@@ -107,17 +101,13 @@ class Reach:
     @property
     def size(self) -> Size | None:
         """Volume, area or length of what can be reached; None while it is not known."""
-        match exact := self.exact:
-            case None:
-                return None
-            case ReachableSolid():
-                return Size("volume", exact.volume, exact.volume_error, 3)
-            case ReachableSurface():
-                return Size("area", exact.area, exact.area_error, 2)
-            case ReachableCurve():
-                return Size("length", exact.curve_length, exact.curve_length_error, 1)
-            case _:
-                return Size("point", 0.0, 0.0, 0)
+        if self.exact is None:
+            return None
+        power = self.exact.dimension
+        if not (word := ("", "curve_length", "area", "volume")[power]):
+            return Size("point", 0.0, 0.0, 0)
+        value, error = (float(getattr(self.exact, word + part)) for part in ("", "_error"))
+        return Size(word.removeprefix("curve_"), value, error, power)
 
     @property
     def unreachability(self) -> float:

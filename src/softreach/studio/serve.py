@@ -73,8 +73,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
     except ModuleNotFoundError as error:
         raise MissingExtra(("viser", "studio")) from error
 
-    check_address(host, port or 0)
-    _check_free(host, port or 0)
+    _check_address(host, port or 0)
     # viser prints a banner; we print our own line.
     with redirect_stdout(io.StringIO()), guarding(host, token) as guard:
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
@@ -248,14 +247,13 @@ def headed(body: bytes, *, zipped: bool) -> bytes:
 # Addresses of the server.
 
 
-def page_url(server: ViserServer) -> str:
-    """Address of the page, for a browser on this machine."""
-    return page_address(server.get_host(), server.get_port())
-
-
-def _check_free(host: str, port: int) -> None:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family) as trial:
+def _check_address(host: str, port: int) -> None:
+    if not host.strip():  # systems take it for every address of the machine
+        allowed = f"an address to listen on, such as {LOOPBACK}"
+        raise InvalidInput("host", repr(host), allowed, f"{ANYWHERE[0]} is for every address")
+    if not 0 <= port <= _LAST_PORT:
+        raise InvalidInput("port", port, f"1 to {_LAST_PORT}", "leave it out for a free one")
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             trial.bind((host, port))
@@ -269,23 +267,11 @@ def is_local(host: str) -> bool:
     return host in LOCAL or host.startswith("127.")
 
 
-def check_address(host: str, port: int) -> None:
-    """Refuse what is no host or no port.
-
-    Raises:
-        InvalidInput: No host is named, or the port is not from 1 to 65535 (0 for a free one).
-    """
-    if not host.strip():  # systems take it for every address of the machine
-        allowed = f"an address to listen on, such as {LOOPBACK}"
-        raise InvalidInput("host", repr(host), allowed, f"{ANYWHERE[0]} is for every address")
-    if not 0 <= port <= _LAST_PORT:
-        raise InvalidInput("port", port, f"1 to {_LAST_PORT}", "leave it out for a free one")
-
-
-def page_address(host: str, port: int) -> str:
-    """The address of the page on a host of this machine."""
+def page_address(host: str, port: int, token: str = "") -> str:
+    """The address of the page on a host of this machine; it shows the token, if there is one."""
     shown = LOOPBACK if host in ANYWHERE else host
-    return f"http://{f'[{shown}]' if ':' in shown else shown}:{port}"
+    address = f"http://{f'[{shown}]' if ':' in shown else shown}:{port}"
+    return f"{address}/?token={token}" if token else address
 
 
 def reachable_hosts(host: str) -> list[str]:
@@ -301,8 +287,3 @@ def reachable_hosts(host: str) -> list[str]:
         line.connect(("192.0.2.1", 9))  # reserved for examples; nothing is sent
         return [str(line.getsockname()[0])]
     return []
-
-
-def with_token(address: str, token: str) -> str:
-    """An address that shows the token; the address alone without any."""
-    return f"{address}/?token={token}" if token else address

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Pull
-from softreach.studio.job import Given, Job, Learned, forgotten, what_follows
+from softreach.studio.jobs import Given, Job, Learned, forgotten, what_follows
 from softreach.studio.reach import cloud_points, shown_rows
 from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.scene import Scene, shows_cloud
@@ -315,7 +315,7 @@ class Session:
             raise
         except Exception:
             self.learn(forgotten(job))
-            self.scene.remove(*job.draws)
+            self.scene.remove(*job.draws.split())
             raise
         finally:
             if job.doing:
@@ -347,7 +347,7 @@ class Session:
             self.keep()
             yield from ()
 
-        return Job("keep", tuple(field.name for field in fields(StudioState)), keep)
+        return Job("keep", " ".join(field.name for field in fields(StudioState)), keep)
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that follows from the state is done; return whether it is."""

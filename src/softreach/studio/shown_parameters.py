@@ -124,13 +124,12 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
         names = [f"{owner}.{field}" if owner else field for field in fields]
         names += [name for name in known if name in own and known[name].owner == owner]
         for parameter in (known[name] for name in dict.fromkeys(names) if name in known):
-            slider = None
-            if parameter.name in own:
-                slider = _own_slider(arm, parameter, units)
-            elif _is_offered(arm, known, parameter):
-                slider = _slider(arm, parameter, units)
-            if slider is not None:
-                shown.append(_on_slider(arm, parameter, units, slider))
+            is_own = parameter.name in own
+            offered = is_own or _is_offered(arm, known, parameter)
+            if offered and not math.isnan(parameter.value(arm)):
+                fixed = None if is_own else _fixed(arm, parameter)
+                slider = fixed or _around_value(arm, parameter, units)
+                shown += [_on_slider(arm, parameter, units, slider)] if slider else []
     return tuple(shown)
 
 
@@ -150,7 +149,20 @@ def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
     return parameter.number.field in own_fields(type(parts_of(arm)[parameter.part]))
 
 
-def _own_slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | None:
+def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
+    """The slider of the tables, if its unit and its ends suit the number."""
+    fixed = (_OF_PART if parameter.owner else _OF_ARM).get(parameter.field)
+    outside_arm = parameter.field == "distance_ratio" and parameter.value(arm) > 1
+    if fixed is None or parameter.unit not in ("1", "rad", "m") or outside_arm:
+        return None
+    if parameter.unit == "m":
+        scale = float(f"{arm.length / arm.length_unit.size:.12g}")
+        low, high, step = (scale * end for end in fixed[1:])
+        return arm.length_unit.label(fixed[0]), low, high, step
+    return fixed
+
+
+def _around_value(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | None:
     """From zero to twice the value, or all angles, within the range; None for a zero of no size.
 
     Where the range itself does not end at zero, the slider stays off it by a hundredth.
@@ -165,34 +177,11 @@ def _own_slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slide
     if not math.isfinite(size):
         return None
     step = max(1.0, size // 200) if parameter.whole else size / 200
-    ends = (
-        max(ends[0], low + step * allowed.open_low),
-        min(ends[1], high - step * allowed.open_high),
-    )
-    owner = f" of {parameter.owner}" if parameter.owner else ""
-    return _titled(f"{parameter.symbol}{owner}", unit), *ends, step
-
-
-def _slider(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | None:
-    """Ends and label; None for what the design leaves open, or for a zero of unknown size."""
-    value = parameter.value(arm)
-    fixed = (_OF_PART if parameter.owner else _OF_ARM).get(parameter.field)
-    outside_arm = parameter.field == "distance_ratio" and value > 1
-    if fixed and parameter.unit in ("1", "rad", "m") and not outside_arm:
-        if parameter.unit == "m":
-            scale = float(f"{arm.length / arm.length_unit.size:.12g}")
-            low, high, step = (scale * end for end in fixed[1:])
-            fixed = arm.length_unit.label(fixed[0]), low, high, step
-        return fixed if math.isfinite(value) else None
-    if value == 0 or math.isnan(value):
-        return None
+    low, high = low + step * allowed.open_low, high - step * allowed.open_high
     name, label = _NAMES.get(parameter.symbol, parameter.symbol), owner_label(parameter.owner)
     rings = {f"ring {k}": ring.name for k, ring in enumerate(arm.section.rings)}
-    owner = f" of {rings.get(label) or label}" if label else ""
-    unit, scale = _unit(parameter, units)
-    size = value / scale
-    ends = (0.01 if parameter.field == "young_modulus" else 0.0) * size, 2 * size
-    return _titled(f"{name}{owner}", unit), min(ends), max(ends), abs(size) / 100
+    title = _titled(f"{name} of {rings.get(label) or label}" if label else name, unit)
+    return title, max(ends[0], low), min(ends[1], high), step
 
 
 def owner_label(path: str) -> str:

@@ -125,7 +125,7 @@ def _files_in(text: str) -> list[str]:
     ]
 
 
-VERSION = 3
+VERSION = 4
 LEVELS = range(12, 22)  # 2^level points: every such prefix of a Sobol sequence is even
 
 MOUSE = {
@@ -161,26 +161,6 @@ class Slice:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlotSettings:
-    """Plots beside the scene; each is computed only while it is shown."""
-
-    shown: tuple[str, ...] = ()  # names of the plots, each once and in order
-    parameter: str = ""  # parameter against which the volume is plotted; "" for the first there is
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.parameter, str):
-            raise InvalidInput("plots.parameter", self.parameter, "a str")
-        if not all(isinstance(name, str) for name in self.shown):
-            raise InvalidInput("plots.shown", self.shown, "names of plots")
-        object.__setattr__(self, "shown", tuple(sorted(set(self.shown))))
-
-    def showing(self, name: str, on: bool = True, **changes: Any) -> Self:
-        """A copy with a plot, or without it, and other changes."""
-        shown = {*self.shown, name} if on else {*self.shown} - {name}
-        return replace(self, shown=tuple(shown), **changes)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Appearance:
     """Looks of a tab: what is drawn and how."""
 
@@ -193,7 +173,9 @@ class Appearance:
     arm: bool = True
     surface: bool = True  # the exact boundary of the reachable set
     mouse: str = "tip"  # use of the mouse in the scene, one of `MOUSE`; it turns the view besides
-    plots: PlotSettings = field(default_factory=PlotSettings)
+    section: bool = False  # plots beside the scene, each computed only while it is shown
+    sweep: bool = False
+    swept: str = ""  # parameter against which the volume is plotted; "" for the first there is
 
     @property
     def handle(self) -> bool:
@@ -344,13 +326,13 @@ def _fields(
     path: dict[str, Any] | None,
     needs: Any,
 ) -> dict[str, Any]:
-    plots, cut = PlotSettings(**appearance["plots"]), Slice(**appearance["slice"])
+    look: dict[str, Any] = appearance | {"slice": Slice(**appearance["slice"])}
     if camera is not None:
         camera |= {name: vector(camera[name]) for name in ("position", "look_at")}
     return {
         "design": design_of_text(design, "state file"),
         "activation": tuple(map(float, activation)),
-        "appearance": Appearance(**appearance | {"slice": cut, "plots": plots}),
+        "appearance": Appearance(**look),
         "target": target and vector(target),
         "reference": reference and design_of_text(reference, "state file"),
         "camera": camera and Camera(**camera),

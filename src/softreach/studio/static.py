@@ -179,11 +179,10 @@ def _page(
     content = json.loads(paths[first].read_text("utf-8").partition(", ")[2].removesuffix(");\n"))
     (scale,) = page_keys(ScalarKey("", 0.0, 1.0))
     base, varied = space.base, space.varied()
+    sliders = [_slider(base, varied[name], values, unit) for name, values in space.parameters]
     sheet = {
         "folder": _FOLDER,
-        "parameters": [
-            _slider(base, varied[name], values, unit) for name, values in space.parameters
-        ],
+        "parameters": sliders,
         "designs": [
             entry if "gap" in entry else {"file": str(k), "numbers": entry["numbers"]}
             for k, entry in enumerate(entries)
@@ -195,15 +194,10 @@ def _page(
         "name": title,
     }
     more = files("softreach.studio").joinpath("static.html").read_text(encoding="utf-8")
-    return web_page(
-        content["parts"],
-        box,
-        unit,
-        caption=title and f"Reachable set of {title}",
-        note=content["note"],
-        more=more.replace("@SHEET@", script_text(sheet)),
-        scripts="'self' file:",
-    ).replace('content="softreach figure"', 'content="softreach static page"', 1)
+    more, caption = more.replace("@SHEET@", script_text(sheet)), f"Reachable set of {title}"
+    words = {"caption": title and caption, "note": content["note"]}
+    page = web_page(content["parts"], box, unit, more=more, scripts="'self' file:", **words)
+    return page.replace('content="softreach figure"', 'content="softreach static page"', 1)
 
 
 def _slider(

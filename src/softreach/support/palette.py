@@ -33,10 +33,17 @@ _BUNDLES: tuple[Color, ...] = (
     (0.10, 0.68, 0.75),
     (0.95, 0.50, 0.10),
     (0.35, 0.35, 0.35),
+    (0.97, 0.62, 0.76),
+    (0.45, 0.24, 0.08),
+    (0.68, 0.88, 0.36),
+    (0.03, 0.10, 0.28),
 )
 # Light that an activation adds: pure, so that three bundles are the paper's RGB.
 _LIGHTS = np.array(
-    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0.5, 0], [1, 1, 1]],
+    [
+        *([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1]),
+        *([1, 0.5, 0], [1, 1, 1], [1, 0, 0.5], [0.5, 0.25, 0], [0.5, 1, 0], [0, 0, 0.5]),
+    ],
     float,
 )
 
@@ -67,7 +74,7 @@ def eight_bit(color: Color) -> tuple[int, int, int]:
 
 
 def bundle_color(index: int) -> Color:
-    """The color of a bundle: red, green, blue, yellow, then others; they repeat after eight."""
+    """The color of a bundle: red, green, blue, yellow, then others; they repeat after twelve."""
     return _BUNDLES[index % len(_BUNDLES)]
 
 

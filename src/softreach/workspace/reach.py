@@ -72,7 +72,7 @@ def reachable_set(
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
             dimension.
-        accuracy: Relative error ε allowed in the volume.
+        accuracy: Relative error ε allowed in the volume; of several sheets under loads twice that.
         cell: Edge h of a cell [m], instead of the rule's.
         tol: Largest tip error, in L.
         frame: In which places are told: that of the "world", or of the "base", whose z is along the
@@ -105,7 +105,9 @@ def reachable_set(
         return thin_set(tip_map)
     if m == 3:
         result = _of_three(tip_map, accuracy, cell, progress)
-        finer = f"a grid above {result.cells} and a smaller cell"
+        allowed = allowed_error(result, accuracy)
+        finer = f"a smaller accuracy, for a grid above {result.cells}"
+        finer += "" if cell is None else ", and a smaller cell"
     else:
         cells = searched_set(tip_map, accuracy, cell, memory, progress)
         hull = cells.hull
@@ -120,11 +122,12 @@ def reachable_set(
             route="search",
             image=cells,
         )
+        allowed = accuracy
         finer = "a smaller cell" if cell is not None else "more memory"
-    if result.volume_error > accuracy * result.volume:
+    if result.volume_error > allowed * result.volume:
         warn(
             f"volume {result.volume:.5g} m³ may be off by {result.volume_error:.2g} m³, more than "
-            f"{accuracy:g} of it; pass {finer}"
+            f"{allowed:g} of it; pass {finer}"
         )
     return result
 
@@ -148,18 +151,21 @@ def rasterized_set(
     return _by_raster(tip_map, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
 
 
-def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
-    """True if the volume errs by more than asked, and grids that memory holds may be fine enough.
+def allowed_error(solid: ReachableSolid, accuracy: float) -> float:
+    """The error of the volume that has to do, relative.
 
-    Of several sheets the error falls as 1/n and no faster: twice what is asked has to do for them,
-    but on grids that take no time.
+    Of several sheets it falls as 1/n and no faster: twice what is asked has to do for them, but on
+    grids that take no time.
     """
-    cells, wanted = 2 * solid.cells, accuracy * solid.volume
-    if solid.is_torn and solid.cells > _QUICK:
-        wanted *= _TORN
-    return solid.volume_error > wanted and (cells + 1) ** 3 <= _MOST_VERTICES / (
-        4.0 if solid.is_torn else 1.0
-    )
+    has_sheets = solid.is_torn and solid.cells > _QUICK
+    return (_TORN if has_sheets else 1.0) * accuracy
+
+
+def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
+    """True if the volume errs too much, and grids that memory holds may be fine enough."""
+    most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)
+    errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
+    return errs and (2 * solid.cells + 1) ** 3 <= most
 
 
 def _of_three(

@@ -110,14 +110,12 @@ class Actuator(Span, ABC):
     @property
     def numbers(self) -> dict[str, Number]:
         """With the bounds, `lower` and `upper` of all bundles, `lower[1]` of one of several."""
-        unit = "" if self.unit == "1" else self.unit
+        allowed = Range(unit="" if self.unit == "1" else self.unit)
         bundles = ["", *(f"[{k}]" for k in range(self.bundles))] if self.bundles > 1 else [""]
         ends = ("lower", "min", "lowest activation"), ("upper", "max", "highest activation")
         return super().numbers | {
-            f"{end}{k}": Number(
-                symbol=f"{short} {self.symbol}{k}", meaning=meaning, allowed=Range(unit=unit)
-            )
-            for end, short, meaning in ends
+            f"{end}{k}": Number(symbol=f"{short} {self.symbol}{k}", meaning=about, allowed=allowed)
+            for end, short, about in ends
             for k in bundles
         }
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.actuators.sector import RingIntegrals, SectorActuator, cone_integrals
@@ -89,31 +88,15 @@ class FiberArchitecture(SectorActuator):
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
         """Θ(Z) = ∫ tan α dZ/(R cos φ) from where it begins [rad]: theory (50)."""
-        angle = self.helical_angle_on(profile, section)
+        angle, ratio = self.helical_angle_on(profile, section), section.ring(self.ring).outer_ratio
         start, _ = self.span(profile.length)
-        return helical_rotation(profile, section.ring(self.ring).outer_ratio, angle, start, z)
-
-
-def helical_rotation(
-    profile: Profile, ratio: float, angle: float | AlongArm, start: float, z: ArrayLike
-) -> Array:
-    """Θ(Z) = ∫ tan α(Z)/(R cos φ) dZ from `start` to Z [rad]: theory (50).
-
-    Args:
-        profile: R2(Z).
-        ratio: R/R2 of the cone on which α is measured [-].
-        angle: α, constant or along the arm [rad].
-        start: Station of its beginning [m].
-        z: Stations Z [m], any shape.
-    """
-    z = np.asarray(z, float)
-    if isinstance(angle, AlongArm):
-        turned = _rotation_from_base(profile, ratio, angle, np.append(z, start))
-        return turned[:-1].reshape(z.shape) - turned[-1]
-    turned = profile.surface_coordinate(z, ratio)
-    if start > 0.0:
-        turned = turned - profile.surface_coordinate(start, ratio)
-    return turned * np.tan(angle)
+        if isinstance(angle, AlongArm):
+            turned = _rotation_from_base(profile, ratio, angle, np.append(z, start))
+            return turned[:-1] - turned[-1]
+        turned = profile.surface_coordinate(z, ratio)
+        if start > 0.0:
+            turned = turned - profile.surface_coordinate(start, ratio)
+        return turned * np.tan(angle)
 
 
 def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Array) -> Array:

@@ -26,13 +26,14 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.base import Base
 from softreach.arm.body import RestShape
+from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number, fields_of, unit_suffix
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.section import Measured, Ring, Section
-from softreach.arm.stations import Marker, RigidPiece
+from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
@@ -63,6 +64,42 @@ _GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
 _BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape, RigidPiece, Marker)
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
+
+
+class Block(NamedTuple):
+    """What a file says under a key at its top."""
+
+    shape: type
+    """One table, a list of tables, text or a number."""
+    kind: Any
+    """Kind of part that a table describes; None for none."""
+    about: str
+    """Description."""
+    required: bool = False
+
+
+LAYOUT: Mapping[str, Block] = {
+    "version": Block(int, None, "Version of the format", required=True),
+    "profile": Block(dict, Profile, "Length and outer radius along the arm", required=True),
+    "materials": Block(dict, Material, "Materials by name; others are looked up in the library"),
+    "section": Block(dict, Section, "Inside of the arm"),
+    "rings": Block(list, Ring, "Layers that actuators live in", required=True),
+    "stations": Block(dict, Stations, "Places along the arm by name, Z [m]"),
+    "actuators": Block(
+        list, Actuator, "In the order of the activations; [] for a passive rod", required=True
+    ),
+    "rigid_pieces": Block(list, RigidPiece, "Where the arm is not deformed"),
+    "drives": Block(
+        list, Drive, "Inputs that activate bundles, before the bundles that none names"
+    ),
+    "markers": Block(list, Marker, "Points that go with sections of the arm"),
+    "loads": Block(dict, Loads, "Gravity, payload, forces and moments"),
+    "base": Block(dict, Base, "Where in the world the arm is clamped, and which way it points"),
+    "rest": Block(dict, RestShape, "Curvature and twist of the arm that nothing drives"),
+    "point": Block(str, None, "Name of the marker that counts as the tip"),
+    "display": Block(dict, None, "How the design is shown; it changes nothing about the arm"),
+}
+"""Keys at the top of a file."""
 
 
 class Key(NamedTuple):

@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 from softreach.arm.actuators import Actuator
 from softreach.arm.actuators.actuator import MOST_BUNDLES
 from softreach.arm.along import AlongArm, Pieces, Samples
-from softreach.arm.base import Base
-from softreach.arm.body import RestShape, named_actuators
+from softreach.arm.body import named_actuators
 from softreach.arm.design_file.keys import (
     KINDS,
+    LAYOUT,
     Key,
     Kind,
     Place,
@@ -31,14 +31,13 @@ from softreach.arm.design_file.keys import (
     own_kind,
     radians,
 )
-from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
 from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Measured, Ring, Section
-from softreach.arm.stations import Marker, RigidPiece, Stations
+from softreach.arm.stations import Marker, Stations
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 from softreach.support.files import toml
 from softreach.support.files.text import read_text
@@ -46,25 +45,6 @@ from softreach.support.files.toml import WRONG, FaultReader, key_text, unknown_k
 
 LONGEST = 250_000
 """Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
-
-LAYOUT: Mapping[str, tuple[type, Any, bool]] = {
-    "version": (int, None, True),
-    "profile": (dict, Profile, True),
-    "materials": (dict, Material, False),
-    "section": (dict, Section, False),
-    "rings": (list, Ring, True),
-    "stations": (dict, Stations, False),
-    "actuators": (list, Actuator, True),
-    "rigid_pieces": (list, RigidPiece, False),
-    "drives": (list, Drive, False),
-    "markers": (list, Marker, False),
-    "loads": (dict, Loads, False),
-    "base": (dict, Base, False),
-    "rest": (dict, RestShape, False),
-    "point": (str, None, False),
-    "display": (dict, None, False),
-}
-"""Keys at the top of a file: one table or a list of them, of what, and whether it is required."""
 
 Arm = TypeVar("Arm")
 
@@ -141,11 +121,11 @@ class _Reader(FaultReader):
         places = {"places": self._table(self._document, "stations")}
         fields["stations"] = self._made(Stations, Place("stations"), places)
         for name in ("actuators", "rigid_pieces", "drives", "markers"):
-            fields[name] = self._several(name, LAYOUT[name][1])
+            fields[name] = self._several(name, LAYOUT[name].kind)
         if not isinstance(listed, list) or len(fields["actuators"]) < len(listed):
             del fields["drives"]
         for name in ("loads", "base", "rest"):
-            fields[name] = self._alone(name, LAYOUT[name][1])
+            fields[name] = self._alone(name, LAYOUT[name].kind)
         display = self._table(self._document, "display")
         self._check_keys(display, "display", ["unit"])
         self.places["display_unit"] = Place("display.unit")
@@ -315,11 +295,11 @@ class _Reader(FaultReader):
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""
         words = {dict: "must be a table", list: "must be a list", str: "must be text", int: ""}
-        for key, (shape, _, required) in LAYOUT.items():
-            if key not in self._document and required:
+        for key, block in LAYOUT.items():
+            if key not in self._document and block.required:
                 self._refuse(key, None, "required key is missing")
-            elif key in self._document and not isinstance(self._document[key], shape):
-                self._refuse(key, self._document[key], words[shape])
+            elif key in self._document and not isinstance(self._document[key], block.shape):
+                self._refuse(key, self._document[key], words[block.shape])
         if self._document.get("rings") == []:
             self._refuse("rings", [], "must not be empty")
         for key in (key for key in self._document if key not in LAYOUT):

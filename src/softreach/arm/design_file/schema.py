@@ -8,14 +8,22 @@ from typing import Any
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
-from softreach.arm.base import POINTS, Base
-from softreach.arm.body import RestShape
-from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
+from softreach.arm.base import POINTS
+from softreach.arm.design_file.keys import (
+    ACTUATORS,
+    KINDS,
+    LAYOUT,
+    PROFILES,
+    Block,
+    Key,
+    in_file_units,
+    keys_of,
+)
 from softreach.arm.drives import Drive
-from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.loads import PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number
-from softreach.arm.section import Measured, Ring, Section
+from softreach.arm.section import Measured, Ring
 from softreach.arm.stations import Marker, RigidPiece
 from softreach.support.errors import Range
 from softreach.support.units import UNITS
@@ -37,7 +45,10 @@ def json_schema() -> dict[str, Any]:
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "softreach design",
         "description": "An arm: lengths in m, angles in degrees, the unit in every key.",
-        **_object(_top(), ["version", "profile", "rings", "actuators"]),
+        **_object(
+            {name: _block(name, block) for name, block in LAYOUT.items()},
+            [name for name, block in LAYOUT.items() if block.required],
+        ),
         "$defs": _definitions(),
     }
 
@@ -47,11 +58,7 @@ def _definitions() -> dict[str, _Schema]:
         "material": _table(Material, "Isotropic elastic material", without=("name",)),
         "inline_material": _table(Material, "Material where it is used"),
         "ring": _table(Ring, "Layer between two radii"),
-        "section": _table(Section, "Inside of the arm"),
         "measured": _table(Measured, "What was measured, in place of what follows from materials"),
-        "loads": _table(Loads, "Gravity, payload, forces and moments"),
-        "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
-        "rest": _table(RestShape, "Curvature and twist of the arm that nothing drives"),
         "drive": _table(Drive, "Input that activates bundles"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
         "rigid_piece": _table(RigidPiece, "Stretch that neither bends nor changes its length"),
@@ -59,58 +66,43 @@ def _definitions() -> dict[str, _Schema]:
         "own_actuator": _own("Actuator", ACTUATORS, "kind"),
         "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
+    definitions |= {
+        name: _table(LAYOUT[name].kind, LAYOUT[name].about)
+        for name in ("section", "loads", "base", "rest")
+    }
     return definitions | {
         name: _table(kind, kind.__doc__ or "", kind=name)
         for name, kind in {**PROFILES, **ACTUATORS}.items()
     }
 
 
-def _top() -> dict[str, _Schema]:
-    profile = _any_of(PROFILES, "own_profile", "Length and outer radius along the arm")
-    actuator = _any_of(ACTUATORS, "own_actuator", "What drives the arm")
+def _block(name: str, block: Block) -> _Schema:
+    about = {"description": block.about}
     unit = {"enum": [*UNITS], "description": "Unit of lengths; L is the arm's"}
-    return {
-        "version": {"const": 2, "description": "Version of the format"},
-        "profile": profile,
-        "materials": _by_name(
-            _of("material"), "Materials by name; others are looked up in the library"
-        ),
-        "section": _of("section"),
-        "rings": {**_list(_of("ring"), "Layers that actuators live in"), "minItems": 1},
-        "stations": _by_name(
-            {"type": "number", "minimum": 0}, "Places along the arm by name, Z [m]"
-        ),
-        "actuators": _list(actuator, "In the order of the activations; [] for a passive rod"),
-        "rigid_pieces": _list(_of("rigid_piece"), "Where the arm is not deformed"),
-        "drives": _list(
-            _of("drive"), "Inputs that activate bundles, before the bundles that none names"
-        ),
-        "point": {**_TEXT, "description": "Name of the marker that counts as the tip"},
-        "markers": _list(_of("marker"), "Points that go with sections of the arm"),
-        "loads": _of("loads"),
-        "base": _of("base"),
-        "rest": _of("rest"),
-        "display": {
-            "description": "How the design is shown; it changes nothing about the arm",
-            **_object({"unit": unit}, []),
+    others: dict[str, _Schema] = {
+        "version": {"const": 2},
+        "materials": {"type": "object", "additionalProperties": _of("material")},
+        "stations": {
+            "type": "object",
+            "additionalProperties": {"type": "number", "minimum": 0},
         },
+        "point": _TEXT,
+        "display": _object({"unit": unit}, []),
     }
+    if name in others:
+        return about | others[name]
+    one = _of(name if block.shape is dict else name.removesuffix("s"))
+    if block.kind in KINDS:
+        own = f"own_{block.kind.__name__.lower()}"
+        one = {"anyOf": [_of(kind) for kind in (*KINDS[block.kind], own)]}
+    if block.shape is dict:
+        return about | one if block.kind in KINDS else one
+    least = {"minItems": 1} if name == "rings" else {}
+    return about | {"type": "array", "items": one} | least
 
 
 def _of(name: str) -> _Schema:
     return {"$ref": f"#/$defs/{name}"}
-
-
-def _list(of: _Schema, description: str) -> _Schema:
-    return {"description": description, "type": "array", "items": of}
-
-
-def _by_name(of: _Schema, description: str) -> _Schema:
-    return {"description": description, "type": "object", "additionalProperties": of}
-
-
-def _any_of(kinds: Mapping[str, type], own: str, description: str) -> _Schema:
-    return {"description": description, "anyOf": [_of(name) for name in (*kinds, own)]}
 
 
 def _own(part: str, kinds: Mapping[str, type], *required: str) -> _Schema:

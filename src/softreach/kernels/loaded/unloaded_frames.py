@@ -8,18 +8,15 @@ and the activated lengths.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.lanes import LANES
 from softreach.kernels.loaded.explicit_rk8 import NODES
-from softreach.kernels.vector import cross
+from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.vector import dot, times
 
 __all__ = ["NODE_ROWS", "STEP_ROWS", "TURN", "TURN_ROWS", "WORK", "pack_lengths", "rest_frames"]
-
-_FIRST, _SECOND = math.sqrt(15) / 3, 10 / 3
 
 # A step is a row of a table: η dZ, d1, d2, d3, ζ̂ dZ of each of its nodes, tip first, LANES numbers
 # each.
@@ -135,12 +132,13 @@ def _fill_bends(values, lanes, table):
 
 @inline
 def _bend(work, at, i):
-    """η u dZ at one Gauss node."""
+    """η u dZ at one Gauss node, as a twist that moves nothing."""
     rest_length = work[at + i]
     return (
         rest_length * work[at + LANES + i],
         rest_length * work[at + 2 * LANES + i],
         rest_length * work[at + 3 * LANES + i],
+        *(0.0, 0.0, 0.0),
     )
 
 
@@ -159,10 +157,10 @@ def _turn(work):
     """Multiply the turn of every lane by that of one piece, q exp(-Ω/2)."""
     for i in range(LANES):
         base, middle, tip = _bend(work, 0, i), _bend(work, 4 * LANES, i), _bend(work, 8 * LANES, i)
-        h = _half_exponent(base, middle, tip)
-        t = h[0] * h[0] + h[1] * h[1] + h[2] * h[2]
-        c, s = _cosine(t), -_sine(t)
-        x, y, z = s * h[0], s * h[1], s * h[2]
+        omega = exponent(base, middle, tip)
+        h = 0.5 * omega[0], 0.5 * omega[1], 0.5 * omega[2]
+        t = dot(h, h)
+        c, (x, y, z) = _cosine(t), times(-_sine(t), h)
         q0, q1 = work[TURN + i], work[TURN + LANES + i]
         q2, q3 = work[TURN + 2 * LANES + i], work[TURN + 3 * LANES + i]
         work[TURN + i] = q0 * c - q1 * x - q2 * y - q3 * z
@@ -181,26 +179,3 @@ def _cosine(t):
 def _sine(t):
     """sin √t / √t to 1e-14 for t < 0.5."""
     return 1.0 - t * (1 / 6 - t * (1 / 120 - t * (1 / 5040 - t * (1 / 362880 - t / 39916800))))
-
-
-@inline
-def _half_exponent(base, middle, tip):
-    """Half the sixth-order Magnus exponent in so(3): `magnus.exponent` without its translations."""
-    s0 = _FIRST * (base[0] - tip[0])
-    s1 = _FIRST * (base[1] - tip[1])
-    s2 = _FIRST * (base[2] - tip[2])
-    r0 = _SECOND * (base[0] + tip[0] - 2.0 * middle[0])
-    r1 = _SECOND * (base[1] + tip[1] - 2.0 * middle[1])
-    r2 = _SECOND * (base[2] + tip[2] - 2.0 * middle[2])
-    m0, m1, m2 = middle
-    c = cross(middle, (s0, s1, s2))
-    e = cross(middle, (2.0 * r0 + c[0], 2.0 * r1 + c[1], 2.0 * r2 + c[2]))
-    last = cross(
-        (c[0] - 20.0 * m0 - r0, c[1] - 20.0 * m1 - r1, c[2] - 20.0 * m2 - r2),
-        (s0 - e[0] / 60, s1 - e[1] / 60, s2 - e[2] / 60),
-    )
-    return (
-        0.5 * m0 + r0 / 24 + last[0] / 480,
-        0.5 * m1 + r1 / 24 + last[1] / 480,
-        0.5 * m2 + r2 / 24 + last[2] / 480,
-    )

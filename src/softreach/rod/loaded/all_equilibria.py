@@ -145,7 +145,7 @@ class AllEquilibria:
 
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
-_MOST_WALKED = 20_000_000  # steps of one search, which take about a second
+_MOST_WALKED = 20_000_000  # steps of one search, which take a few seconds
 _MOST_STEPS = 512
 _ROUGHLY = 0.01  # [rad]
 _SAME = 1e-3  # [rad], of equilibria that were found in two ways

@@ -80,7 +80,7 @@ def follow(
         h = to - place[rows]
         guess = units(last.frame[rows] + h[:, None] * slopes[rows])
         gamma = begin[rows] + to[:, None] * (end[rows] - begin[rows])
-        found = solver.careful(gamma, guess, ALL_LOADS if hangs else to)
+        found = solver.search(gamma, guess, ALL_LOADS if hangs else to)
         missed = found.tips - last.tips[rows] - h[:, None] * moves[rows]
         good, growth = _judged(solver, found, guess, missed, is_first[rows])
         on, h_on, found = rows[good], h[good, None], found.of(good)

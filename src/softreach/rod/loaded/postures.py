@@ -96,7 +96,7 @@ class Postures:
 
     def _hung(self, gamma: Array) -> Followed:
         """Loads put on the twin at fixed activations."""
-        start = self.twin.careful(gamma, None, np.zeros(1))
+        start = self.twin.search(gamma, None, np.zeros(1))
         return follow(self.twin, gamma, gamma, start, hangs=False)
 
     @lazy
@@ -132,7 +132,7 @@ class Postures:
         at = np.arange(len(gamma))[rows]
         order, guesses = self._guesses(gamma[at])
         at = at[order]
-        found = self.solver.quick(gamma[at], guesses)
+        found = self.solver.search(gamma[at], guesses)
         good = found.margin > self._least
         if guesses is not None:
             good &= turn_between(found.frame, guesses) < self._nearness
@@ -171,7 +171,7 @@ class Postures:
 
     def _unstable(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
-        found = self.solver.careful(gamma[rows], None)
+        found = self.solver.search(gamma[rows], None)
         at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
         found = found.only(~found.is_stable | at_rest)  # no stable ones of others
         self.solver.put(gamma, rows, found, equilibria)
@@ -231,7 +231,7 @@ class Postures:
 
 def polished(solver: Solver, gamma: Array, on_twin: Equilibria, within: float) -> Equilibria:
     """Stable equilibria of an arm beside those of its twin; found where they are so near [rad]."""
-    found = solver.careful(gamma, on_twin.frame)
+    found = solver.search(gamma, on_twin.frame)
     near = turn_between(found.frame, on_twin.frame) < within
     return found.only(on_twin.is_found & found.is_stable & near)
 
@@ -283,7 +283,7 @@ class FloodedPostures(Postures):
         guesses = self.flood.at(begin)[0]
         before = self.flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
         slopes = (1.0 - clear) * PARTS * (guesses - before)
-        start = self.twin.careful(begin, guesses)
+        start = self.twin.search(begin, guesses)
         near = turn_between(start.frame, guesses) <= self._nearness
         lost = np.flatnonzero(~(start.is_stable & near))
         start.put(lost, self.rest.of(np.zeros(len(lost), int)))
@@ -325,7 +325,7 @@ class ContinuedPostures(Postures):
         """The twin that has most of these postures, on it, and which; of two that of the side."""
         sides = []
         for postures in (self.origin, self.origin.mirrored):
-            rest = postures.twin.careful(self.at, self.frame)
+            rest = postures.twin.search(self.at, self.frame)
             near = turn_between(rest.frame, self.frame) < _POLISHED
             sides.append((postures.twin, rest, rest.is_stable & near))
             if sides[-1][2].all():
@@ -384,13 +384,13 @@ class Ring:
         They lean to about where the activations bend the unloaded arm; without a bend none is
         found.
         """
-        leaning, tables = twin.careful(gamma, None).only(np.zeros(len(gamma), bool)), twin.tables
+        leaning, tables = twin.search(gamma, None).only(np.zeros(len(gamma), bool)), twin.tables
         bent = FreeRod(tables.arm, 1e-6).tips(gamma)
         bends = np.linalg.norm(bent @ tables.axes[1:].T, axis=1) > _STRAIGHT * tables.arm.length
         there = _azimuth(bent, tables.axes) - self.azimuth
         for turn in _TURNS:
             left = np.flatnonzero(bends & ~leaning.is_found)
-            found = twin.careful(gamma[left], self._turned(there[left] + turn, tables.axes))
+            found = twin.search(gamma[left], self._turned(there[left] + turn, tables.axes))
             leaning.put(left[found.is_stable], found.of(found.is_stable))
         return leaning
 

@@ -25,7 +25,7 @@ __all__ = ["PushingTip", "TipResponse"]
 _MOST_STEPS = 256
 _SHORTEST = 2.0**-12  # part of a force by which it is raised
 _MOST_TURN = 0.2  # [rad], of what a node sees
-_DOUBTFUL = 0.05  # margin of stability below which a quick search decides nothing
+_DOUBTFUL = 0.05  # margin of stability below which finer steps decide
 
 
 class TipResponse(NamedTuple):

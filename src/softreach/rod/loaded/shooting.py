@@ -14,6 +14,9 @@ from softreach.rod.tip_map import Frames, Status, TipStatus, has_tip
 from softreach.support.arrays import Array, Index, Mask
 
 ALL_LOADS = np.ones(1)
+_WIDEST = 1.2  # [rad], longest first step of Newton's method that is trusted
+_SMALL = 2e-3  # [rad], step from which on chord steps do
+_WALKS = 8, 12  # allowed, with tangents and without
 
 
 class Equilibria(NamedTuple):
@@ -65,33 +68,15 @@ class Equilibria(NamedTuple):
         return self._replace(status=np.where(good, self.status, np.int8(TipStatus.UNDECIDED)))
 
 
-class Search(NamedTuple):
-    """Settings of a search by the kernels."""
-
-    widest: float
-    """Longest first Newton step that is trusted [rad]."""
-    small: float
-    """Newton step from which on chord steps do [rad]."""
-    walks: tuple[int, int]
-    """Walks allowed, with tangents and without."""
-
-
-QUICK = Search(1.2, 5e-3, (5, 12))
-"""From a start that is near."""
-CAREFUL = Search(1.2, 1e-3, (8, 12))
-"""To follow a branch, also where it is about to end."""
-MARGIN_ALONE = Search(np.inf, np.inf, (1, 0))
-"""One walk from where it is."""
-
-
 def shoot(
     gamma: Array,
     tables: LoadTables,
     guesses: Array | None,
     steps: StepTables,
     tiny: float,
-    search: Search = CAREFUL,
     shares: Array = ALL_LOADS,
+    *,
+    margin_alone: bool = False,
 ) -> Equilibria:
     """Searches for equilibria; see `solve_directions`.
 
@@ -101,15 +86,18 @@ def shoot(
         guesses: Frames as in `Equilibria`; None for those of the unloaded arm.
         steps: Its steps.
         tiny: Turn that may be left [rad].
-        search: Settings.
         shares: Of the loads, shape (n,), or (1,) for all.
+        margin_alone: Whether to walk along the guesses once, for their margins, as they are found.
     """
     size = tables.frame_size
     out = np.empty((len(gamma), 5 + size))
     solve = kernels.solve_directions if tables.one_direction else kernels.solve_frames
     given = np.zeros((0, size)) if guesses is None else np.ascontiguousarray(guesses)
     arm = _columns(gamma), tables.axes, tables.at_tip, given, tuple(steps)
-    solve(*arm, (search.widest, search.small, tiny), search.walks, shares, out)
+    limits, walks = (_WIDEST, _SMALL, tiny), _WALKS
+    if margin_alone:
+        limits, walks = (np.inf, np.inf, tiny), (1, 0)
+    solve(*arm, limits, walks, shares, out)
     margin = out[:, -2]
     status = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)
     found = Equilibria(out[:, :3], status, margin, out[:, 3:-2])
@@ -140,15 +128,6 @@ def walk(
     walked = columns, tables.at_tip, np.ascontiguousarray(frames), tuple(steps)
     respond(*walked, twists, yields, sections)
     return twists[:, :, : gamma.shape[1]], yields, sections
-
-
-def base_directions(
-    gamma: Array, tables: LoadTables, directions: Array, steps: StepTables
-) -> Array:
-    """Directions of gravity at the base of one arm (1, bundles), for those at its tip, (n, 3)."""
-    out = np.empty_like(directions)
-    kernels.base_directions(_columns(gamma), tables.at_tip, directions, tuple(steps), out)
-    return out
 
 
 def _columns(gamma: Array) -> Array:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import tables
@@ -14,15 +15,11 @@ from softreach.kernels.loaded.response import TRACE
 from softreach.rod.free import linear_strains
 from softreach.rod.loaded.shooting import (
     ALL_LOADS,
-    MARGIN_ALONE,
-    QUICK,
     Equilibria,
     LoadedShapes,
     Response,
-    base_directions,
     shapes_of,
     shoot,
-    units,
     walk,
 )
 from softreach.rod.loaded.tables import LoadTables, StepTables
@@ -34,6 +31,7 @@ from softreach.support.lazy import lazy
 
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
+_FACING = 1024  # directions walked together
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +68,9 @@ class Solver:
         steps = max(2 * self.steps, enough_for_all_breaks(self.tables.arm))
         return Solver(self.tables, steps, self.tol)
 
-    def quick(self, gamma: Array, guesses: Array | None) -> Equilibria:
-        """Searches from frames as in `Equilibria`, or from the unloaded arm."""
-        return shoot(gamma, self.tables, guesses, self._steps, self._tiny, QUICK)
-
-    def careful(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Equilibria:
-        """The same under shares of the loads, to follow a branch."""
-        return shoot(gamma, self.tables, guesses, self._steps, self._tiny, shares=shares)
+    def search(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Equilibria:
+        """Searches under shares of the loads, from frames or from the unloaded arm."""
+        return shoot(gamma, self.tables, guesses, self._steps, self._tiny, shares)
 
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
@@ -85,7 +79,7 @@ class Solver:
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
         equilibria = self.empty(len(gamma))
-        self.put(gamma, slice(None), self.quick(gamma, known.frame), equilibria)
+        self.put(gamma, slice(None), self.search(gamma, known.frame), equilibria)
         return equilibria
 
     def put(
@@ -113,10 +107,11 @@ class Solver:
         Both (n, 3) as the base of the unloaded arm sees them; loads along one direction only.
         """
 
-        def image(points: Array) -> Array:  # steps do not keep the length
-            directions = np.ascontiguousarray(points)
-            images = base_directions(gamma, self.tables, directions, self._steps)
-            return images / np.linalg.norm(images, axis=1, keepdims=True)
+        def image(points: Array) -> Array:
+            images, many = np.empty_like(points), np.repeat(gamma, _FACING, axis=0)
+            for rows in parallel.blocks(len(points), _FACING):
+                images[rows] = self._facing(many[: len(images[rows])], points[rows], [-1])[:, 0]
+            return images
 
         return image
 
@@ -134,18 +129,22 @@ class Solver:
         table = self._steps if is_uniform else self.tables.of_edges(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
         trace = walk(gamma, self.tables, directions, table, trace=True)[2]
-        margin = shoot(gamma, self.tables, directions, table, 0.0, MARGIN_ALONE).margin
+        margin = shoot(gamma, self.tables, directions, table, 0.0, margin_alone=True).margin
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
         shapes = shapes_of(at, trace, rows, self._force_at(table, rows), nowhere)
         return shapes.on_base(), margin
 
     def frames_facing(self, gamma: Array, directions: Array) -> Array:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
+        nodes = self._facing(gamma, directions, self._steps.firsts[:-1])
+        return nodes.reshape(len(gamma), self.tables.frame_size)
+
+    def _facing(self, gamma: Array, directions: Array, ends: ArrayLike) -> Array:
+        """Directions of gravity at ends of steps of such arms, as their bases see them."""
         whole = self._steps._replace(firsts=np.array([0, len(self._steps.lengths)]))
-        tables = self.tables.in_one_segment
-        trace = walk(gamma, tables, directions, whole, trace=True)[2]
-        seen = trace[:, self._steps.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
-        return units(seen.reshape(len(gamma), self.tables.frame_size))
+        trace = walk(gamma, self.tables.in_one_segment, directions, whole, trace=True)[2]
+        seen = trace[:, ends, :3] @ rotation_matrices(trace[:, -1, 12:16])
+        return seen / np.linalg.norm(seen, axis=2, keepdims=True)  # steps do not keep the length
 
     def respond(
         self,

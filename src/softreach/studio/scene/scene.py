@@ -16,10 +16,11 @@ from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.kinematics import configuration, rest_configuration
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
-from softreach.studio.scene.camera import NumberedBox, way_to
+from softreach.studio.scene.camera import NumberedBox, add_label, way_to
 from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
 from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
+from softreach.support import palette
 from softreach.support.palette import bundle_color, eight_bit
 from softreach.workspace import ReachableSolid
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from viser import SceneApi
 
     from softreach.plot.coloring import BundleKey, ScalarKey
+    from softreach.requirements import Check
     from softreach.rod.tip_map import TipMap
 
 Array = NDArray[np.float64]
@@ -43,6 +45,15 @@ _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST = 0.35
 _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which the arm is seen
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
+VERDICTS = {
+    "met": eight_bit(palette.MET),
+    "missed": eight_bit(palette.MISSED),
+    "undecided": (200, 130, 0),
+}
+"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
+_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
+_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
+_MOST_LABELS = 20  # more would hide each other
 _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
 """Color and opacity of the reach without loads, and of the one of the kept design."""
 _MARK: Color = (235, 90, 0)
@@ -369,6 +380,42 @@ class Scene:
         self.dots("/sample/predicted", predicted, _DARK, _MARKER)
         pairs = np.stack([measured, predicted], axis=1)
         self.lines("/sample/residuals", pairs, _MARK, 0.005)
+
+    def draw_needs(self, check: Check | None) -> None:
+        """Draw the places and regions of a design that was judged; None takes them away."""
+        self.remove("/needs")
+        if check is None:
+            return
+        if len(check.places):
+            self._draw_places(check)
+        length, around = check.arm.length, np.array(self.axes.corners)
+        verdicts = {(f.kind, f.name): f.verdict for f in check.findings}
+        needs = check.requirements
+        named = [(keep.kind, keep.name, keep.region) for keep in needs.keeps]
+        named += [("cover", t.name, t.region) for t in needs.targets if t.region is not None]
+        for k, (kind, name, region) in enumerate(named):
+            verdict = verdicts.get((kind, name), "met")
+            lines = [line / length for line in region.wireframe(around * length)]
+            pieces = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
+            is_met = verdict == "met"
+            color, width = (_REGION[kind], _FINE) if is_met else (VERDICTS[verdict], _BROAD)
+            self.lines(f"/needs/region {k}", pieces, color, width)
+
+    def _draw_places(self, check: Check) -> None:
+        length, rows = check.arm.length, np.arange(len(check.places))
+        places, met = check.places / length, check.reached.all(axis=0)
+        worst = check.gaps.argmax(axis=0)  # of the payloads
+        gaps, nearest = check.gaps[worst, rows], check.nearest[worst, rows] / length
+        self.dots("/needs/reached", places[met], VERDICTS["met"], _BALL)
+        missed = np.flatnonzero(~met)
+        arms = _CROSS * np.array([[1, 0, 1], [1, 0, -1], [0, 1, 0]]) / np.sqrt([[2], [2], [1]])
+        cross = places[missed][:, None, None] + np.stack([-arms, arms], axis=1)
+        self.lines("/needs/missed", cross.reshape(-1, 2, 3), VERDICTS["missed"], _BROAD)
+        ways = np.stack([places, nearest], axis=1)[missed]
+        self.lines("/needs/gaps", ways, VERDICTS["missed"], _FINE)
+        for k in missed[:_MOST_LABELS]:
+            text = check.arm.length_unit.rounded(float(gaps[k]), digits=".3g")
+            add_label(self.api, f"/needs/label {k}", text, places[k] + [0.0, 0.0, 2.0 * _CROSS])
 
 
 def shows_cloud(reach: Reach, look: Appearance) -> bool:

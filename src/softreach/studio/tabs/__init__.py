@@ -6,14 +6,15 @@ from collections.abc import Callable
 from typing import Any
 
 from softreach.studio.fields import Fields, attempt
+from softreach.studio.jobs import SCENE_JOBS
 from softreach.studio.session import Session
+from softreach.studio.tabs import goals, move
 from softreach.studio.tabs.compare import compare
 from softreach.studio.tabs.design import arm_parts, design, loads
 from softreach.studio.tabs.export import export
-from softreach.studio.tabs.goals import add_place, calibrate, needs
+from softreach.studio.tabs.goals import add_place, measured, needs
 from softreach.studio.tabs.move import activation, drag, extend_path, path, take, target
-from softreach.studio.tabs.status import status
-from softreach.studio.tabs.view import plots, view
+from softreach.studio.tabs.view import plots, status, view
 
 TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
     "Design": (design,),
@@ -22,9 +23,11 @@ TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
     "View": (view,),
     "Plots": (plots,),
     "Compare": (compare,),
-    "Goals": (needs, calibrate),
+    "Goals": (needs, measured),
     "Export": (export,),
 }
+JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)
+"""Every kind of work that a tab has done for it."""
 
 
 def furnish(session: Session) -> None:

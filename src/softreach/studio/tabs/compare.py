@@ -30,7 +30,7 @@ def compare(panel: Fields) -> None:
     known = "design", "reference", "found.reach", "found.reference"
     panel.html(*known, content=_compared)
     panel.change("Keep this design", kept, "Draws its boundary in gray from now on")
-    with panel.folder("kept design", lambda state, _: state.reference is not None):
+    with panel.folder("kept design", "reference"):
         panel.change("Swap", swapped, "Makes the kept design the design, and back")
         forget = "Compares no more, and takes the gray boundary away"
         panel.change("Forget", lambda state: state.replace(reference=None), forget, **GRAY)

@@ -171,6 +171,7 @@ def arm_parts(panel: Fields) -> None:
         arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
         return refusal(error, part_parameters(arm, known[label]), arm)
 
+    panel.message, panel.words = message, words
     panel.anew(folder, "design", "found.part", key=_chosen, build=build, words=words)
 
 
@@ -323,7 +324,7 @@ def loads(panel: Fields) -> None:
             "Take all loads off",
             lambda state: state.replace(design=state.design.replace(loads=None)),
             "Gravity, payload and all forces",
-            lambda state, _: state.design.loads is not None,
+            "design.loads",
             **GRAY,
         )
         follows = "design", "found.tip", "found.pointing", "found.posture"

@@ -5,28 +5,35 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.calibration import Calibration
+from softreach.calibration import Calibration, calibrate
+from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import read_measurements, read_table
-from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target
+from softreach.calibration.model import MarkerModel
+from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target, check
+from softreach.requirements.checks import quick_check
 from softreach.studio import markup
 from softreach.studio.fields import GRAY, Attribute, Fields
 from softreach.studio.files import LARGEST
-from softreach.studio.found import Bench, Found
+from softreach.studio.found import Bench, Found, Sample
+from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.scene.needs import COLORS
+from softreach.studio.scene.scene import VERDICTS
 from softreach.studio.session import Session
 from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import number_of
-from softreach.support.errors import InvalidInput, counted
+from softreach.studio.work import rest
+from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
 from softreach.support.files.text import text_of
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     from viser import UploadedFile
+
 
 _EMPTY = {
     "place to reach": "x, y, z in {unit}; empty: where the tip is",
@@ -43,7 +50,6 @@ _ALL = "everything"
 def needs(panel: Fields) -> None:
     """Needs of the design, and what it misses of them."""
     session, gui = panel.session, panel.gui
-    wanted = lambda state, _: state.needs
     with panel.folder("requirements"):
         panel.say("Say what the arm is for: what it misses is shown while you change it.")
         about = "A place for the tip, a box for the arm at these places, or a limit"
@@ -72,13 +78,13 @@ def needs(panel: Fields) -> None:
                 part.value = part.options[0]
 
         panel.follow("design", "needs", show=offer)
-        panel.button("Remove", lambda: _remove_need(session, part.value), one, wanted)
+        panel.button("Remove", lambda: _remove_need(session, part.value), one, "needs")
         read = lambda file: read_needs(session, file.name, file.content)
         about = "Requirements as softreach check and softreach search read them"
         panel.upload("Load needs (TOML)", read, about, **GRAY)
         save = lambda: session.send("needs.toml", session.state.needs.encode())
         about = "The needs as a file for softreach check and softreach search"
-        panel.button("Save needs (TOML)", save, about, wanted, **GRAY)
+        panel.button("Save needs (TOML)", save, about, "needs", **GRAY)
 
 
 def verdict(found: Found, state: StudioState) -> str:
@@ -94,7 +100,7 @@ _SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided"
 
 
 def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
-    mark, sign = Swatch(COLORS[finding.verdict]), _SIGNS[finding.verdict]
+    mark, sign = Swatch(VERDICTS[finding.verdict]), _SIGNS[finding.verdict]
     text = _reach_text(check, finding) if finding.kind == "reach" else finding.text
     return mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"
 
@@ -259,7 +265,7 @@ _FREE = {
 """Numbers that a fit may change: name -> what the check box says."""
 
 
-def calibrate(panel: Fields) -> None:
+def measured(panel: Fields) -> None:
     """Measured poses: their markers over the arm, a fit to them, and the calibrated design."""
     session = panel.session
     with panel.folder("measured poses", expanded=False):
@@ -267,7 +273,7 @@ def calibrate(panel: Fields) -> None:
             "Load measured poses (CSV)", lambda file: _read_poses(session, file), _ABOUT_LOAD
         )
         panel.text("found.bench", content=lambda _, found: _bench_text(found.bench))
-        with panel.folder("samples", lambda _, found: found.bench is not None):
+        with panel.folder("samples", "found.bench"):
             panel.steps(
                 "sample",
                 "found.bench",
@@ -366,3 +372,106 @@ def _summary(bench: Bench | None) -> str:
     if not result.fit.converged:
         lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
     return "".join([*parts, *map(markup.paragraph, lines)])
+
+
+# Jobs
+
+
+_ACCURACY = 0.03  # of shares that are covered, and of distances between stations
+_PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
+_POSES = ("reach", "cover", "stay_inside", "avoid")
+"""Kinds of findings that other poses may change."""
+
+
+def _check(given: Given) -> Results:
+    """By poses that are found in some milliseconds; by every pose where these miss something."""
+    state = given.state
+    if not state.needs:
+        yield Learned({"check": None, "check_refusal": ""})
+        return
+    try:
+        with no_warnings():
+            quick = quick_check(state.design, requirements_of(state.needs), _ACCURACY)
+    except SoftreachError as error:
+        yield Learned({"check": None, "check_refusal": str(error)})
+        return
+    yield Learned({"check": quick, "check_refusal": ""})
+    if all(finding.met or finding.kind not in _POSES for finding in quick.findings):
+        return
+    rest(given.check, _PAUSE)
+    progress = lambda _: given.check()
+    with no_warnings():
+        made = check(quick.arm, quick.requirements, accuracy=_ACCURACY, progress=progress)
+    yield Learned({"check": made})
+
+
+CHECK_NEEDS = Job(
+    "needs",
+    "design needs",
+    _check,
+    lambda given: given.scene.draw_needs(given.found.check),
+    wanted="needs",
+    makes="check",
+    draws="/needs",
+)
+"""The design against its needs."""
+
+
+def _predict(given: Given) -> Results:
+    """Markers of the pose, while the arm has its inputs."""
+    bench, design = given.found.bench, given.state.design
+    here = bench is not None and bench.posed(given.state).activation == given.state.activation
+    if bench is None or not (here and bench.fits(design)):
+        yield Learned({"sample": None})
+        return
+    arm = bench.fitted(design) or design
+    pose = bench.data.of(np.array([bench.number]))
+    # The inputs of a pose may be beyond the bounds of the design.
+    predicted = MarkerModel.of(free_numbers(arm, ["pose"]), pose).of_arm(arm).places[0]
+    yield Learned({"sample": Sample(pose.places[0], predicted, arm)})
+
+
+def _draw_sample(given: Given) -> None:
+    sample, design, scene = given.found.sample, given.state.design, given.scene
+    if sample is None:
+        scene.remove("/sample")
+        return
+    scene.draw_sample(sample.measured / design.length, sample.predicted / design.length)
+    if sample.arm == design:
+        scene.remove("/sample/arm")
+    else:
+        same = given.state.replace(design=sample.arm).activation
+        scene.draw_arm(sample.arm, same, "/sample/arm", design.length)
+
+
+DRAW_SAMPLE = Job(
+    "sample",
+    "design activation found.bench",
+    _predict,
+    _draw_sample,
+    wanted="found.bench",
+    makes="sample",
+    draws="/sample",
+)
+"""Measured and predicted markers of a pose, while the arm has its inputs."""
+
+
+def _fit(given: Given) -> Results:
+    bench, steps = given.found.bench, count(1)
+    if bench is None:
+        return
+
+    def progress(_: int) -> None:
+        given.check()
+        given.report(f"calibrating, step {next(steps)}")
+
+    with no_warnings():
+        result = calibrate(given.state.design, bench.data, free=bench.free, progress=progress)
+    given.check()
+    yield Learned({"bench": replace(bench, result=result)})
+
+
+FIT_ARM = Job("fit", "", _fit, doing="calibrating")
+"""Fits free numbers of the design to all poses."""
+
+JOBS = (CHECK_NEEDS, DRAW_SAMPLE, FIT_ARM)

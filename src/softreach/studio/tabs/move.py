@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.export.clouds import path_csv
-from softreach.inverse.path import PathStatus
+from softreach.inverse.drag import Drag
+from softreach.inverse.path import PathStatus, track_path
 from softreach.inverse.request import positions_in
 from softreach.schema import activation_symbols
 from softreach.studio.captions import place_text, tip_text
 from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
 from softreach.studio.figures import track_picture
 from softreach.studio.files import LARGEST
-from softreach.studio.found import Found
-from softreach.studio.jobs.move import at_point
+from softreach.studio.found import Found, Lag
+from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.scene.scene import MOST_BUNDLES
 from softreach.studio.session import Session
-from softreach.studio.state import MOST_POINTS, MOUSE, StudioState, TipPath, rod_of, solvable_rod
+from softreach.studio.state import (
+    MOST_POINTS,
+    MOUSE,
+    StudioState,
+    TipPath,
+    rod_of,
+    solvable_rod,
+    vector,
+)
 from softreach.studio.widgets import TypedField, vector_kind
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import text_of
@@ -34,14 +45,12 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
 
+
 # The tip, dragged
 
 _DRAG_HINT = (
     "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
     "solutions."
-)
-_ABOUT_MOUSE = (
-    "Use of the mouse in the scene, which it turns besides; a click is on a reached place"
 )
 
 
@@ -50,7 +59,8 @@ def drag(panel: Fields) -> None:
     session = panel.session
     eye = lambda: np.array(session.camera.actual().position)
     ball = DragBall(session.client.scene, session.drag_to, eye)
-    panel.dropdown("mouse", MOUSE, attribute("appearance.mouse"), _ABOUT_MOUSE)
+    about = "Use of the mouse in the scene, which it turns besides; a click is on a reached place"
+    panel.dropdown("mouse", MOUSE, attribute("appearance.mouse"), about)
 
     def place(state: StudioState, found: Found) -> None:
         arm, look, lag = state.design, state.appearance, found.lag
@@ -165,7 +175,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
         "Clear the target",
         lambda state: state.replace(target=None),
         "Takes target and solutions away",
-        lambda state, _: state.target is not None,
+        "target",
         **GRAY,
     )
 
@@ -219,7 +229,6 @@ def _answer_text(answer: Solution | None, state: StudioState) -> str:
 
 # A path
 
-_PATH_HINT = "The tip follows a path as far as its branch of solutions goes: load one, or click it."
 _POINTS = 24  # of the straight line to each place that is clicked
 
 
@@ -227,14 +236,15 @@ def path(panel: Fields) -> None:
     """A path of the tip: loaded or clicked, followed, played and saved."""
     session = panel.session
     with panel.folder("follow a path"):
-        panel.say(_PATH_HINT)
+        about = "The tip follows a path as far as its branch of solutions goes"
+        panel.say(f"{about}: load one, or click it.")
         read = lambda file: _read_path(session, file)
         panel.upload("Load a path (CSV)", read, "columns x, y, z [m]", mime_type=".csv,text/csv")
         panel.change(
             "Remove the path",
             lambda state: state.replace(path=None),
             "and what was found along it",
-            lambda state, _: state.path is not None,
+            "path",
             **GRAY,
         )
         panel.text("design", "path", "found.track", content=_path_text)
@@ -336,3 +346,156 @@ def _tip(state: StudioState) -> np.ndarray:
     if not np.isfinite(tip).all():
         raise InvalidInput("activation", state.activation, "one with an equilibrium")
     return tip
+
+
+# Jobs
+
+
+_FAMILY = 6  # shapes offered where infinitely many reach the target
+_DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
+_RESIDUAL = 1e-8  # [L]
+_STEP = 0.05  # [s] between points that are played
+
+
+def _solve(given: Given) -> Results:
+    from softreach.inverse import solve_inverse
+
+    state, change = given.state, None
+    if state.target is None:
+        yield Learned({"answer": None})
+        return
+    solvable_rod(state.design)
+    near = state.activation if len(state.activation) > 3 else None
+    answers = solve_inverse(state.design, [state.target], near=near, family=_FAMILY, from_rest=True)
+    answer = answers[0]
+    if given.found.takes_nearest and len(answer):
+        distance = np.linalg.norm(answer.activations - state.activation, axis=1)
+        best = tuple(answer.activations[int(np.argmin(distance))].tolist())
+        change = lambda now: now.replace(activation=best)
+    yield Learned({"answer": answer, "takes_nearest": False}, change)
+
+
+def _draw_answer(given: Given) -> None:
+    answer, design, scene = given.found.answer, given.state.design, given.scene
+    scene.remove("/ghosts")
+    if answer is None:
+        scene.draw_target(None)
+        return
+    nearest = None if len(answer) else answer.nearest / design.length
+    scene.draw_target(answer.target / design.length, nearest)
+    shapes = answer.activations if len(answer) else answer.nearest_activation[None]
+    scene.draw_ghosts(design, shapes)
+
+
+SOLVE_INVERSE = Job(
+    "inverse",
+    "design target",
+    _solve,
+    _draw_answer,
+    wanted="target",
+    makes="answer takes_nearest",
+    draws="/ghosts /target /gap",
+)
+"""The activations that reach the target, and their shapes."""
+
+
+def _follow_tip(given: Given) -> Results:
+    """Follow the latest place that a drag passes; where it rests, that is the target."""
+    state, pull, drag = given.state, given.found.pull, given.found.drag
+    if pull is None:
+        return
+    solvable_rod(state.design)
+    if drag is None or drag.arm != state.design:
+        drag = Drag(state.design)
+    place = np.round(pull.place, _DECIMALS) if pull.rests else pull.place
+    dragged = drag.to(state.activation, place * state.design.length)
+    known: dict[str, Any] = {"drag": drag}
+    if dragged is None:
+        yield Learned(known)
+    else:
+        known |= {"held": (state.design, dragged), "lag": Lag(place, dragged)}
+        target = vector(place * state.design.length) if pull.rests else None
+
+        def moved(now: StudioState) -> StudioState:
+            if now.design != state.design:
+                raise InvalidInput("design", "changed", "unchanged while its tip is dragged")
+            return now.replace(activation=dragged.activation, target=target)
+
+        yield Learned(known, moved)
+    if pull.rests:
+        rested = lambda now: now.without(pull)
+        yield Learned(rested, ends_step=True)
+
+
+DRAG_TIP = Job("drag", "found.pull", _follow_tip, makes="pull lag")
+"""The arm follows its dragged tip on its branch; where that rests, every branch is looked for."""
+
+
+def _follow(given: Given) -> Results:
+    path = given.state.path
+    yield Learned({"track": None})
+    if path is not None:
+        rod = solvable_rod(given.state.design)
+        fits = path.start is not None and len(path.start) == rod.box.bundles
+        start = rod.box.clip(np.array(path.start)) if fits else None
+        track = track_path(rod, np.array(path.points), start, residual_over_length=_RESIDUAL)
+        yield Learned({"track": track})
+
+
+def _draw_path(given: Given) -> None:
+    path, track, length = given.state.path, given.found.track, given.state.design.length
+    if path is None:
+        given.scene.remove("/path")
+        return
+    points, done = np.array(path.points), np.empty((0, 3))
+    if track is not None and track.sizes["point"] == len(points):
+        done = points[track.status.values == PathStatus.FOLLOWED]
+        if len(done) and len(done) < len(points):
+            done = np.concatenate([done, track.end_position.values[None]])
+    given.scene.draw_path(points / length, done / length)
+
+
+FOLLOW_PATH = Job(
+    "path",
+    "design path.points path.start",
+    _follow,
+    _draw_path,
+    wanted="path",
+    makes="track",
+    draws="/path",
+    doing="following the path",
+)
+"""The activations along the path, and where the branch ends."""
+
+
+def _play(given: Given) -> Results:
+    track, path = given.found.track, given.state.path
+    if track is None or path is None:
+        return
+    count = int((track.status == PathStatus.FOLLOWED).sum())
+    activations = track.activation.values
+    for point in range(path.at if path.at < count - 1 else 0, count):
+        given.check()
+        yield Learned(change=lambda now, k=point: at_point(now, activations, k))
+        time.sleep(_STEP)
+
+
+PLAY_PATH = Job("play", "", _play)
+"""Moves the arm along the path."""
+
+
+def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioState:
+    """The arm at a point of its path, with one of the activations there, shape (k, bundles).
+
+    The state stays as it is where the path is not followed.
+    """
+    if state.path is None or point >= len(state.path.points) or point >= len(activations):
+        return state
+    there = activations[point]
+    if not np.isfinite(there).all():
+        return state
+    path = replace(state.path, at=point)
+    return state.replace(path=path, activation=tuple(there.tolist()))
+
+
+JOBS = (SOLVE_INVERSE, DRAG_TIP, FOLLOW_PATH, PLAY_PATH)

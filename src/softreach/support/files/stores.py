@@ -357,31 +357,17 @@ def seal(folder: Path) -> None:
     (folder / ROOT).write_bytes(sealed(json.dumps(root, indent=2).encode()))
 
 
-def attributes_of(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """Attributes of a store on disk.
-
-    Raises:
-        InvalidInput: No store of softreach.
-    """
-    try:
-        return unsealed(Path(path, ROOT).read_bytes())
-    except (OSError, ValueError) as error:
-        raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], str(error)) from None
-
-
 def foreign_entry(folder: Path) -> str:
     """The first thing in a folder that is none of a store of softreach; empty if there is none."""
     try:
-        arrays = attributes_of(folder)[ARRAYS]
-    except InvalidInput:
+        arrays = unsealed((folder / ROOT).read_bytes())[ARRAYS]
+    except (OSError, ValueError):
         return ROOT if (folder / ROOT).exists() else min(os.listdir(folder), default="")
-    own = {"", *arrays}
-    for parent, folders, files in os.walk(folder):
-        for name in sorted([*folders, *files]):
-            key = Path(parent, name).relative_to(folder).as_posix()
-            # A folder is one of an array, or holds its chunks.
-            chunk = Chunk.of_key(key if name in files or "/" in key else f"{key}/c")
-            if (chunk is None or chunk.array not in own) and not _PARTIAL.search(name):
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink() or not path.is_dir():
+            key = path.relative_to(folder).as_posix()
+            chunk = Chunk.of_key(key)
+            if (chunk is None or chunk.array not in {"", *arrays}) and not _PARTIAL.search(key):
                 return key
     return ""
 
