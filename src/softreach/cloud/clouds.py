@@ -39,13 +39,7 @@ from softreach.support.progress import Progress, bar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "compute_cloud",
-    "design_of",
-    "open_cloud",
-    "save_cloud",
-    "tip_map_of",
-]
+__all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
 
 _CHUNK = 1 << 19  # samples of a stored array that are held at once
 _LONG = 5_000_000  # samples from which a bar is worth showing

@@ -23,13 +23,7 @@ from softreach.support.errors import InvalidInput, warn
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "Hull",
-    "concave_hull",
-    "convex_hull",
-    "unreachability",
-    "volume_curve",
-]
+__all__ = ["Hull", "concave_hull", "convex_hull", "unreachability", "volume_curve"]
 
 DEFAULT_RADIUS = 0.05  # of the arm's length
 SPACINGS = 3.0  # a smaller ball falls through between the points
@@ -39,10 +33,7 @@ QUARTER_SPACINGS = 2.5  # below, V(N/4) leaves the law N^-1/2: design/triangulat
 
 
 def concave_hull(
-    points: np.ndarray | xr.DataArray,
-    alpha: float | str | None = None,
-    *,
-    bias: bool = False,
+    points: np.ndarray | xr.DataArray, alpha: float | str | None = None, *, bias: bool = False
 ) -> Hull:
     """The alpha shape of a cloud: what a ball of radius alpha cannot scoop out of its convex hull.
 
@@ -237,7 +228,7 @@ def _warn_if_fine(hull: Hull, positions: np.ndarray) -> None:
     if hull.alpha < SPACINGS * spacing:
         warn(
             f"alpha = {_in_spacings(hull, spacing)}: below {SPACINGS:g} the shape has holes "
-            "between points and its volume is too small; use more points or a larger alpha",
+            "between points and its volume is too small; use more points or a larger alpha"
         )
 
 
@@ -260,7 +251,7 @@ def _corrected(hull: Hull, quarter: Hull) -> Hull:
         warn(
             f"no estimate of the bias: alpha = {_in_spacings(quarter, quarter.spacing)}, a quarter "
             f"of the cloud; below {QUARTER_SPACINGS:g} the law N^-1/2 fails; use more points or a "
-            "larger alpha",
+            "larger alpha"
         )
         return hull
     # theory (47)

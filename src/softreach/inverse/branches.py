@@ -128,7 +128,6 @@ def _set_size(prepared: PreparedMap, count: int) -> int:
 
 
 def _alone(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
-    """The roots of some of the targets, on this thread only."""
     with parallel.undivided():
         return _branches_of(prepared, request, chosen)
 
@@ -228,7 +227,6 @@ def _improved(tip_map: TipMap, goal: Array, starts: Starts) -> Array:
 
 
 def _search(goal: Array, start: Array) -> Search:
-    """The state of Newton's method before its first step."""
     n = len(start)
     return Search(
         target=goal,
@@ -243,7 +241,6 @@ def _search(goal: Array, start: Array) -> Search:
 
 
 def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
-    """Step 6: the roots and their partners beyond a fold."""
     fresh = roots
     for _ in range(2):  # a partner may have a partner of its own where two folds meet
         fresh = _newton(prepared, request, _partner_starts(prepared, fresh))

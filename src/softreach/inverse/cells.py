@@ -164,7 +164,6 @@ def _mesh(tip_map: TipMap, vertices: _Vertices, corner: Index) -> ActivationMesh
 
 
 def _image_boxes(mesh: ActivationMesh) -> Array:
-    """Boxes round the images of the cells [m], shape (cell, 2, 3)."""
     images = mesh.tip[mesh.corner]
     error = mesh.interpolation_error[:, None]
     return np.stack([images.min(axis=1) - error, images.max(axis=1) + error], 1)

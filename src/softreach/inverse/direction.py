@@ -179,8 +179,6 @@ class Objective:
 
 
 class _Expansion(NamedTuple):
-    """Functions to second order about a point each."""
-
     value: Array
     gradient: Array
     hessian: Array

@@ -82,7 +82,6 @@ class Drag:
         return self._dragged(self._nearest(point, target), target)
 
     def _nearest(self, point: BranchPoint, target: Array) -> BranchPoint:
-        """The place around here that brings the tip nearest to the target."""
         gamma, tip_map = point.gamma, point.tip_map
         starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, point.slope)]))
         targets = np.tile(target, (len(starts), 1))

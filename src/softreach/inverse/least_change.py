@@ -340,7 +340,6 @@ def _searched(
     penalty: float,
     limits: tuple[float, int],
 ) -> None:
-    """Run the searches that begin at `ends`, on the calling thread."""
     box, total = tip_map.box, len(owner)
     bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
     running = _room(min(total, _TOGETHER), box.bundles)

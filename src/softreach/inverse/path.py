@@ -321,7 +321,6 @@ def _best_start(
 def _followed(
     tracker: Continuation, first: BranchPoint, points: Array
 ) -> tuple[list[BranchPoint], BranchEnd]:
-    """The points that the branch leads to, and its end."""
     end = BranchEnd(PathStatus.FOLLOWED, first.kept())
     followed = [end.point]
     for k in range(1, len(points)):
@@ -379,7 +378,6 @@ def _dataset(
 
 
 def _end_length(points: Array, followed: int, end: BranchEnd | None) -> tuple[float, float]:
-    """The length of path up to the end of the branch [m], and its error."""
     if end is None:
         return np.nan, np.nan
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)

@@ -171,5 +171,4 @@ def _with_units(line: str, units: list[str]) -> str:
 
 
 def _is_header(line: str) -> bool:
-    """True if a line holds names: no part of it begins as a number does."""
     return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))

@@ -179,7 +179,6 @@ def face_seeds(tip_map: TipMap, coarse: TipMap) -> Seeds:
 
 
 def _with_tips(tip_map: TipMap, gamma: Array, coarse: TipMap) -> Seeds:
-    """Seeds at those activations that have a stable equilibrium."""
     tip = tip_map.tips(gamma)
     if tip_map.supports_unstable:
         known = np.isfinite(tip[:, 0])

@@ -193,7 +193,6 @@ class Solutions(Sequence[Solution]):
         return Solution(target, Status(status), *others, tip_maps=self.tip_maps)
 
     def _of(self, rows: Mapping[str, Any]) -> dict[str, Any]:
-        """Columns of some targets and solutions."""
         return {name: getattr(self, name)[rows[axes[0]]] for name, (_, axes, _) in _COLUMNS.items()}
 
     def _several(self, chosen: Index) -> Solutions:

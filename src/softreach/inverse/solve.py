@@ -127,7 +127,6 @@ def solve_inverse(
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
-    """All roots, and the nearest points to the targets that have none."""
     roots = every_branch(prepared, request)
     if not request.from_rest:
         roots = with_other_sheets(prepared, request, roots)
@@ -148,14 +147,12 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
-    """Nearest points, or compromises between distance and direction."""
     roots = every_branch(prepared, request) if prepared.dimension == 3 else None
     closest = (nearest if request.direction is None else compromises)(prepared, request, roots)
     return _solutions(prepared, request, no_roots(prepared.tip_map), closest)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
-    """Least changes where the target is reached, nearest places where it is not."""
     target, gamma, best = least_changes(prepared, request)
     roots = roots_at(prepared.tip_map, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
@@ -230,7 +227,6 @@ def _solutions(
 
 
 def _leans(tip_map: TipMap, activations: Array) -> Mask:
-    """Mask of activations at which an arm under loads leans to one of two sides."""
     known = as_tip_map(tip_map)
     if isinstance(known.rod, LoadedRod):
         return known.rod.leans(known.inputs.activations(activations))

@@ -197,7 +197,6 @@ _Swept = tuple[Array, Array]
 def _swept(
     solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float, progress: Progress
 ) -> tuple[_Swept, _Swept]:
-    """Derivatives of volume and convex volume by what boundary and corners of the hull sweep."""
     tip_map = solid.tip_map
     if solid.route == "flux" or tip_map.supports_unstable:
         tip_map = refined(tip_map, flux_tol(tip_map))
@@ -262,7 +261,6 @@ class _Sum(NamedTuple):
 
 
 def _sum(nodes: BoundarySamples | HullCorners | Flux | Wrap, tips: TipDerivatives) -> _Sum:
-    """Volume swept by nodes with area vectors."""
     slopes = tips.at(nodes.cube)
     area = nodes.corner_areas if isinstance(nodes, Wrap) else nodes.area
     swept = np.einsum("ni,nip->np", area, slopes)
@@ -299,7 +297,6 @@ def _by_differences(
 
 
 def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
-    """Derivative of values that a raster has made rough."""
     value, smooth = float(shifts.weights @ values), float(shifts.rough_weights @ values)
     noise = abs(float(_ROUGHNESS @ values)) / float(np.linalg.norm(_ROUGHNESS))
     error = abs(value - smooth) + 2.0 * noise * float(np.linalg.norm(shifts.weights))

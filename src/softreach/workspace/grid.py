@@ -171,11 +171,7 @@ class LiftedGrid:
 
     @classmethod
     def of(
-        cls,
-        tip_map: TipMap,
-        n: int,
-        progress: Progress = silent,
-        ticks: list[Array] | None = None,
+        cls, tip_map: TipMap, n: int, progress: Progress = silent, ticks: list[Array] | None = None
     ) -> LiftedGrid:
         """The grid of n cells along each free bundle; see `grid_tips`."""
         m = tip_map.box.dimension
@@ -238,7 +234,6 @@ def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
 
 
 def _corners(n: int, m: int) -> Index:
-    """Nodes at the corners of all cells, shape (n^m, 2^m)."""
     first = np.arange((n + 1) ** m).reshape((n + 1,) * m)[(slice(-1),) * m]
     return first.reshape(-1, 1) + corner_steps((n,) * m)
 
@@ -261,16 +256,10 @@ def _is_plain(held: Held, is_single: Mask, n: int, m: int) -> Mask:
 
 
 def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
-    """Cells of each branch over some cells.
+    """Cells (k,) of each branch over some, and one posture or -1 for each corner (k, 2^m).
 
     Around a pitchfork or a cusp corners have two postures on one branch: it is parted there again.
-
-    Args:
-        held: The postures.
-        states: Numbers of those at the corners of cells, -1 for none, (cells, 2^m, postures).
-
-    Returns:
-        Numbers of the cells, and one posture or -1 for each corner, shapes (k,) and (k, 2^m).
+    States are numbers of postures at the corners of cells, -1 for none, (cells, 2^m, postures).
     """
     corners, joined = states.shape[1], _joined(held, states)
     cell, corner, _ = np.nonzero(states >= 0)
@@ -308,15 +297,8 @@ def _joined(held: Held, states: Index) -> Index:
 def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
     """Places where branches end on the way to corners that they do not reach.
 
-    All cells of a branch share its place beside one node, so that its sheet has no cracks.
-
-    Args:
-        held: The postures.
-        states: Numbers of those at the corners of cells, -1 for none, shape (k, 2^m).
-        corners: Their nodes, shape (k, 2^m).
-
-    Returns:
-        Number of its place for each corner without a posture, 0 for others, (k, 2^m), and places.
+    All cells of a branch share its place beside one node, so that its sheet has no cracks. Given
+    with the places is the number of its place for each corner without a posture, (k, 2^m).
     """
     total = len(held.node)
     row, corner = np.nonzero(states < 0)

@@ -250,7 +250,6 @@ def _check(arm: Manipulator) -> None:
 
 
 def _usual_payloads(arm: Manipulator) -> Array:
-    """Payloads between those that hardly bend the arm and those that bend it far [kg]."""
     assert arm.loads is not None
     stiffness = arm.section.stiffness_at(arm.profile, np.array([0.5 * arm.length]))
     weight = float(stiffness.bending[0]) / arm.length**2

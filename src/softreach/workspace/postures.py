@@ -66,7 +66,7 @@ class AllPostures(TipMap):
     def _known(self) -> tuple[Array, Array]:
         every = [each.gamma for each in self.sheets]
         number = np.repeat(np.arange(len(every)) + 1.0, [len(gamma) for gamma in every])
-        gamma = np.column_stack([np.concatenate(every), number])
+        gamma = np.column_stack([np.concatenate(every), number]).astype(np.float64)
         found = np.isfinite(tips := self.tips(gamma)).all(axis=1)
         return gamma[found], tips[found]
 

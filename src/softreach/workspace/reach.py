@@ -133,11 +133,7 @@ def reachable_set(
 
 
 def rasterized_set(
-    tip_map: TipMap,
-    cells: int,
-    cell: float | None,
-    accuracy: float,
-    progress: Progress = silent,
+    tip_map: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress = silent
 ) -> ReachableSolid:
     """Reach of three free bundles by one raster, whether the map is one to one or not.
 
@@ -213,15 +209,7 @@ def _by_faces(tip_map: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
 def _by_raster(
     tip_map: TipMap, grid: _Grid, fine: Image, accuracy: float, before: _Grid | None = None
 ) -> ReachableSolid:
-    """The solid of any image; without the integral over the box where it has several sheets.
-
-    Args:
-        tip_map: The tip map.
-        grid: The grid.
-        fine: Its image.
-        accuracy: Relative error allowed.
-        before: The grid of half as many cells, if it is known.
-    """
+    """The solid of any image; `before` is the grid of half as many cells, if it is known."""
     if before is None or not grid.lifted.is_torn:
         before = grid.coarser(tip_map)
     coarse = before.image(fine.lattice)
@@ -254,8 +242,6 @@ def _by_raster(
 
 
 class _Grid(NamedTuple):
-    """The mapped vertices of a grid of three bundles."""
-
     lifted: LiftedGrid
     jacobian_dets: Array
     """det J, shape ((n + 1)³,)."""

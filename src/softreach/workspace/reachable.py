@@ -155,7 +155,6 @@ class ReachableSet(ABC):
         return "\n  ".join([f"{type(self).__name__}: {size}", *details])
 
     def _lines(self) -> list[str]:
-        """Lines to print: the size first."""
         size, hull = self._stored[:2]
         lines = [f"{_MEANINGS[size][1]} {self._text(size)}", f"convex hull {self._text(hull)}"]
         if _MEANINGS[size][0] == _MEANINGS[hull][0] and getattr(self, hull) > 0.0:
@@ -163,7 +162,6 @@ class ReachableSet(ABC):
         return lines
 
     def _numbers(self) -> Stored:
-        """Numbers to store."""
         each = (
             with_error(name, getattr(self, name), getattr(self, f"{name}_error"), *_MEANINGS[name])
             for name in self._stored
@@ -171,11 +169,9 @@ class ReachableSet(ABC):
         return {name: number for numbers in each for name, number in numbers.items()}
 
     def _sizes(self) -> tuple[float, float, float, float]:
-        """Size and error of the set, and of its convex hull."""
         return self.volume, self.volume_error, self.convex_volume, self.convex_volume_error
 
     def _text(self, name: str) -> str:
-        """A number with its error, shares in percent."""
         value, error, unit = getattr(self, name), getattr(self, f"{name}_error"), _MEANINGS[name][0]
         if unit == "1":
             return quantity(100 * value, "%", 100 * error)
@@ -268,7 +264,6 @@ class ReachableSolid(ReachableSet):
         return Shell(half, Estimate(thickness, error))
 
     def _boundary_area(self) -> Estimate:
-        """Area of both sides of a thin set [m²]."""
         if self.route == "search":
             assert isinstance(self.image, ReachedCells)
             fine, coarse = self.image.wrap.area, self.image.coarse.area

@@ -181,7 +181,6 @@ def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
 
 
 def _size(grid: LiftedGrid) -> float:
-    """Length of chords, or area of two triangles each [m or m²]."""
     corners = grid.tips[grid.cells]
     if corners.shape[1] == 2:
         return float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=-1).sum())
@@ -313,8 +312,6 @@ def planar_set(
 
 
 class _Outline(NamedTuple):
-    """Closed curves of tips around a region."""
-
     tips: Array
     """Shape (n, 3)."""
     gamma: Array
@@ -359,7 +356,6 @@ def _smooth(tip_map: TipMap, flat: TipMap, area: Estimate) -> Estimate:
 
 
 def _mesh(outline: _Outline, plane: Plane) -> Surface:
-    """Triangles of the region: those of its outline and of centers inside."""
     from scipy.spatial import Delaunay
 
     points = np.concatenate([outline.tips, outline.centers])
