@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import tables
@@ -110,8 +109,9 @@ class Solver:
 
         def image(points: Array) -> Array:
             images, many = np.empty_like(points), np.repeat(gamma, _FACING, axis=0)
+            last = np.array([-1])
             for rows in parallel.blocks(len(points), _FACING):
-                images[rows] = self._facing(many[: len(images[rows])], points[rows], [-1])[:, 0]
+                images[rows] = self._facing(many[: len(images[rows])], points[rows], last)[:, 0]
             return images
 
         return image
@@ -140,7 +140,7 @@ class Solver:
         nodes = self._facing(gamma, directions, self._steps.firsts[:-1])
         return nodes.reshape(len(gamma), self.tables.frame_size)
 
-    def _facing(self, gamma: Array, directions: Array, ends: ArrayLike) -> Array:
+    def _facing(self, gamma: Array, directions: Array, ends: Index) -> Array:
         """Directions of gravity at ends of steps of such arms, as their bases see them."""
         whole = self._steps._replace(firsts=np.array([0, len(self._steps.lengths)]))
         trace = walk(gamma, self.tables.in_one_segment, directions, whole, trace=True)[2]
