@@ -23,6 +23,7 @@ from softreach.cli.app import run
 from softreach.inverse import solve_inverse
 from softreach.inverse.solutions import Status
 from softreach.rod.rods import as_tip_map
+from softreach.support.errors import NotPossible
 from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
 from softreach.workspace.cells import cells_of
 
@@ -180,3 +181,11 @@ def test_a_tip_rounded_to_millimeters_is_reached_within_one(capsys):
     assert run(["solve", "three_tendon_robot", "--target", text, "--within", "1mm"]) == 0
     assert "reached within 0." in capsys.readouterr().out
     assert run(["solve", "three_tendon_robot", "--target", text, "--within", "-1mm"]) == 2
+
+
+def test_a_set_without_inside_says_so():
+    arm = designs.minimal_trunk().with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
+    surface = reachable_set(arm)
+    for ask in (lambda: surface.contains([[0.0, 0.0, 0.5]]), lambda: surface.grid):
+        with pytest.raises(NotPossible, match=r"dimension 2 has no .*: ask for distances"):
+            ask()

@@ -15,7 +15,7 @@ from softreach.geometry.surface import Surface, without_flakes
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
-from softreach.support.errors import MissingExtra, counted
+from softreach.support.errors import MissingExtra, NotPossible, counted
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.boundary import boundary_surface, wrapped_surface
@@ -61,6 +61,9 @@ def with_error(name: str, value: float, error: float, unit: str, meaning: str) -
     }
 
 
+Route = Literal["flux", "raster", "search"]
+
+
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachableSet(ABC):
     """The image of the activation box under the map from activations to tips.
@@ -94,6 +97,14 @@ class ReachableSet(ABC):
     """Share of the activation box at which two postures are held, the one or the other by the way
     that the arm has come [-]; mirror images of those that lean do not count. 0 for more than
     three free bundles, of which nothing tells."""
+    multiplicity: Mapping[int, float] = field(default_factory=dict)
+    """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for other
+    numbers of free bundles than three."""
+    route: Route = "raster"
+    """Source of the volume. "flux": the map is found to be one to one, and the volume is what
+    flows through the images of the six faces of the activation box. "raster": the image folds or
+    overlaps, or may do so under loads and at kinks; a signed volume by flux makes it exact
+    elsewhere, unless the set is torn. "search": more than three free bundles."""
 
     @property
     def arm(self) -> Manipulator:
@@ -125,6 +136,23 @@ class ReachableSet(ABC):
         Raises:
             InvalidInput: Points of another shape or not finite.
         """
+
+    def contains(self, points: ArrayLike) -> Mask:
+        """Mask of the points in a solid, shape (n,).
+
+        Raises:
+            NotPossible: The set is thin.
+        """
+        raise NotPossible(f"a set of dimension {self.dimension} has no inside: ask for distances")
+
+    @lazy
+    def grid(self) -> xr.Dataset:
+        """The cells of a solid.
+
+        Raises:
+            NotPossible: The set is thin.
+        """
+        raise NotPossible(f"a set of dimension {self.dimension} has no cells: ask for distances")
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers of the set with their errors and units, and where they come from."""
@@ -178,9 +206,6 @@ class ReachableSet(ABC):
         return quantity(value, unit.translate(_POWERS), error)
 
 
-Route = Literal["flux", "raster", "search"]
-
-
 class Shell(NamedTuple):
     """A thin set as a sheet: the area of its middle, half of that of both sides."""
 
@@ -202,20 +227,12 @@ class ReachableSolid(ReachableSet):
     dimension: ClassVar[int] = 3
     _stored: ClassVar[tuple[str, ...]] = "volume", "convex_volume", "unreachability"
 
-    multiplicity: Mapping[int, float] = field(default_factory=dict)
-    """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
-    free bundles."""
     multiplicity_error: float = np.nan
     """Error of the volume reached more than once [m³]; 0 for the route "flux", NaN for more than
     three free bundles."""
     fold_volume: float = np.nan
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     NaN for more than three free bundles."""
-    route: Route
-    """Source of the volume. "flux": the map is found to be one to one, and the volume is what
-    flows through the images of the six faces of the activation box. "raster": the image folds or
-    overlaps, or may do so under loads and at kinks; a signed volume by flux makes it exact
-    elsewhere, unless the set is torn. "search": more than three free bundles."""
     is_torn: bool = False
     """True if the set is the image of several sheets of postures."""
     image: Image | ReachedCells = field(repr=False)
