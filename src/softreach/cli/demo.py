@@ -55,13 +55,8 @@ def demo(
 
     start = perf_counter()
     arm = design_from("minimal_trunk", unit=unit)
-    formats = {
-        "design.toml": DESIGN_FILE,
-        "cloud.zarr": CLOUD_STORE,
-        "cloud.ply": CLOUD_FILES,
-        "hull.ply": CLOUD_FILES,
-        "cloud.png": PICTURES,
-    }
+    formats = {"design.toml": DESIGN_FILE, "cloud.zarr": CLOUD_STORE, "cloud.png": PICTURES}
+    formats |= {"cloud.ply": CLOUD_FILES, "hull.ply": CLOUD_FILES}
     for name, kinds in formats.items():
         check_output(out / name, kinds, overwrite)
     check_hull_memory(n)

@@ -191,11 +191,8 @@ def _solutions(
     roots = rows(roots, np.lexsort((beside, roots.target))) if beside.any() else roots
     statuses = np.full(count, Status.REACHED, np.int8)
     statuses[missing[~hit]] = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
-    gamma, gaps, proved_gaps = (
-        np.empty((count, tip_map.box.bundles)),
-        np.empty(count),
-        np.zeros(count),
-    )
+    gamma = np.empty((count, tip_map.box.bundles))
+    gaps, proved_gaps = np.zeros((2, count))
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
     points = request.targets.copy()

@@ -286,11 +286,8 @@ def respond(
     moved, angle = np.zeros((3, every)), np.zeros((3, every))
     for k in range(steps):
         for i in range(3):
-            d, n, node = (
-                directors[k, i],
-                force[k, i],
-                (rest_length[k, i], stretch[k, i], thrust[k, i]),
-            )
+            d, n = directors[k, i], force[k, i]
+            node = rest_length[k, i], stretch[k, i], thrust[k, i]
             source = rates[6 * i : 6 * i + 6]
             _rates_of_places(node, d[2], n, rise[i])
             _sources(
