@@ -54,6 +54,10 @@ def reach(
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
     meshed = [("skimage", "surface")] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
     options.check_outputs(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite, *meshed)
+    free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
+    for path in outs:
+        if not options.is_page(path) and free < (3 if _is_drawn(path) else 2):
+            raise _too_few(path)
     if not any(map(_is_drawn, outs)):
         options.refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)
@@ -85,7 +89,11 @@ def _write(
         export_mesh(reached.surface(), path, unit=options.written_unit(arm), overwrite=overwrite)
         console.written(path, options.written_unit(arm))
     else:
-        raise NotPossible(f"{path} cannot be written for a design with so few free bundles")
+        raise _too_few(path)
+
+
+def _too_few(path: Path) -> NotPossible:
+    return NotPossible(f"{path} cannot be written for a design with so few free bundles")
 
 
 def payload(
