@@ -96,15 +96,19 @@ class Last:
 
 def run():
     Last()
-    parallel.run([lambda: print("went on")])
+    WORK
     return 0
 
 sys.exit(interruption.run_stoppable(run))
 """
 
 
-def test_a_signal_that_python_swallows_ends_the_work_at_the_next_item(tmp_path):
-    process = subprocess.run([sys.executable, "-c", SWALLOWED], capture_output=True, text=True)
+@pytest.mark.parametrize(
+    "work", ['parallel.run([lambda: print("went on")])', "interruption.wait_for_signal()"]
+)
+def test_a_signal_that_python_swallows_ends_the_work_at_the_next_item(work):
+    command = [sys.executable, "-c", SWALLOWED.replace("WORK", work)]
+    process = subprocess.run(command, capture_output=True, text=True)
     assert (process.returncode, process.stdout) == (143, "")
     assert process.stderr == f"{INTERRUPTED}\n"
 

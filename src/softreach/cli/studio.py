@@ -59,12 +59,12 @@ def studio(
         _write_static(source, static, vary, unit, overwrite=overwrite)
         return
     refuse("without --static", vary=vary, unit=unit, overwrite=overwrite)
-    import threading
     import warnings
     import webbrowser
 
     from softreach.studio import Studio
     from softreach.studio.serve import is_local, new_token
+    from softreach.support.interruption import wait_for_signal
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
@@ -80,7 +80,7 @@ def studio(
             console.note(_warning(with_token=with_token))
         if open_page:
             webbrowser.open(running.url)
-        threading.Event().wait()
+        wait_for_signal()
 
 
 def _write_static(

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 INTERRUPTED = "interrupted: nothing half-written was left behind"
 
+_LOST = 0.5  # seconds after which a lost signal is found
 _came: list[int] = []  # signals to end this process
 
 
@@ -21,6 +23,13 @@ def check_stopped() -> None:
     """
     if _came:
         raise KeyboardInterrupt
+
+
+def wait_for_signal() -> None:
+    """Wait for a signal to end, also one whose exception Python has lost."""
+    while True:
+        check_stopped()
+        time.sleep(_LOST)
 
 
 def run_stoppable(run: Callable[[], int]) -> int:
