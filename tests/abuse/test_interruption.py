@@ -103,9 +103,10 @@ sys.exit(interruption.run_stoppable(run))
 """
 
 
-@pytest.mark.parametrize(
-    "work", ['parallel.run([lambda: print("went on")])', "interruption.wait_for_signal()"]
-)
+GOES_ON = 'parallel.run([lambda: print("went on")])'
+
+
+@pytest.mark.parametrize("work", [GOES_ON, "interruption.wait_for_signal()"])
 def test_a_signal_that_python_swallows_ends_the_work_at_the_next_item(work):
     command = [sys.executable, "-c", SWALLOWED.replace("WORK", work)]
     process = subprocess.run(command, capture_output=True, text=True)
@@ -114,7 +115,8 @@ def test_a_signal_that_python_swallows_ends_the_work_at_the_next_item(work):
 
 
 def test_what_ignores_a_signal_goes_on_ignoring_it():
-    script = SWALLOWED.replace("class", "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n\nclass")
+    script = SWALLOWED.replace("WORK", GOES_ON)
+    script = script.replace("class", "signal.signal(signal.SIGTERM, signal.SIG_IGN)\n\nclass")
     process = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (process.returncode, process.stdout, process.stderr) == (0, "went on\n", "")
 
