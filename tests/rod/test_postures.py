@@ -149,7 +149,7 @@ def test_a_tentacle_that_hangs_first_is_where_a_shooting_from_the_base_has_it(pa
 @pytest.mark.parametrize(
     ("payload", "side"),
     [
-        (0.1, 4),
+        (0.1, 3),
         pytest.param(0.1, 7, marks=pytest.mark.large),
         pytest.param(0.02, 25, marks=pytest.mark.large),
     ],
