@@ -147,7 +147,7 @@ def followed(x, begin, end, parts: int = 50):
         b, a = (begin + k / parts * (end - begin))[:, :2].T
         y = x.copy()
         with np.errstate(all="ignore"):
-            for _ in range(12):
+            for _ in range(8):
                 y -= (y**3 - a * y - b) / (3 * y**2 - a)
             going &= (np.abs(y - x) < 0.3) & (3 * y**2 > a) & (np.abs(y**3 - a * y - b) < 1e-9)
         x[going], way[going] = y[going], k / parts
@@ -219,7 +219,7 @@ class FlatCusp(Cusp):
 
     def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
         near = np.linalg.norm(gamma[:, None] - self.at, axis=2).argmin(axis=1)
-        x, way = followed(self.x[near], self.at[near], gamma)
+        x, way = followed(self.x[near], self.at[near], gamma, parts=20)
         lost = way < 1.0
         tips[:] = np.where(lost[:, None], np.nan, np.column_stack([x, gamma[:, 1], 0 * x]))
         if slopes is not None:
