@@ -42,6 +42,7 @@ from softreach.kernels.loaded.section import (
     push_tangents,
     put_three,
     put_world,
+    step_direction_tip,
     three,
     unit,
     world,
@@ -326,3 +327,36 @@ def solve_directions(gamma, axes, tip, guesses, steps, limits, most, shares, out
 def solve_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out):
     """The same under any loads, with six numbers for each node: G, H."""
     _search_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out)
+
+
+@kernel
+def base_directions(gamma, tip, directions, steps, out):
+    """Directions of the forces that the base must see, for those that the tip of one rod sees.
+
+    Args:
+        gamma: One activation (1, bundle).
+        tip: As of `solve_directions`.
+        directions: G(L) as the base of the unloaded arm sees them (n, 3).
+        steps: As of `solve_directions`.
+        out: Filled, (n, 3).
+    """
+    lanes = np.zeros((steps[0].shape[2] - 1, LANES))
+    work, w = np.zeros(REST_WORK), np.zeros(SIZE)
+    rest = np.zeros((steps[1].shape[0], STEP_ROWS * LANES))
+    load_all(lanes, gamma, 0, 1)
+    rest_frames(work, lanes, steps[0], steps[1], rest)
+    for first in range(0, directions.shape[0], LANES):
+        here = min(LANES, directions.shape[0] - first)
+        for i in range(LANES):
+            w[SHARE + i] = 1.0
+            g, h = node_world(turn_at(work, TURN, i), directions, first + min(i, here - 1), 0, 3)
+            put_world(w, G, i, g, h)
+            begin_tip(w, tip, i)
+        for k in range(rest.shape[0]):
+            r, c = rest[k], steps[2][k]
+            for i in range(LANES):
+                step_direction_tip(w, r, c, i)
+        for i in range(here):
+            g = turned(back(turn_at(work, TURN, i)), get(w, G, i))
+            for axis in range(3):
+                out[first + i, axis] = g[axis]

@@ -97,6 +97,15 @@ def shoot(
     return found.only((out[:, -1] == kernels.FOUND) & np.isfinite(out[:, :-1]).all(axis=1))
 
 
+def base_directions(
+    gamma: Array, tables: LoadTables, directions: Array, steps: StepTables
+) -> Array:
+    """Directions of gravity at the base of one arm (1, bundles), for those at its tip, (n, 3)."""
+    out = np.empty_like(directions)
+    kernels.base_directions(_columns(gamma), tables.at_tip, directions, tuple(steps), out)
+    return out
+
+
 def walk(
     gamma: Array,
     tables: LoadTables,

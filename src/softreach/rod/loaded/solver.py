@@ -17,6 +17,7 @@ from softreach.rod.loaded.shooting import (
     Equilibria,
     LoadedShapes,
     Response,
+    base_directions,
     shapes_of,
     shoot,
     walk,
@@ -30,7 +31,6 @@ from softreach.support.lazy import lazy
 
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
-_FACING = 1024  # directions walked together
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,12 +107,10 @@ class Solver:
         Both (n, 3) as the base of the unloaded arm sees them; loads along one direction only.
         """
 
-        def image(points: Array) -> Array:
-            images, many = np.empty_like(points), np.repeat(gamma, _FACING, axis=0)
-            last = np.array([-1])
-            for rows in parallel.blocks(len(points), _FACING):
-                images[rows] = self._facing(many[: len(images[rows])], points[rows], last)[:, 0]
-            return images
+        def image(points: Array) -> Array:  # steps do not keep the length
+            directions = np.ascontiguousarray(points)
+            images = base_directions(gamma, self.tables, directions, self._steps)
+            return images / np.linalg.norm(images, axis=1, keepdims=True)
 
         return image
 
@@ -137,15 +135,11 @@ class Solver:
 
     def frames_facing(self, gamma: Array, directions: Array) -> Array:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
-        nodes = self._facing(gamma, directions, self._steps.firsts[:-1])
-        return nodes.reshape(len(gamma), self.tables.frame_size)
-
-    def _facing(self, gamma: Array, directions: Array, ends: Index) -> Array:
-        """Directions of gravity at ends of steps of such arms, as their bases see them."""
         whole = self._steps._replace(firsts=np.array([0, len(self._steps.lengths)]))
         trace = walk(gamma, self.tables.in_one_segment, directions, whole, trace=True)[2]
-        seen = trace[:, ends, :3] @ rotation_matrices(trace[:, -1, 12:16])
-        return seen / np.linalg.norm(seen, axis=2, keepdims=True)  # steps do not keep the length
+        seen = trace[:, self._steps.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
+        seen /= np.linalg.norm(seen, axis=2, keepdims=True)  # steps do not keep the length
+        return seen.reshape(len(gamma), self.tables.frame_size)
 
     def respond(
         self,
