@@ -12,7 +12,7 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
 from softreach.cli.values import ERROR, Number, Rows, as_read, rows_of
-from softreach.support.errors import NotPossible
+from softreach.support.errors import NotPossible, counted
 from softreach.support.files.formats import PAGES, PICTURES
 
 if TYPE_CHECKING:
@@ -64,9 +64,24 @@ def reach(
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | rows_of(reached.to_dataset())
+    rows = rows if json else _by_activations(rows)
     console.rows(f"reachable set of {design}", rows, json, arm)
     for path in outs:
         _write(reached, arm, path, point, overwrite)
+
+
+def _by_activations(rows: Rows) -> Rows:
+    """A row each for the places that one activation reaches, two, and so on, in place of lists."""
+    lists = "activations", "multiplicity", f"multiplicity{ERROR}"
+    if not rows.keys() >= {*lists}:
+        return rows
+    result = {name: row for name, row in rows.items() if name not in lists}
+    (error, unit), (volume_error, _) = rows[lists[2]], rows[f"volume{ERROR}"]
+    for count, volume in zip(rows["activations"][0], rows["multiplicity"][0], strict=True):
+        name = f"reached by {counted(int(count), 'activation')}"
+        result[name] = volume, unit
+        result[f"{name}{ERROR}"] = error + (volume_error if count == 1 else 0.0), unit
+    return result
 
 
 def _is_drawn(path: Path) -> bool:
