@@ -543,3 +543,10 @@ def test_loads_ask_in_one_line_for_what_the_arm_lacks(options, lacking, capsys):
 
 def test_no_gravity_on_an_arm_without_loads_changes_nothing(folder):
     assert asked_for("minimal_trunk", "--gravity", "none") == sr.designs.minimal_trunk()
+
+
+def test_a_gradient_takes_parameters_as_list_prints_them(printed):
+    command = "gradient", "minimal_trunk"
+    assert printed(*command, "taper_deg", "--accuracy", "0.1") == printed(
+        *command, "taper", "--accuracy", "0.1"
+    )

@@ -179,13 +179,17 @@ def gradient(
     Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
 
     Args:
-        parameters: Parameters, as softreach list parameters DESIGN names them.
+        parameters: Parameters, as softreach list parameters DESIGN names them, or without units.
         accuracy: Relative error allowed in what is rasterized.
     """
+    from softreach.arm.parameters import parameters_by_every_name
+    from softreach.arm.written import written_name
     from softreach.support import progress
     from softreach.workspace import volume_gradient
 
     arm = design_from(design, changes)
+    plain = {written_name(name, p.unit): name for name, p in parameters_by_every_name(arm).items()}
+    parameters = [plain.get(name, name) for name in parameters]
     with progress.bar("differentiating the volume", len(parameters)) as step:
         derivatives = volume_gradient(arm, parameters, accuracy=accuracy, progress=step)
     numbers = rows_of(derivatives.to_dataset())
