@@ -102,8 +102,6 @@ class Command:
 
     def continuing(self, begun: Command) -> Self:
         """This command for a store that another version began: without metrics added since."""
-        if begun.softreach_version == self.softreach_version:
-            return self
         names = {metric.name for metric in begun.metrics}
         kept = (m for m in self.metrics if m.name in names or not known_metric(m.name))
         return replace(self, metrics=tuple(kept), softreach_version=begun.softreach_version)

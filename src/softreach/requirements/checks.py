@@ -119,7 +119,7 @@ class Check(Reported):
     @lazy
     def target_of(self) -> Index:
         """Index of the target that each place belongs to, shape (place,)."""
-        counts = [0 if t.places is None else len(t.points) for t in self.requirements.targets]
+        counts = [len(target.points) for target in self.requirements.targets]
         return np.repeat(np.arange(len(counts)), counts)
 
     @property

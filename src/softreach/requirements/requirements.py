@@ -107,13 +107,12 @@ class Requirements:
     @property
     def places(self) -> Array:
         """Places of all targets that have some, one after the other [m], shape (n, 3)."""
-        each = [target.points for target in self.targets if target.places is not None]
-        return np.concatenate([np.empty((0, 3)), *each])
+        return np.concatenate([np.empty((0, 3)), *(target.points for target in self.targets)])
 
     @property
     def within(self) -> Array:
         """Distance to which each of these must be reached [m], shape (n,)."""
-        each = [np.full(len(t.points), t.within) for t in self.targets if t.places is not None]
+        each = (np.full(len(target.points), target.within) for target in self.targets)
         return np.concatenate([np.empty(0), *each])
 
     def under_payloads(self, arm: Manipulator) -> list[Manipulator]:
