@@ -92,7 +92,10 @@ from softreach.support import interruption, parallel
 
 class Last:
     def __del__(self):
-        os.kill(os.getpid(), signal.SIGTERM)
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        except KeyboardInterrupt:
+            self.handle  # as llvmlite does, whose objects are half-made then
 
 def run():
     Last()

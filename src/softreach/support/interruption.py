@@ -69,5 +69,5 @@ def _stop(number: int, _: object) -> None:
 
 
 def _unraisable(lost: Any) -> None:
-    if not isinstance(lost.exc_value, KeyboardInterrupt):  # `check_stopped` raises it again
+    if not _came:  # `check_stopped` raises a lost one again; half-made objects cannot be closed
         sys.__unraisablehook__(lost)
