@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import zipfile
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -199,6 +202,28 @@ class TestArm:
         assert all(part.is_watertight for part in parts.values())
         colors = [parts[n].visual.material.baseColorFactor[:3].argmax() for n in list(parts)[1:]]
         assert colors == [0, 1, 2]  # red, green, blue
+
+    def test_3mf_holds_the_same_solids_in_their_unit(self, trunk, bent, tmp_path):
+        export_arm(trunk, bent, tmp_path / "arm.vtu", unit="mm")
+        export_arm(trunk, bent, tmp_path / "arm.3mf", unit="mm")
+        with zipfile.ZipFile(tmp_path / "arm.3mf") as package:
+            model = ElementTree.fromstring(package.read("3D/3dmodel.model"))
+        assert model.get("unit") == "millimeter"
+        objects = model.findall(".//{*}object")
+        assert [part.get("name") for part in objects] == ["body", "left", "right", "longitudinal"]
+        vertices = [
+            [float(v.get(k)) for k in "xyz"] for o in objects for v in o.findall(".//{*}vertex")
+        ]
+        np.testing.assert_allclose(vertices, meshio.read(tmp_path / "arm.vtu").points, rtol=1e-8)
+        for part in objects:
+            faces = [
+                [int(t.get(k)) for k in ("v1", "v2", "v3")] for t in part.iter() if t.get("v3")
+            ]
+            edges = {(a, b) for f in faces for a, b in zip(f, [*f[1:], f[0]], strict=True)}
+            assert edges == {(b, a) for a, b in edges}  # each edge has a face on either side
+        with pytest.raises(InvalidInput, match=r"m, cm, mm for a \.3mf file"):
+            export_arm(trunk, bent, tmp_path / "again.3mf", unit="L")
+        assert not left_over(tmp_path, "arm.vtu", "arm.3mf")
 
     def test_obj_holds_named_parts(self, trunk, bent, tmp_path):
         export_arm(trunk, bent, tmp_path / "arm.obj")

@@ -411,7 +411,7 @@ def images(trunk):
 def test_the_image_of_a_line_is_followed_back(trunk, images):
     gamma, path = images
     track = track_path(trunk, path, start=BEGIN)
-    assert track.attrs["end"] == ""
+    assert track.attrs["end"] == "end"
     assert (track.status == PathStatus.FOLLOWED).all()
     assert float(track.tip_error.max()) <= 1e-10
     assert np.abs(track.activation.values - gamma).max() < 1e-6

@@ -122,7 +122,7 @@ def test_a_path_on_the_bounds_of_a_hanging_arm_is_followed_unless_its_chords_lea
         track = track_path(hanging, path, line[0])
         outside = solve_inverse(hanging, 0.5 * (path[:1] + path[1:2])).statuses[0] != Status.REACHED
         assert outside == (length == 0.1)
-        assert track.attrs["end"] == ("bound" if outside else "")
+        assert track.attrs["end"] == ("bound" if outside else "end")
         followed = track.status.values == PathStatus.FOLLOWED
         assert np.abs(track.activation.values - line)[followed].max() < 1e-3
 

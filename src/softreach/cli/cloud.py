@@ -95,7 +95,7 @@ def volume(
 
     Args:
         alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical.
-        out: Write the α-shape here: .ply .stl .obj .glb .vtu
+        out: Write the α-shape here: .ply .stl .obj .glb .3mf .vtu
     """
     from softreach.cloud.volume import concave_hull, convex_hull, flat_areas
     from softreach.export import export_mesh

@@ -38,7 +38,7 @@ def export(
 
     A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
-    .glb .vtu), or the source of a filament of ActiveFilaments.jl (.jl).
+    .glb .3mf .vtu), or the source of a filament of ActiveFilaments.jl (.jl).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
 

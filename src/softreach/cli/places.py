@@ -139,7 +139,7 @@ def _end(tracked: xr.Dataset, unit: LengthUnit) -> str:
     bundle, bound = tracked.attrs["end_bundle"], tracked.attrs["end_bound"]
     error = unit.rounded(float(tracked.end_length_error), digits=".1g")
     ends = {
-        "": "the end of the path",
+        "end": "the end of the path",
         "fold": f"{at}, where the branch turns back (a fold)",
         "no_start": "nowhere: the first point is not reached",
         "snaps": f"{at} (± {error}), where the arm snaps",

@@ -41,7 +41,7 @@ def reach(
 
     Args:
         accuracy: Relative error allowed in the volume.
-        out: Write the boundary (.ply .stl .obj .glb .vtu), draw slices (.png .pdf .svg), or
+        out: Write the boundary (.ply .stl .obj .glb .3mf .vtu), draw slices (.png .pdf .svg), or
             the set as a web page that turns (.html). May be repeated.
         at: Point x,y,z that the slices meet at: the middle of the set if left out.
     """

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Sequence
 from io import BufferedWriter
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,6 +38,20 @@ if TYPE_CHECKING:
 
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
+_CORE_3MF = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
+_UNITS_3MF = {"m": "meter", "cm": "centimeter", "mm": "millimeter"}
+_PACKAGE_3MF = {
+    "[Content_Types].xml": """<?xml version="1.0" encoding="UTF-8"?>
+<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
+<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
+<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
+</Types>""",
+    "_rels/.rels": """<?xml version="1.0" encoding="UTF-8"?>
+<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
+<Relationship Target="/3D/3dmodel.model" Id="model"
+ Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
+</Relationships>""",
+}
 _CLEAR = 0.45  # opacity of a body that has something inside
 
 
@@ -63,12 +79,12 @@ def export_mesh(
     unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
-    """Write a triangle mesh as .ply, .stl, .obj, .glb or .vtu, chosen by the suffix.
+    """Write a triangle mesh as .ply, .stl, .obj, .glb, .3mf or .vtu, chosen by the suffix.
 
     A closed surface that touches itself along edges is parted there, by a thousandth of their
     length, so that it can be printed. STL and GLB keep single precision. glTF has y up: a GLB
-    holds our coordinates under one node that turns z up into y up. PLY, STL, OBJ and GLB say the
-    unit, which `Mesh.load` reads; other readers of GLB take all for meters.
+    holds our coordinates under one node that turns z up into y up. All but VTU say the unit;
+    `Mesh.load` reads it, but other readers of GLB take all for meters. A 3MF takes no L.
 
     Args:
         mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
@@ -129,7 +145,7 @@ def export_arm(
     unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
-    """Write a deformed arm as .ply, .stl, .obj, .glb or .vtu, chosen by the suffix.
+    """Write a deformed arm as .ply, .stl, .obj, .glb, .3mf or .vtu, chosen by the suffix.
 
     The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
     that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
@@ -207,6 +223,34 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     file.write(meshes.export(file_type="glb"))
 
 
+def _write_3mf(scene: Scene, file: BufferedWriter) -> None:
+    """An object for each part, in a unit that the file names (3MF core specification)."""
+    if scene.unit.relative:
+        raise InvalidInput("unit", "L", f"{', '.join(_UNITS_3MF)} for a .3mf file")
+    colors = ["#" + bytes(_colors(part)[0]).hex().upper() for part in scene.parts]
+    names = [quoteattr(part.name) for part in scene.parts]
+    bases = (f'<base name={n} displaycolor="{c}"/>' for n, c in zip(names, colors, strict=True))
+    resources = [f'<basematerials id="1">{"".join(bases)}</basematerials>']
+    items = []
+    for index, part in enumerate(scene.parts):
+        corners = (f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in part.vertices)
+        faces = (f'<triangle v1="{i}" v2="{j}" v3="{k}"/>' for i, j, k in part.faces)
+        resources.append(
+            f'<object id="{index + 2}" type="model" name={names[index]} pid="1" pindex="{index}">'
+            f"<mesh><vertices>{''.join(corners)}</vertices>"
+            f"<triangles>{''.join(faces)}</triangles></mesh></object>"
+        )
+        items.append(f'<item objectid="{index + 2}"/>')
+    model = (
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<model unit="{_UNITS_3MF[scene.unit.name]}" '
+        f'xml:lang="en" xmlns="{_CORE_3MF}"><resources>{"".join(resources)}</resources>'
+        f"<build>{''.join(items)}</build></model>"
+    )
+    with zipfile.ZipFile(file, "w") as package:
+        for name, text in {**_PACKAGE_3MF, "3D/3dmodel.model": model}.items():
+            package.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
+
+
 def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
     surface = joined(scene.parts)
     number = np.repeat(np.arange(len(scene.parts)), [len(part.faces) for part in scene.parts])
@@ -234,6 +278,7 @@ SURFACE_FILES: Formats = {
     ".stl": format_file(_write_stl, "trimesh"),
     ".obj": format_file(_write_obj, "trimesh"),
     ".glb": format_file(_write_glb, "trimesh"),
+    ".3mf": format_file(_write_3mf),
     ".vtu": format_file(_write_vtu, "meshio"),
 }
 """Formats of surfaces and arms."""

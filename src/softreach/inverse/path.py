@@ -65,7 +65,7 @@ def track_path(
         Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
         branch, and `status` (`PathStatus`); `end_activation` and `end_position` are the last on
         the branch, `end_length` the length of path up to there and `end_length_error` how much
-        farther the branch may go [m]; the attributes name how it ended: `end` ("" if the whole
+        farther the branch may go [m]; the attributes name how it ended: `end` ("end" if the whole
         path is followed, else `fold`, `bound`, `snaps` or `no_start`), `end_bundle` and
         `end_bound`.
 
@@ -370,7 +370,7 @@ def _dataset(
         {"axis": list(AXES), **bundle_coordinates(tip_map.arm, tip_map.box.names)},
         {
             **provenance(tip_map.arm, tip_map.frame),
-            "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),
+            "end": "end" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),
             "end_bundle": bundle,
             "end_bound": bound,
         },

@@ -291,7 +291,7 @@ def end_text(track: xr.Dataset, arm: Manipulator) -> str:
     end, way = track.attrs["end"], arm.length_unit.rounded(float(track.end_length))
     if end == "no_start":
         return "The first point is not reached: out of reach, or not from this activation."
-    if not end:
+    if end == "end":
         return f"All {points} points are followed: {way} of path."
     reasons = {
         "fold": "the branch turns back (a fold)",
