@@ -20,8 +20,6 @@ Triple = tuple[float, float, float]
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
 """Declaration of the place of a named station."""
 
-_PLACE: dict[str, Any] = {"low": 0.0, "named": True}
-
 _SHORTEST = 1e-9  # of L, of a part between two places: below it, places round to one another
 
 
@@ -117,18 +115,16 @@ class Span(Located):
         InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
     """
 
-    start_over_length: float = number(
-        "Z0/L", "", "where it begins", low=0.0, below=1.0, default=0.0
-    )
+    start_over_length: float = number("Z0/L", "", "its start", low=0.0, below=1.0, default=0.0)
     """Z0/L, where along the arm it begins [-]."""
-    end_over_length: float = number("Z1/L", "", "where it ends", above=0.0, high=1.0, default=1.0)
+    end_over_length: float = number("Z1/L", "", "its end", above=0.0, high=1.0, default=1.0)
     """Z1/L, where it ends [-]."""
     start: float | str | None = number(
-        "Z0", "m", "where it begins", instead_of="start_over_length", default=None, **_PLACE
+        "Z0", "m", "its start", instead_of="start_over_length", default=None, low=0.0, named=True
     )
     """Z0 [m], or the name of a station of the arm, in place of `start_over_length`."""
     end: float | str | None = number(
-        "Z1", "m", "where it ends", above=0.0, instead_of="end_over_length", default=None, **_PLACE
+        "Z1", "m", "its end", instead_of="end_over_length", default=None, above=0.0, named=True
     )
     """Z1 [m], or the name of a station of the arm, in place of `end_over_length`."""
 
@@ -190,7 +186,7 @@ class Marker(Located):
     )
     """Z/L of its section [-]."""
     station: float | str | None = number(
-        "Z", "m", "where its section is", instead_of="station_over_length", default=None, **_PLACE
+        "Z", "m", "its section", instead_of="station_over_length", default=None, low=0.0, named=True
     )
     """Z [m], or the name of a station of the arm, in place of `station_over_length`."""
     offset: Triple = number(
