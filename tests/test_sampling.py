@@ -142,14 +142,6 @@ def test_a_cloud_survives_the_disk(cloud, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_an_interrupted_computation_ends(trunk):
-    def interrupted(_: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        sr.compute_cloud(trunk, n=200_000, progress=interrupted)
-
-
 def test_progress_adds_up(trunk):
     done = []
     sr.compute_cloud(trunk, n=50_001, progress=done.append)

@@ -236,11 +236,3 @@ def test_a_place_that_is_missing_leaves_the_rest_of_its_sample(good):
     data.loc[3, "tool_y_mm"] = np.nan
     result = sr.calibrate(ARM, data, free=FREE, rivals=False)
     assert result.train.number == 2 * len(good) - 1
-
-
-def test_an_interruption_passes_through(good):
-    def stop(done):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        sr.calibrate(ARM, good, free=FREE, progress=stop)

@@ -68,28 +68,6 @@ def test_a_rest_shape_along_the_arm_is_integrated():
 
 
 @pytest.mark.parametrize("loads", [None, sr.Loads(payload=0.02)])
-def test_tendons_far_off_the_axis_bend_alike(loads):
-    """A pair pulled with +t and -t, 0.3 m off the axis, is a couple: a uniform bend of K1 û."""
-    arm = _hanging()
-    arm = arm.replace(profile=arm.profile.replace(taper=0.0), loads=loads)
-    stiffness = float(arm.section.stiffness(0.015).bending)
-    far = sr.Tendon(name="far", distance=0.3, bundles=2, activation_bounds=(0.0, 1.0))
-    faked = arm.replace(actuators=(*arm.actuators, far), rest=RestShape())
-    bent = arm.replace(rest=RestShape(curvature_y=2.0))
-    pull = 2.0 * stiffness / 0.3
-    given = np.array([[0.5, 1.0, 0.2]])
-    # One is let go by what the other pulls more, so that both together do not shorten the arm.
-    both = np.concatenate([given, [[0.0, pull]]], axis=1), np.concatenate([given, [[pull, 0.0]]], 1)
-    apart = [sr.tip_positions(faked, x) for x in both]
-    axial = float(arm.section.stiffness(0.015).axial)
-    tips = sr.tip_positions(bent, given)
-    nearest = min(np.abs(tip - tips).max() for tip in apart)
-    assert (
-        nearest < 4 * pull / axial * arm.length
-    )  # one tendon of the couple alone shortens by that
-
-
-@pytest.mark.parametrize("loads", [None, sr.Loads(payload=0.02)])
 def test_slopes_are_those_of_the_tips(loads):
     rod = sr.rod.as_tip_map(_hanging(curvature_x=3.0, twist=1.0).replace(loads=loads), 1e-9)
     x, step = np.array([[0.7, 0.3, 1.2]]), 1e-4
