@@ -204,7 +204,7 @@ def test_the_command_line_colors_a_cloud_by_compliance(tmp_path):
 
 def slopes(arm, cloud):
     """Differences of the tips of a cloud, shape (n, 3, m)."""
-    return differences(lambda gamma: tip_positions(arm, gamma, 1e-9), cloud.activation.values)
+    return differences(lambda gamma: tip_positions(arm, gamma), cloud.activation.values)
 
 
 @pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk])
