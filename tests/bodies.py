@@ -10,12 +10,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from softreach.arm import Loads, Manipulator
+from softreach.arm import Loads, Manipulator, designs
 from softreach.arm.tables import tables
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody
+from softreach.rod.loaded.tables import ArmBody, LoadTables
 from tests.oracles import rod
 
 _DEGREE = 40
@@ -27,6 +27,18 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
     material = ring.material.replace(young_modulus=young, density=density)
     section = arm.section.replace(rings=(ring.replace(material=material),))
     return arm.replace(section=section, loads=loads)
+
+
+def weighed(arm: Manipulator, load: float, gravity=(0.0, 0.0, -9.81), **loads) -> Manipulator:
+    """The arm with E such that its load number is `load`."""
+    young = 1000 * 9.81 * arm.length**3 / (load * arm.profile.outer_radius**2)
+    return rubber(arm, Loads(gravity=gravity, **loads), young)
+
+
+def straight(body, loads: Loads, length=1.0, steps=32) -> Solver:
+    """The solver of a straight passive rod."""
+    arm = designs.minimal_trunk(taper=0.0, length=length)
+    return Solver(LoadTables(arm, loads, body), steps, 1e-10)
 
 
 def by_lines(solver: Solver, gamma: np.ndarray) -> Equilibria:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -91,6 +93,15 @@ def in_box(arm: Manipulator, n: int, seed: int = 1) -> Array:
     """Random activations within the bounds."""
     cube = np.random.default_rng(seed).random((n, arm.bundles))
     return arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
+
+
+def differences(f: Callable[[Array], Array], gamma: Array, step: float = 1e-3) -> Array:
+    """Fourth-order central differences of f along every column of gamma, on a last axis."""
+    columns = []
+    for e in step * np.eye(gamma.shape[1]):
+        near, far = (f(gamma + k * e) - f(gamma - k * e) for k in (1, 2))
+        columns.append((8 * near - far) / (12 * step))
+    return np.stack(columns, axis=-1)
 
 
 def rotvec(angles):

@@ -133,13 +133,6 @@ class TestDesign:
         assert "mass  " not in text
         assert "give the density [kg/m³] of rings[0].material to know the mass" in text
 
-    def test_equal_neighbors_share_a_line(self, capsys):
-        assert run(["design", "helical_tendon_robot"]) == 0
-        lines = [line for line in capsys.readouterr().out.splitlines() if "  activation" in line]
-        assert [line.partition("  0 to 15 N:")[0] for line in lines] == [
-            "  activation tendon 1 to tendon 4"
-        ]
-
     def test_where_linear_laws_end_is_said_on_demand(self, capsys):
         assert run(["design", "minimal_trunk"]) == 0
         assert "Exact to first order" not in capsys.readouterr().out
@@ -183,13 +176,6 @@ class TestCloud:
         assert facts["samples"] == 512
         assert facts["highest_tip_L"] == pytest.approx(float(cloud.tip[:, 2].max()))
 
-    def test_lengths_are_counted_in_l_whatever_the_length(self, folder, printed):
-        sr.designs.minimal_trunk(length=0.3).save("short.toml")
-        short = printed("cloud", "short.toml", "--n", "500")
-        long = printed("cloud", "minimal_trunk", "--n", "500")
-        for name in ("highest_tip_L", "lowest_tip_L"):
-            assert short[name] == pytest.approx(long[name], rel=1e-6)
-
     def test_a_cloud_is_named_after_its_design_and_replaces_none_unless_asked(self, folder, capsys):
         again = ["cloud", "minimal_trunk", "--n", "40"]
         assert run(["cloud", "minimal_trunk", "--n", "50"]) == 0
@@ -232,11 +218,6 @@ class TestVolume:
         assert "use more points or a larger alpha" in streams.err
         assert "Traceback" not in streams.err
         assert streams.out.splitlines()[6].endswith("(estimate)  -")
-
-    def test_the_hull_is_written(self, stored, folder, printed):
-        trimesh = pytest.importorskip("trimesh")
-        facts = printed("volume", stored, "--alpha", "0.4L", "--out", "hull.ply")
-        assert trimesh.load("hull.ply").volume == pytest.approx(facts["volume_L3"], rel=1e-6)
 
 
 class TestReach:
@@ -473,14 +454,6 @@ def test_gravity_down_beside_a_hanging_base_pulls_along_the_arm(folder, capsys):
     assert run(["design", "lce_arm", "--base", "hanging", "--gravity", "down", "--json"]) == 0
     *_, last = capsys.readouterr().out.splitlines()
     assert json.loads(last)["base"] == "hanging: points down"
-
-
-def test_a_place_below_a_hanging_arm_is_reached(capsys):
-    place = ["minimal_trunk", "--target", "0.2,0.1,-0.6"]
-    assert run(["solve", *place, "--base", "hanging"]) == 0
-    assert "reached" in capsys.readouterr().out.splitlines()[0]
-    assert run(["solve", *place]) == 0
-    assert "unreachable" in capsys.readouterr().out.splitlines()[0]
 
 
 def test_a_loaded_cloud_counts_its_stable_samples(folder, capsys):

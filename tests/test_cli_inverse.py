@@ -59,29 +59,6 @@ def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):
     np.testing.assert_allclose(sr.tip_positions(trunk, found), points, atol=1e-8)
 
 
-def test_a_path_says_that_the_arm_snaps(tmp_path, capsys, monkeypatch):
-    import xarray as xr
-
-    from softreach.inverse import path
-
-    ended = xr.Dataset(
-        {
-            "activation": (("point", "bundle"), [[0.0, 0.0, 0.0], [np.nan] * 3]),
-            "tip_error": ("point", [0.0, np.nan]),
-            "status": ("point", [0, 4]),
-            "end_length": ((), 0.25),
-            "end_length_error": ((), 1e-8),
-        },
-        attrs={"end": "snaps", "end_bundle": "", "end_bound": ""},
-    )
-    monkeypatch.setattr(path, "track_path", lambda *_: ended)
-    (tmp_path / "path.csv").write_text("x,y,z\n0,0,1\n0,0,0.5\n")
-    out = tmp_path / "activations.csv"
-    assert run(["track", "minimal_trunk", str(tmp_path / "path.csv"), "--out", str(out)]) == 0
-    assert "1 of 2 points followed, up to 0.25 m of path" in (said := capsys.readouterr().out)
-    assert "where the arm snaps" in said
-
-
 def test_the_reachable_set_is_reported_drawn_and_written(tmp_path, capsys):
     surface, figure = tmp_path / "reach.ply", tmp_path / "reach.png"
     arguments = ["reach", "minimal_trunk", "--accuracy", "0.02", "--json"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -74,15 +72,6 @@ def test_blocks_do_not_matter(cloud):
     np.testing.assert_allclose(whole.bending_mean, cut.bending_mean, rtol=1e-12)
 
 
-def test_corners_of_the_box_lie_within_the_histogram_and_nearly_fill_it():
-    arm = sr.designs.minimal_trunk()
-    corners = np.array(np.meshgrid(*arm.bounds)).reshape(3, -1).T
-    found = stream_statistics(arm, [corners], quantiles=(1.0,))
-    largest, end = found.bending_quantile[:, 0], found.bending_edge[:, -1]
-    assert (largest <= end).all()
-    assert (largest >= end * (1 - 2e-5)).all()
-
-
 def test_a_single_bundle_that_cannot_move_has_one_value():
     arm = sr.designs.minimal_trunk().with_bounds((-0.5, -0.5))
     found = stream_statistics(arm, [np.full((10, 3), -0.5)])
@@ -106,12 +95,6 @@ def test_taper_widens_and_raises_the_curvature_toward_the_tip():
     assert (np.diff(width["tapered"]) > 0).all()
 
 
-@pytest.mark.parametrize("stations", [[-0.1], [1.1], [], [[0.5], [0.6]], [np.nan]])
-def test_stations_off_the_arm_are_refused(cloud, stations):
-    with pytest.raises(InvalidInput, match=r"stations = .*Z within \[0, 1\] m"):
-        curvature_statistics(cloud, stations)
-
-
 def test_nothing_to_count_is_refused(cloud):
     with pytest.raises(InvalidInput, match="at least one sample"):
         stream_statistics(sr.cloud.design_of(cloud), [])
@@ -133,17 +116,6 @@ def stations(arm):
     return arm.length * np.array([0.0, 0.3, 0.9, 1.0])
 
 
-@given(arm=arms())
-def test_strains_are_the_tables_times_the_activations(arm):
-    z, gamma = stations(arm), in_box(arm, 20)
-    table, (curvature, extension) = tables(arm, z), as_tip_map(arm).strains(gamma, z)
-    scale = np.abs(table.curvature).max()
-    assert table.rest_length_factor is table.extension
-    u = np.einsum("scb,nb->nsc", table.curvature, gamma)
-    np.testing.assert_allclose(curvature, u, rtol=1e-12, atol=1e-13 * scale)
-    np.testing.assert_allclose(extension, 1 + gamma @ table.extension.T, rtol=1e-12)
-
-
 def test_a_force_leaves_curvature_per_length_at_rest_and_fibers_take_it_along():
     """dᵢ' = η Uγ × dᵢ = ζ u × dᵢ with η of the fibers alone."""
     arm = fibers_and_a_tendon()
@@ -153,15 +125,6 @@ def test_a_force_leaves_curvature_per_length_at_rest_and_fibers_take_it_along():
     eta = 1 + gamma[:, :2] @ table.extension[:, :2].T
     rate = eta[..., None] * np.einsum("scb,nb->nsc", table.curvature, gamma)
     np.testing.assert_allclose(curvature * extension[..., None], rate, rtol=1e-12, atol=1e-12)
-
-
-def test_a_sample_has_the_same_strains_to_the_last_bit_whatever_is_beside_it(trunk):
-    gamma = in_box(trunk, 1000)
-    strains = partial(as_tip_map(trunk).strains, stations=stations(trunk))
-    whole = strains(gamma)
-    for part in (slice(0, 1), slice(3, 500), slice(7, 1000, 13)):
-        np.testing.assert_array_equal(strains(gamma[part]).curvature, whole.curvature[part])
-        np.testing.assert_array_equal(strains(gamma[part]).extension, whole.extension[part])
 
 
 @given(arm=arms())

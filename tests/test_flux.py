@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from softreach.arm import Loads, Manipulator, designs
-from softreach.arm.parameters import changed
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
+from softreach.workspace import volume_gradient
 from softreach.workspace.flux import grid_faces, signed_volume
 from softreach.workspace.image import DIAGONAL
 from softreach.workspace.measure import extrapolated_hull
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
+from tests.sets import solid
 
 Map = Callable[[np.ndarray], np.ndarray]
 
@@ -95,12 +95,6 @@ def pressed(x: np.ndarray) -> np.ndarray:
 
 
 pytestmark = pytest.mark.filterwarnings("ignore:volume .* may be off")
-
-
-def solid(arm: Manipulator | TipMap, **options) -> ReachableSolid:
-    found = reachable_set(arm, **options)
-    assert isinstance(found, ReachableSolid)
-    return found
 
 
 def is_injective(of: Map) -> bool:
@@ -202,18 +196,6 @@ def test_flux_and_raster_agree_within_the_error_of_the_raster(name):
     assert sum(v for k, v in raster.multiplicity.items() if k > 1) <= raster.multiplicity_error
 
 
-@pytest.mark.parametrize("name", ONE_TO_ONE)
-def test_the_flux_agrees_with_points_counted_in_the_set(name):
-    found = solid(ONE_TO_ONE[name])
-    tips = found.surface().vertices
-    low, high = tips.min(axis=0), tips.max(axis=0)
-    points = np.random.default_rng(0).uniform(low, high, (30_000, 3))
-    share = found.contains(points).mean()
-    box = np.prod(high - low)
-    scatter = box * np.sqrt(share * (1 - share) / len(points))
-    assert share * box == pytest.approx(found.volume, abs=4 * scatter)
-
-
 def test_the_flux_is_the_integral_of_det_j_whether_the_map_folds_or_not():
     for arm in (ARM, designs.minimal_trunk(np.radians(75), np.radians(3))):
         rod = as_tip_map(arm, 1e-9)
@@ -223,12 +205,6 @@ def test_the_flux_is_the_integral_of_det_j_whether_the_map_folds_or_not():
         stretch = np.linalg.det(rod.tips_and_slopes(rod.box.from_free_cube(cube))[1])
         whole = float(weights @ stretch) * rod.box.volume
         assert signed_volume(rod).value == pytest.approx(whole, rel=1e-8)
-
-
-def test_volume_grows_with_the_cube_of_the_length():
-    arm = ONE_TO_ONE["minimal trunk"]
-    larger = changed(arm, {"length": 3.0, "outer_radius": 3.0 * float(arm.profile.radius(0.0))})
-    assert solid(larger).volume == pytest.approx(27.0 * solid(arm).volume, rel=1e-9)
 
 
 def test_the_paper_s_design_folds_in_a_corner_and_is_rasterized():
@@ -258,12 +234,6 @@ def test_a_surface_found_in_a_raster_leaves_no_spike_out(arm):
     corners = found.tip_map.tips(found.tip_map.box.corners())
     outer = corners[~found.image.are_deep(corners)]
     assert found.surface().distance(outer).max() < DIAGONAL * found.image.lattice.cell
-
-
-def test_the_route_is_told_in_the_dataset():
-    assert solid(ARM, accuracy=0.02).to_dataset().attrs["route"] == "raster"
-    many = solid(designs.redundant_trunk(), accuracy=0.1, cell=0.1)
-    assert many.to_dataset().attrs["route"] == "search"
 
 
 def test_the_hull_is_that_of_the_faces():

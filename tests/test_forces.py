@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import softreach as sr
 from softreach import plot
 from softreach.arm.loads import Loads
 from softreach.cli.app import run
-from softreach.force_growth import Growth
 from softreach.forces import Stop, blocked_force
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
@@ -86,20 +84,6 @@ def test_where_no_linear_program_is_solved_the_search_is_unfinished(monkeypatch)
     assert not found.limit.values.any()
 
 
-def test_few_steps_lead_to_where_stability_is_lost(monkeypatch):
-    """Margins foretell the force: no creeping towards it, and no margin left in the end."""
-    margins, program = [], Growth._program
-
-    def counted(growth, fixed, reach):
-        margins.append(fixed.response.margin)
-        return program(growth, fixed, reach)
-
-    monkeypatch.setattr(Growth, "_program", counted)
-    blocked_force(LOADED, None, SIDE, start=START[:1])
-    assert len(margins) < 60
-    assert 0.0 < margins[-1] < 2e-5
-
-
 @pytest.mark.parametrize("first", [1, pytest.param(0, marks=pytest.mark.large)])
 def test_the_bundles_named_are_at_their_bounds(first):
     found = blocked(LOADED, SIDE, first)
@@ -110,14 +94,6 @@ def test_the_bundles_named_are_at_their_bounds(first):
     limit = found.limit.values
     assert (limit <= at).all()
     np.testing.assert_array_equal(limit.any(axis=1), bound)
-
-
-def test_a_growth_whose_program_has_no_solution_is_unfinished(monkeypatch):
-    unsolved = SimpleNamespace(x=None)
-    monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: unsolved)
-    found = blocked_force(LOADED, None, SIDE, start=START[:1])
-    assert found.status.values.tolist() == [Stop.UNFINISHED]
-    assert found.force.values.tolist() == [0.0]
 
 
 def test_the_force_begins_to_grow_by_the_compliance():

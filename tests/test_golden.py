@@ -11,20 +11,12 @@ import pytest
 
 import softreach as sr
 from softreach.arm import (
-    FiberArchitecture,
-    LinearTaper,
-    Manipulator,
-    Material,
-    Pieces,
-    Ring,
-    Section,
     designs,
 )
 from softreach.atlas import DesignSpace, atlas_cloud
 from softreach.exchange import activefilaments
 from softreach.export import export_arm
 from softreach.plot import plot_slab
-from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration
 from softreach.support.errors import InvalidInput
 
@@ -41,30 +33,6 @@ def test_an_activated_filament_is_that_of_active_filaments_jl():
     shape = configuration(designs.filament(), [-2.0, -1.3, 0.0], stations=[0.1], tol=1e-12)
     np.testing.assert_allclose(shape.position[0], POSITION, rtol=0, atol=1e-12)
     np.testing.assert_allclose(shape.directors[0], DIRECTORS, rtol=0, atol=1e-12)
-
-
-def test_the_same_filament_in_layers_of_one_material_is_it_too():
-    """Its rings as ActiveFilaments.jl has them, with E = 1 MPa; the core in two parts here."""
-    rubber = Material(young_modulus=1e6, poisson_ratio=0.5)
-    rings = (
-        Ring(inner_ratio=0.2, outer_ratio=0.6, material=rubber, name="inner"),
-        Ring(inner_ratio=0.6, material=rubber, name="outer"),
-    )
-    sectors = FiberArchitecture(
-        helical_angle=Pieces(stations_over_length=(0, 0.05, 1), values=(np.pi / 10, np.pi / 10)),
-        extent=np.radians(30),
-        bundles=3,
-        ring="outer",
-        activation_bounds=(-2.0, 0.0),
-    )
-    filament = Manipulator(
-        profile=LinearTaper(length=1.0, outer_radius=1 / 16),
-        section=Section(rings=rings, core=rubber),
-        actuators=(sectors,),
-    )
-    position, directors = FreeRod(filament, 1e-12).frames([[-2.0, -1.3, 0.0]], [0.1])
-    np.testing.assert_allclose(position[0, 0], POSITION, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(directors[0, 0], DIRECTORS, rtol=0, atol=1e-12)
 
 
 # What leaves a posed arm, pictures, meshes and atlases, is where the arm is in the world
@@ -86,11 +54,6 @@ def test_a_mesh_hangs_from_the_ceiling(hanging, tmp_path):
     low, high = trimesh.load(tmp_path / "arm.stl").bounds
     assert (low[2], high[2]) == pytest.approx((1.0, 2.0), abs=0.01)
     np.testing.assert_allclose((low + high)[:2] / 2, CEILING.position[:2], atol=0.01)
-
-
-def test_the_card_of_an_arm_is_drawn_in_the_world(trunk, hanging):
-    assert trunk._repr_html_().split("<pre")[0] != hanging._repr_html_().split("<pre")[0]
-    assert "points down, at (0.1, 0.2, 2) m" in hanging._repr_html_()
 
 
 def test_a_slab_goes_through_the_base_unless_it_is_said_where(hanging):

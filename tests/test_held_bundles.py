@@ -156,21 +156,6 @@ def test_five_bundles_with_one_held_at_rest_change_as_little_as_four():
     assert np.allclose(changes, least, atol=1e-7)
 
 
-@pytest.mark.parametrize("bundle", range(3))
-def test_two_free_bundles_come_as_near_as_a_dense_cloud(trunk, bundle):
-    from scipy.spatial import KDTree
-
-    arm = holding(trunk, {bundle: -0.5})
-    targets = np.random.default_rng(1).uniform(-1, 1, (40, 3))
-    found = solve_inverse(arm, targets)
-    assert (found.gaps <= KDTree(tip_positions(arm, in_box(arm, 40_000))).query(targets)[0]).all()
-    assert (found.nearest_activations[:, bundle] == -0.5).all()
-    gamma = in_box(arm, 20)
-    back = solve_inverse(arm, tip_positions(arm, gamma))
-    assert (back.statuses == Status.REACHED).all()
-    assert apart(back.activations, back.offsets, gamma).max() < 1e-6
-
-
 def test_an_arm_that_cannot_move_reaches_one_place(trunk):
     arm = holding(trunk, {0: -0.5, 1: -0.1, 2: -0.3})
     tip = tip_positions(arm, [[-0.5, -0.1, -0.3]])
@@ -180,14 +165,6 @@ def test_an_arm_that_cannot_move_reaches_one_place(trunk):
     assert away.status is Status.UNREACHABLE
     assert away.gap == pytest.approx(0.2)
     assert np.array_equal(away.nearest, tip[0])
-
-
-def test_a_direction_is_weighed_with_the_position_by_the_free_bundles():
-    arm = holding(designs.redundant_trunk(), {1: -0.5})
-    gamma = in_box(arm, 1)
-    d3 = configuration(arm, gamma[0], [arm.length]).directors.values[0, 2]
-    solution = solve_inverse(arm, tip_positions(arm, gamma), direction=d3)[0]
-    assert np.abs(solution.nearest_activation - gamma[0]).max() < 1e-4
 
 
 def test_a_path_is_followed_with_a_bundle_held_at_rest_as_without_it():

@@ -16,7 +16,7 @@ from softreach.support.palette import material_fill
 from tests.cable import Cable
 from tests.made_arms import FIRM, MADE_ARMS, SOFT, STIFF, Ring, mixed_arm, one_ring_arm
 
-plt = pytest.importorskip("matplotlib.pyplot")
+pytest.importorskip("matplotlib.pyplot")
 trimesh = pytest.importorskip("trimesh")
 
 SUFFIXES = ("ply", "stl", "obj", "glb", "vtu")
@@ -42,13 +42,6 @@ def resting(arm, stations=11):
 
 
 class TestEveryKind:
-    @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
-    def test_has_a_cross_section(self, arm, share):
-        ax = plot_cross_section(arm, share * arm.length)
-        ax.figure.canvas.draw()
-        reach = float(arm.profile.radius(share * arm.length)) / arm.length
-        assert ax.get_xlim()[1] > reach
-
     def test_has_pictures_at_rest_and_deformed(self, arm):
         shape = sr.configuration(arm, some_activation(arm), stations=21)
         ax = plot_arm(arm, shape, view="oblique")
@@ -304,14 +297,6 @@ class TestSection:
         assert isinstance(gap, Annulus)
         assert gap.get_radii()[0] == pytest.approx(0.8 * outer)
         assert gap.get_width() == pytest.approx(0.3 * outer)
-
-
-def test_a_sections_reach_is_at_least_its_radius():
-    from softreach.plot.cross_section import section_reach
-
-    arm = one_ring_arm(Tendon(distance=0.05, end_over_length=0.5, activation_bounds=(0, 1)))
-    assert section_reach(arm, 0.1) == pytest.approx(0.05)
-    assert section_reach(arm, 0.2) == pytest.approx(0.02)
 
 
 def test_the_arm_at_rest_has_sections_at_kinks():

@@ -10,7 +10,7 @@ from softreach.arm import designs
 from softreach.inverse.direction import Objective, minimize
 from softreach.rod import ActivationBox, as_tip_map, configuration
 from softreach.workspace.search import CLOSELY, nearest_tips
-from tests.laws import in_box
+from tests.laws import differences, in_box
 
 
 def unit_box(m: int) -> ActivationBox:
@@ -60,12 +60,6 @@ def test_no_bundle_brings_the_nearest_tip_nearer_to_a_target_out_of_reach(design
     ahead = found.gamma[far] + 1e-9 * np.sign(gain)
     gain[(ahead < rod.box.low) | (ahead > rod.box.high)] = 0.0
     assert np.abs(gain).max() < 1e-5
-
-
-def differences(function, gamma: np.ndarray, step: float = 1e-6) -> np.ndarray:
-    """Central differences of a function of (n, m) activations along each axis, last."""
-    shifts = step * np.eye(gamma.shape[1])
-    return np.stack([(function(gamma + s) - function(gamma - s)) / (2 * step) for s in shifts], -1)
 
 
 @pytest.mark.parametrize(

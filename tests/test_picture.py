@@ -58,12 +58,6 @@ class TestPoints:
             assert -1 + column / 10 <= x <= -1 + (column + 1) / 10
             assert 4 - (row + 1) / 10 <= y <= 4 - row / 10
 
-    def test_a_large_point_is_a_disc_of_its_diameter(self):
-        drawn = image([[0.5 + 1e-9, 0.5, 0.0]], RED, size=40, width=100)
-        rows, columns = np.nonzero(drawn[..., 3])
-        assert np.hypot(rows - rows.mean(), columns - columns.mean()).max() <= 20
-        assert len(rows) == pytest.approx(np.pi * 20**2, rel=0.03)
-
     @given(diameter=st.floats(1, 30), place=st.tuples(st.floats(0, 1), st.floats(0, 1)))
     def test_points_grow_into_the_pixels_within_their_radius(self, diameter, place):
         drawn = image([[*place, 0.0]], RED, size=diameter, width=20)
@@ -105,10 +99,6 @@ class TestPoints:
     def test_points_outside_or_not_finite_leave_no_trace(self):
         points = [[2, 0.5, 0], [0.5, -1, 0], [np.nan, 0.5, 0], [0.5, 0.5, np.nan], [0.5, np.inf, 0]]
         assert not image(points, RED, size=1).any()
-
-    def test_smoothing_keeps_the_color_and_spreads_the_opacity(self):
-        drawn = image([[0.51, 0.51, 0.0]], RED, size=0.5, oversample=2)
-        assert drawn[3, 4].tolist() == [255, 0, 0, 63]
 
 
 class TestTriangles:

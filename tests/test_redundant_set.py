@@ -16,6 +16,7 @@ from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import ReachableSolid, reachable_set
 from softreach.workspace.cells import smallest_memory
 from softreach.workspace.wrap import damped_steps
+from tests.sets import is_closed, solid
 
 
 def family(revolution: float, extent: float, offset: float, bundles: int) -> FiberArchitecture:
@@ -53,12 +54,6 @@ def six_bundles() -> Manipulator:
 def twelve_bundles() -> Manipulator:
     fibers = [family(turn, 25, 20 * i, 3) for i, turn in enumerate((90, -90, 0, 45))]
     return arm_of(*fibers, inner_radius=0.03, poisson_ratio=0.4, bounds=(-1.2, 0.1))
-
-
-def solid(arm: Manipulator, **options: object) -> ReachableSolid:
-    found = reachable_set(arm, **options)  # pyright: ignore[reportArgumentType]
-    assert isinstance(found, ReachableSolid)
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -115,26 +110,12 @@ def test_the_surface_of_a_set_with_a_thin_rim_is_closed_and_in_one_piece():
     four = solid(designs.redundant_trunk(), accuracy=5e-2)
     surface = four.surface()
     sides = np.stack([surface.faces, np.roll(surface.faces, -1, axis=1)], -1).reshape(-1, 2)
-    back = np.unique(sides[:, ::-1], axis=0)
-    np.testing.assert_array_equal(np.unique(sides, axis=0), back)
-    assert len(back) == len(sides)  # two triangles at each edge, one either way
+    assert is_closed(surface.faces)
     count = len(surface.vertices)
     near = coo_array((np.ones(len(sides)), tuple(sides.T)), shape=(count, count))
     assert connected_components(near, directed=False)[0] == 1
     assert surface.volume == pytest.approx(four.volume, abs=four.volume_error)
     assert four.distance(surface.vertices).max() < 0.5 * four.grid.attrs["cell"]
-
-
-def test_more_bundles_reach_more():
-    # Of six bundles one held at 0 leaves a part of what all reach.
-    six = solid(six_bundles(), accuracy=3e-2)
-    bounds = six.arm.bounds.copy()
-    bounds[0] = 0.0
-    part = solid(six.arm.with_bounds(bounds), accuracy=3e-2)
-    assert part.tip_map.box.dimension == 5
-    assert part.volume < six.volume + six.volume_error + part.volume_error
-    reached = part.surface().vertices
-    assert six.distance(reached).max() < 0.5 * part.grid.attrs["cell"]
 
 
 def test_little_memory_means_larger_cells_a_larger_error_and_a_warning():

@@ -26,6 +26,7 @@ from softreach.rod.rods import as_tip_map
 from softreach.support.errors import NotPossible
 from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
 from softreach.workspace.cells import cells_of
+from tests.sets import is_closed, solid
 
 
 def two_segments() -> Manipulator:
@@ -42,19 +43,6 @@ def two_segments() -> Manipulator:
         stations={"mid": 0.1},
         actuators=(near, far),
     )
-
-
-def is_closed(faces: np.ndarray) -> bool:
-    """True if each edge has one face in either direction."""
-    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    there, back = np.unique(sides, axis=0), np.unique(sides[:, ::-1], axis=0)
-    return len(there) == len(sides) and np.array_equal(there, back)
-
-
-def solid(arm: Manipulator, **options: float) -> ReachableSolid:
-    found = reachable_set(arm, **options)  # pyright: ignore[reportArgumentType]
-    assert isinstance(found, ReachableSolid)
-    return found
 
 
 def corners(found: ReachableSolid) -> np.ndarray:

@@ -24,6 +24,7 @@ from softreach.workspace import (
 from softreach.workspace.reach import rasterized_set
 from softreach.workspace.search import nearest_tips
 from tests.bodies import rubber
+from tests.sets import solid
 
 Moved = Callable[[np.ndarray], np.ndarray]
 Stable = Callable[[np.ndarray], np.ndarray]
@@ -71,12 +72,6 @@ def outside_ball(gamma: np.ndarray) -> np.ndarray:
 
 
 BALL = 4 / 3 * np.pi * 0.3**3
-
-
-def solid(rod: TipMap | Manipulator, **options) -> ReachableSolid:
-    found = reachable_set(rod, **options)
-    assert isinstance(found, ReachableSolid)
-    return found
 
 
 pytestmark = pytest.mark.filterwarnings("ignore:volume .* may be off")

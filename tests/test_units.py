@@ -97,16 +97,6 @@ def test_a_vector_has_all_units_or_none():
         assert lengths_in(text, 3) is None
 
 
-@pytest.mark.parametrize("typed", ["30mm,20mm,60mm", "3cm,20mm,0.06m", "0.6L,0.4L,1.2L"])
-def test_a_target_is_the_same_in_any_unit(typed, folder, printed):
-    sr.designs.minimal_trunk(length=0.05).save("arm.toml")
-    told, plain = (
-        printed("solve", "arm.toml", "--target", text)[0] for text in (typed, "0.03,0.02,0.06")
-    )
-    assert told["target_m"] == pytest.approx(plain["target_m"], rel=1e-15)
-    assert told["gap_m"] == pytest.approx(plain["gap_m"])
-
-
 @pytest.mark.parametrize(
     "header", ["x_mm,y_mm,z_mm", "x [mm],y [mm],z [mm]", '"x_mm","y_mm","z_mm"', "x,y,z"]
 )
@@ -235,13 +225,6 @@ def test_a_length_is_shown_in_a_handy_unit_or_the_one_asked_for(
     sr.designs.minimal_trunk(length=length).save("arm.toml")
     assert run(["design", "arm.toml", *options]) == 0
     assert re.search(rf"^  length +{shown}$", capsys.readouterr().out, re.MULTILINE)
-
-
-def test_the_volume_is_shown_with_its_error(capsys):
-    assert run(["reach", "lce_arm", "--accuracy", "0.05"]) == 0
-    text = capsys.readouterr().out
-    assert re.search(r"^  volume +\d+(\.\d+)? ± \d+(\.\d+)? mL$", text, re.MULTILINE)
-    assert "volume error" not in text
 
 
 def test_the_unit_of_a_file_is_that_of_what_is_shown_and_written(folder, capsys):

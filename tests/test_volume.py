@@ -103,12 +103,6 @@ def test_labeled_tips_may_have_their_axes_in_either_order(tips):
     assert concave_hull(tips.T, 0.2).volume == concave_hull(tips, 0.2).volume
 
 
-def test_a_shape_that_has_fallen_apart_is_warned_of(tips):
-    with pytest.warns(SoftreachWarning, match="below 3 the shape has holes"):
-        hull = concave_hull(tips, 1e-3)
-    assert hull.volume < 1e-3
-
-
 def test_points_without_a_length_need_a_radius():
     with pytest.raises(InvalidInput, match=r"alpha = None: must be a radius \[m\].*length"):
         concave_hull(random_points(10))
@@ -118,12 +112,6 @@ def test_points_without_a_length_need_a_radius():
 def test_other_radii_are_refused(alpha):
     with pytest.raises(InvalidInput, match="a radius > 0"):
         concave_hull(random_points(10), alpha)
-
-
-def test_the_critical_radius_leaves_one_region_around_all_points(tips):
-    hull = concave_hull(tips, "critical")
-    assert hull.regions == 1
-    assert len(np.unique(hull.vertices, axis=0)) == len(hull.vertices)
 
 
 def test_a_radius_below_three_spacings_warns_with_both_numbers():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 import pytest
 
@@ -28,16 +26,7 @@ from softreach.workspace import (
 from softreach.workspace.image import Image
 from softreach.workspace.reach import rasterized_set
 from tests.laws import arm_of
-
-
-def trunk_at(revolution_deg: float, taper_deg: float) -> Manipulator:
-    return designs.minimal_trunk(np.radians(revolution_deg), np.radians(taper_deg))
-
-
-def solid(arm: Manipulator, **options) -> ReachableSolid:
-    found = reachable_set(arm, **options)
-    assert isinstance(found, ReachableSolid)
-    return found
+from tests.sets import is_closed, solid, trunk_at
 
 
 @pytest.fixture(scope="module")
@@ -160,9 +149,7 @@ def test_the_image_of_a_part_of_the_box_lies_within(best, trunk):
 def test_the_surface_is_closed_outward_and_holds_the_volume(best, folded):
     for found in (best, folded):
         surface = found.surface()
-        begins, ends = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
-        edges = Counter(zip(begins.tolist(), ends.tolist(), strict=True))
-        assert all(edges[b, a] == 1 == n for (a, b), n in edges.items())
+        assert is_closed(surface.faces)
         assert surface.volume == pytest.approx(found.volume, rel=5e-4)
 
 
@@ -188,12 +175,6 @@ def test_distance_is_signed_and_grows_by_one(best):
     step = 0.05 * rng.normal(size=(2000, 3))
     change = np.abs(best.distance(points + step) - distance)
     assert (change < np.linalg.norm(step, axis=1) + best.grid.attrs["cell"]).all()
-
-
-def test_volume_scales_with_the_cube_of_the_length(best):
-    large = reachable_set(designs.minimal_trunk(length=3.0))
-    assert large.volume == pytest.approx(27 * best.volume, rel=1e-9)
-    assert large.unreachability == pytest.approx(best.unreachability, rel=1e-9)
 
 
 def test_a_tip_map_is_asked_as_its_arm_is(trunk):
@@ -245,11 +226,6 @@ def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
     assert np.isnan([fine.fold_volume, fine.fold_volume_error, fine.multiplicity_error]).all()
 
 
-def test_a_cloud_of_four_bundles_lies_inside(redundant):
-    tips = compute_cloud(redundant.arm, n=100_000).tip.values
-    assert redundant.contains(tips).all()
-
-
 def test_two_free_bundles_sweep_an_area(trunk):
     arm = trunk.with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
     sheet = reachable_set(arm)
@@ -297,14 +273,6 @@ def test_no_free_bundle_leaves_a_point(trunk):
     assert repr(point).startswith("ReachablePoint: (")
     tip = tip_positions(trunk, np.full((1, 3), -0.5))
     assert point.distance(tip + [[0.0, 0.3, 0.4]]) == pytest.approx(0.5)
-
-
-def test_a_held_bundle_with_room_elsewhere_changes_nothing():
-    whole = designs.redundant_trunk()
-    bounds = ((-5 / 3, 0.0), (-5 / 3, 0.0), (-5 / 3, 0.0), (0.0, 0.0))
-    held = reachable_set(whole.with_bounds(bounds))
-    three = whole.replace(actuators=whole.actuators[:3])
-    assert held.volume == pytest.approx(reachable_set(three).volume, rel=1e-6)
 
 
 def test_progress_counts_every_vertex(trunk):

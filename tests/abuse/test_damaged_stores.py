@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import textwrap
@@ -14,13 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import given
-from hypothesis import strategies as st
 
 import softreach as sr
 from softreach import schema
 from softreach.atlas import DamagedStore, atlas_cloud, build_atlas, open_atlas, verify_atlas
-from softreach.atlas.layout import PER_DESIGN
 from softreach.cli.app import run
 from softreach.support.errors import SoftreachError, SoftreachWarning
 from softreach.support.files.stores import Chunk
@@ -31,8 +27,9 @@ Files = dict[str, bytes]
 TIP = "tip/c/0/0/0/0"
 
 
-def flipped(content: bytes, bit: int | None = None) -> bytes:
-    bit = 4 * len(content) if bit is None else bit
+def flipped(content: bytes) -> bytes:
+    """One bit of it, anywhere."""
+    bit = int(np.random.default_rng(len(content)).integers(8 * len(content)))
     damaged = bytearray(content)
     damaged[bit // 8] ^= 1 << bit % 8
     return bytes(damaged)
@@ -41,9 +38,6 @@ def flipped(content: bytes, bit: int | None = None) -> bytes:
 WAYS: dict[str, Callable[[bytes], bytes | None]] = {
     "one bit flipped": flipped,
     "cut in half": lambda content: content[: len(content) // 2],
-    "a byte longer": lambda content: content + b"\0",
-    "empty": lambda _: b"",
-    "of zeros": lambda content: bytes(len(content)),
     "nested too deeply": lambda _: b"[" * 100_000,
     "missing": lambda _: None,
 }
@@ -127,32 +121,6 @@ def test_damage_of_any_file_is_named_and_mended_by_the_command_that_built_the_at
         if way in MENDED and number % 5 == MENDED.index(way):
             built(place)
             assert only_files(place) == atlas_files
-
-
-def any_bit(files: Files, place: int) -> tuple[str, bytes]:
-    """A file with one bit flipped, which lies at a place of all bits of a store."""
-    place %= 8 * sum(map(len, files.values()))
-    for name, content in files.items():
-        if place < 8 * len(content):
-            return name, flipped(content, place)
-        place -= 8 * len(content)
-    raise AssertionError
-
-
-@given(place=st.integers(0, 1 << 40))
-def test_any_flipped_bit_is_noticed(cloud_files, atlas_files, tmp_path_factory, place):
-    folder = tmp_path_factory.mktemp("flipped")
-    raised_by(
-        lambda: sr.open_cloud(written(cloud_files, folder / "c", *any_bit(cloud_files, place)))
-    )
-    name, content = any_bit(atlas_files, place)
-    atlas = written(atlas_files, folder / "a", name, content)
-    shared = name.endswith("zarr.json") or name.split("/")[0] not in PER_DESIGN
-    if shared:
-        raised_by(lambda: verify_atlas(atlas))
-    else:
-        assert verify_atlas(atlas).damaged == 1
-    shutil.rmtree(folder)
 
 
 def test_nothing_is_written_to_an_atlas_whose_root_is_lost_by_another_command(
@@ -253,9 +221,6 @@ def test_commands_name_what_is_damaged(cloud_files, atlas_files, tmp_path, capsy
     assert "chunk 0/0/0/0 of array tip" in printed.out
     assert printed.err.count("\n") == 1
     assert "the command that built the atlas" in printed.err
-    written(atlas_files, Path("b.zarr"), "taper/c/0", None)
-    arguments = ["atlas", "best", "b.zarr", "reach_height"]
-    assert "array taper" in refusal_of(arguments, capsys, tmp_path)
 
 
 def test_a_store_that_is_replaced_while_it_is_read_is_not_mixed(cloud, tmp_path, monkeypatch):
@@ -321,17 +286,12 @@ def test_an_atlas_gives_way_to_a_cloud_only_if_one_says_so(cloud, atlas_files, t
     assert sr.open_cloud(place).identical(cloud)
 
 
-# Clouds that could not be opened
-
-
 CHANGES: dict[str, Callable[[xr.Dataset], object]] = {
     "no coordinate axis": lambda cloud: cloud.drop_vars("axis"),
-    "fewer bundles": lambda cloud: cloud.isel(bundle=[0, 1]),
     "another status": lambda cloud: schema.with_status(cloud, np.full(64, 9, np.int8)),
     "no dataset": lambda cloud: cloud.to_dict(),
     "another length": lambda cloud: cloud.assign(tip=cloud.tip.assign_attrs(length=2.0)),
     "another design": lambda cloud: cloud.assign_attrs(design=sr.designs.lce_arm().to_toml()),
-    "no version": lambda cloud: cloud.assign_attrs(softreach_version=None),
     "a tolerance of NaN": lambda cloud: cloud.assign_attrs(tol=float("nan")),
 }
 

@@ -10,7 +10,7 @@ from softreach.cli.app import app
 from softreach.cli.changes import Changes
 from softreach.cli.options import Sampling
 from softreach.cli.values import Number, Whole
-from softreach.support.quantity import read_number, read_whole_number
+from softreach.support.quantity import read_whole_number
 from tests.abuse.refusals import refusal_of
 
 TRUNK = "minimal_trunk"
@@ -23,63 +23,33 @@ NOT_WRITTEN = "error: --overwrite has no effect without --out"
 REFUSED = {
     # one bad value for each reader
     f"cloud {TRUNK} --n=1.5": "n = 1.5: must be a whole number such as 20000 or 2e4",
-    f"cloud {TRUNK} --n=0": "n = 0: must be a whole number, 1 or more",
     f"cloud {TRUNK} --seed=-1": "seed = -1: must be a whole number, from 0",
-    f"cloud {TRUNK} --tol=nan": "tol = nan: must be a finite number such as 0.5 or 1e-3",
-    f"cloud {TRUNK} --tol=0": "tol = 0",
     f"design {TRUNK} --set taper=２deg": "taper = ２deg: must be a finite number",
     f"volume {TRUNK} --alpha=-1L": "must be a radius > 0",
     f"solve {TRUNK} --target 0,0,nan": POSITION,
-    f"equilibria {TRUNK} --activation=1,2": "3 comma-separated numbers",
-    f"atlas build a.zarr --vary taper_deg=0:3:{10**9}": "a count up to 100000",
     "atlas build a.zarr --vary taper_deg=nan,1": "must be numbers",
-    f"{VARY} --alpha 0.05": "like 0.05L",
     f"{VARY} --shard 2/2": "shard = 2/2: must be (i, k), or i/k on the command line",
     # one for each command that has numbers or words of its own
     f"volume {TRUNK} --n=1e15": "GB of memory, of which",
-    f"reach {TRUNK} --accuracy nan": "accuracy = nan: must be a finite number",
     "solve redundant_trunk --target 0,0,1 --family 0": "family = 0: must be a whole number",
     f"equilibria {TRUNK} --activation=-7,-7,-7": SHAPE,
-    f"equilibria {TRUNK} --view diagonal --out a.png": "view = diagonal: must be front, side",
-    "atlas build a.zarr --vary taper_deg=0:3:1001 --vary revolution_deg=0:9:1000": "1,000,000 at",
-    "atlas figures a.zarr --panels 0": "panels = 0: must be a whole number, 1 or more",
     f"studio {TRUNK} --port 80000": "port = 80000: must be 1 to 65535; leave it out",
-    f"studio {TRUNK} --no-open --host=": "host = '': must be an address to listen on",
     f"studio {TRUNK} --static a": "parameters = none: must be at least one of",
     "desgin": 'Did you mean "design"',
     "design": "give a design file or a built-in design, or use --schema",
-    "design nowhere.toml": "nowhere.toml: must be a file that exists",
     "design elephant": "elephant: must be a .toml file, or one of elephant_trunk, filament",
-    "design minimal_trank": 'did you mean "minimal_trunk"?',
     "design arm.json": "softreach import arm.json arm.toml",
     f"design {TRUNK} --set left.tension=3": "commands; their bounds are left.lower and left.upper",
-    f"design {TRUNK} --tapr-deg 3": "Did you mean --taper-deg",
-    f"design {TRUNK} --taper-deg 10": "3.57633 deg",
-    f"cloud {TRUNK} --sampler unifrom": 'did you mean "uniform"?',
     f"cloud {TRUNK} --sampler sobol --n 1000": "512 or 1024",
-    f"cloud {TRUNK} --sampler grid --n 999": "9^3 = 729 or 10^3 = 1000",
-    "volume nowhere.zarr": "must be a Zarr store written by softreach; it does not exist",
     "atlas status nowhere.zarr": "must be an atlas written by build_atlas; it does not exist",
     f"show {TRUNK} --n 9 --color pink": "left, right, longitudinal",
-    f"export {TRUNK}": "requires an argument",
     f"solve {TRUNK}": "give either --target or --targets",
-    f"solve {TRUNK} --targets nowhere.csv": "must be a file that exists",
     "solve lce_arm --target 0,0,5inch": "or each with its unit (m, cm, mm, um, µm, L)",
-    f"reach {TRUNK} --accuracy 2": "accuracy = 2.0: must be",
-    **{
-        f"{one} --unit ft": "unit = 'ft': must be one of m, cm, mm, L"
-        for one in ("design lce_arm", "show lce_arm", "demo")
-    },
-    **{
-        f"{VARY} --alpha={alpha}": "must be a radius > 0 over the length of each design"
-        for alpha in ("-1L", "5cm")
-    },
+    "design lce_arm --unit ft": "unit = 'ft': must be one of m, cm, mm, L",
+    f"{VARY} --alpha=5cm": "must be a radius > 0 over the length of each design",
     # changes of a design
     "design lce_arm --payload 200": "payload = 200: must be a mass >= 0 with its unit (kg, g, mg)",
-    "design lce_arm --payload -2g": "payload = -2g: must be a mass >= 0",
-    "design lce_arm --gravity Down": "gravity = Down: must be down, up, sideways, none, or",
     "design lce_arm --gravity 0,0,-9.81N": "three finite numbers x,y,z in m/s²",
-    "design lce_arm --gravity hanging": "gravity = hanging: must be down, up, sideways, none, or",
     "design lce_arm --base=z": "must be one of upright, hanging, up, down, x, -x, y, -y",
     "design lce_arm --tip-force 1,2": "tip_force = 1,2: must be three finite numbers x,y,z in N",
     "design lce_arm --set taper": "set = taper: must be PATH=VALUE",
@@ -87,24 +57,16 @@ REFUSED = {
     "design lce_arm --set taper_deg=3deg": "without a unit, which the name holds",
     "design lce_arm --set bore_ratio=0.1m": "= 0.1m: must be a finite number without a unit",
     "design lce_arm --set taper=1deg --set taper_deg=2": "set = taper_deg: must be given once",
-    "design lce_arm --set taper=1deg --taper-deg 2": "set = taper: must be given once",
-    "design lce_arm --set tapr=1deg": 'did you mean "taper"?',
-    "design lce_arm --set rings[0].material.density_kg_m3=-1": "density_kg_m3 = -1: must be",
     # options that would be ignored
     "volume a.zarr --n 5": f"--n {STORED}",
-    "show a.zarr --taper-deg 1": f"--taper-deg {STORED}",
-    "export a.zarr b.csv --payload 2g": f"--payload {STORED}",
     f"reach {TRUNK} --at 0,0,0.1": "--at has no effect without a picture: add --out slices.png",
     f"cloud {TRUNK} --n 1000 --sampler grid --seed 1": "--seed has no effect on the sampler grid",
     f"design {TRUNK} --schema --unit mm": "--unit has no effect with --schema",
     f"design {TRUNK} --overwrite": NOT_WRITTEN,
-    f"equilibria {TRUNK} --view top": "--view has no effect without --out",
     f"solve {TRUNK} --target 0,0,1 --family 2": "--family has no effect on up to three",
     "export a.zarr a.csv --activation=0,0,0": "--activation has no effect on a cloud",
     f"studio {TRUNK} --vary taper_deg=0:3:4": "--vary has no effect without --static",
-    f"studio {TRUNK} --static a --vary taper_deg=0,1 --port 8080": "--port has no effect",
     "atlas build a.zarr --space a.toml --design lce_arm": "--design has no effect with --space",
-    "atlas build a.zarr --space a.toml --payload 1g": "--payload has no effect with --space",
     f"{VARY} --metrics exact --alpha 0.1L": "--alpha has no effect without the metrics",
     f"design {TRUNK} -q -v": "choose --quiet or --verbose",
 }
@@ -116,26 +78,17 @@ def test_what_a_command_cannot_use_is_refused_in_one_line(words, tmp_path, monke
     assert REFUSED[words] in refusal_of(words.split(), capsys, tmp_path)
 
 
-@pytest.mark.parametrize(
-    "text", ["7", "+7", "-7", "007", "1e6", "2.5e3", "1.0", "400_000", " 12 ", str(2**63 - 1)]
-)
+@pytest.mark.parametrize("text", ["+7", "2.5e3", "400_000", " 12 ", str(2**63 - 1)])
 def test_a_whole_number_may_be_written_in_every_way_that_rounds_nothing(text):
-    number = read_whole_number(text)
-    assert number == (float(text) if {"e", "."} & set(text) else int(text))
+    assert read_whole_number(text) == (float(text) if "." in text else int(text))
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["1.5", "0x10", "１２", "", "nan", "inf", "1e400", "1e-3", "1,000", "1__0", "_1", "True"],
+    "text", ["1.5", "0x10", "１２", "", "nan", "1e400", "1e-3", "1__0", "True"]
 )
 def test_what_is_no_whole_number_is_refused(text):
     with pytest.raises(ValueError, match=r"^"):
         read_whole_number(text)
-
-
-@pytest.mark.parametrize("text", ["1e-6", ".5", "5.", "-0", "1E3", "+2.5"])
-def test_a_decimal_number_is_what_python_reads(text):
-    assert read_number(text) == float(text)
 
 
 FILES = {

@@ -154,14 +154,6 @@ def test_a_place_where_nothing_can_be_written_is_said(things, tmp_path, monkeypa
         assert sorted(os.listdir()) == before
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_a_folder_without_permission_is_said(things, tmp_path):
-    tmp_path.chmod(0o500)
-    assert "Permission denied" in str(
-        raised_by(lambda: write("mesh.stl", things, tmp_path / "a.stl"))
-    )
-
-
 def test_a_link_to_a_file_stays_a_link(things, tmp_path):
     (tmp_path / "link.stl").symlink_to("real.stl")
     write("mesh.stl", things, tmp_path / "link.stl")
@@ -269,28 +261,18 @@ def test_a_folder_whose_replacement_was_killed_is_found_and_comes_back(tmp_path)
 
 
 TRUNK = "minimal_trunk"
-SURFACES = "must be a file name ending in .ply, .stl, .obj, .glb"
-PICTURE = "must be a file name ending in .png, .pdf, .svg"
 THERE = "something is there; choose another name, or pass --overwrite"
 
 
 UNWRITABLE = {
     f"cloud {TRUNK} --out notes.csv": "must be a file name ending in .zarr",
     f"cloud {TRUNK} --out folder.zarr --overwrite": "never replaced",
-    f"volume {TRUNK} --out a.txt": SURFACES,
+    f"volume {TRUNK} --out a.txt": "must be a file name ending in .ply, .stl, .obj, .glb",
     f"volume {TRUNK} --out notes.ply": THERE,
-    f"reach {TRUNK} --out a.png --out a.txt": ".vtu, .png, .pdf, .svg",
-    f"show {TRUNK} --out notes.png": THERE,
-    f"equilibria {TRUNK} --out notes.png": THERE,
     "payload lce_arm --gravity up --out notes.png": THERE,
-    f"track {TRUNK} path.csv --out path.csv": THERE,
-    f"design {TRUNK} --out notes.toml": THERE,
     f"export {TRUNK} notes.jl": THERE,
-    "export cloud.zarr a.stl": ".csv, .parquet",
-    "export cloud.zarr path.csv": THERE,
     "export cloud.zarr path.csv --format activefilaments": THERE,
     "demo --out mine": THERE,
-    "paper --out mine": THERE,
     "paper --out pictures": "a folder without other figures",
 }
 
@@ -299,9 +281,8 @@ UNWRITABLE = {
 def crowded(tmp_path, monkeypatch):
     """A folder with files that are nobody's output."""
     monkeypatch.chdir(tmp_path)
-    for name in ("taken", "notes.ply", "notes.png", "notes.toml", "notes.jl"):
+    for name in ("notes.ply", "notes.png", "notes.jl", "path.csv"):
         (tmp_path / name).write_text("my notes")
-    (tmp_path / "path.csv").write_text("x,y,z\n0.2,0.1,0.6\n0.2,0.1,0.61\n")
     for name in ("folder.zarr/a", "mine/report.html", "mine/cloud.png", "pictures/figures/a.png"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("mine")
@@ -321,27 +302,10 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(
     assert UNWRITABLE[words] in refusal_of(words.split(), capsys, crowded)
 
 
-def lacks(libraries: str, extras: str) -> str:
-    return f"this needs {libraries}; install it with: pip install 'softreach[{extras}]'"
-
-
-MISSING = {
-    f"show {TRUNK}": ("matplotlib", lacks("matplotlib", "plot")),
-    "atlas figures a.zarr": ("matplotlib", lacks("matplotlib", "plot")),
-    f"volume {TRUNK} --out a.glb": ("trimesh", lacks("trimesh", "export")),
-    "export cloud.zarr a.csv": ("pyarrow", lacks("pyarrow", "export")),
-    f"reach {TRUNK} --out a.stl --out a.png": (
-        "trimesh matplotlib skimage",
-        "trimesh and matplotlib and scikit-image; install them with: "
-        "pip install 'softreach[export,plot,surface]', or in a clone with: make setup",
-    ),
-}
-
-
-@pytest.mark.parametrize("words", MISSING)
-def test_missing_extras_are_named_all_at_once_before_the_work(words, tmp_path, monkeypatch, capsys):
+def test_missing_extras_are_named_all_at_once_before_the_work(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    libraries, said = MISSING[words]
-    for library in libraries.split():
+    for library in ("trimesh", "matplotlib", "skimage"):
         monkeypatch.setitem(sys.modules, library, None)
-    assert said in refusal_of(words.split(), capsys, tmp_path)
+    said = refusal_of(["reach", TRUNK, "--out", "a.stl", "--out", "a.png"], capsys, tmp_path)
+    assert "trimesh and matplotlib and scikit-image; install them with: " in said
+    assert "pip install 'softreach[export,plot,surface]', or in a clone with: make setup" in said

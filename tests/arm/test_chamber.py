@@ -146,9 +146,7 @@ def test_sizes_that_are_ratios_shrink_with_the_arm_and_lengths_do_not():
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"distance": None}, "give exactly one of distance and distance_ratio"),
         ({"distance_ratio": 0.5}, "give exactly one of distance and distance_ratio"),
-        ({"radius": None}, "give exactly one of radius and radius_ratio"),
         ({"radius_ratio": 0.2}, r"\(0.004, 0.2\): give exactly one of radius and radius_ratio"),
     ],
 )

@@ -9,8 +9,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import softreach as sr
@@ -27,7 +28,8 @@ from softreach.arm import (
 )
 from softreach.arm.design_file.schema import json_schema
 from softreach.arm.material import named_material
-from tests.arm.drawn_arms import any_arms
+from tests.cable import Cable
+from tests.kinds import any_arms
 
 FILES = Path(__file__).parents[2] / "designs"
 
@@ -49,7 +51,29 @@ def same(one: sr.Manipulator, other: sr.Manipulator) -> bool:
     return repr(dataclasses.asdict(one)) == repr(dataclasses.asdict(other))
 
 
-@given(arm=any_arms())
+NAMES = st.text(st.characters(exclude_categories=["C", "Z"], exclude_characters=".[]"), max_size=8)
+
+
+@st.composite
+def named_arms(draw: st.DrawFn) -> sr.Manipulator:
+    """Any arm with a cable, whose parts have any names that a file can hold, or none."""
+    arm, number = draw(any_arms()), st.floats(-1e3, 1e3)
+    cable = Cable(place=draw(st.tuples(number, number)), activation_bounds=(-0.0, 5e-324))
+    actuators = [one.replace(name=draw(NAMES)) for one in (*arm.actuators, cable)]
+    rings = []
+    for k, ring in enumerate(arm.section.rings):
+        density = draw(st.none() | st.just(-0.0) | number.map(abs))
+        material = ring.material.replace(name=draw(NAMES), density=density)
+        rings.append(ring.replace(name=f"{draw(NAMES)}{k}x", material=material))
+    kept = [one.replace(ring=0) if hasattr(one, "ring") else one for one in actuators]
+    try:
+        return arm.replace(section=arm.section.replace(rings=tuple(rings)), actuators=tuple(kept))
+    except sr.InvalidDesign as error:  # names alike
+        assume("name" not in str(error))
+        raise
+
+
+@given(arm=named_arms())
 def test_an_arm_of_any_kind_survives_a_file_to_the_last_bit(arm):
     again = sr.Manipulator.from_toml(arm.to_toml())
     assert again == arm
@@ -108,33 +132,15 @@ def test_keys_have_the_unit_that_they_say():
     )
 
 
-@pytest.mark.parametrize(
-    ("interpolation", "expected"),
-    [
-        ("", Samples(stations_over_length=(0, 0.5, 1), values=(0.0, math.pi / 4, math.pi / 3))),
-        (
-            "interpolation = 'linear'",
-            Samples(
-                stations_over_length=(0, 0.5, 1),
-                values=(0.0, math.pi / 4, math.pi / 3),
-                interpolation="linear",
-            ),
-        ),
-    ],
-)
-def test_an_angle_may_change_along_the_arm(interpolation, expected):
-    along = "stations_over_length = [0, 0.5, 1]\nvalues = [0, 45, 60]"
-    text = f"{BODY}{FIBER.replace('helical_angle_deg = 10.0', '')}"
-    arm = sr.Manipulator.from_toml(f"{text}[actuators.helical_angle_deg]\n{along}\n{interpolation}")
-    assert arm.fibers[0].helical_angle == expected
-
-
-def test_an_angle_may_be_constant_in_pieces():
-    along = "{ stations_over_length = [0, 0.5, 1], values = [0, 45], interpolation = 'constant' }"
-    arm = sr.Manipulator.from_toml(BODY + FIBER.replace("10.0", along))
-    assert arm.fibers[0].helical_angle == Pieces(
-        stations_over_length=(0, 0.5, 1), values=(0.0, math.pi / 4)
-    )
+@pytest.mark.parametrize("interpolation", ["constant", "cubic", "linear"])
+def test_an_angle_may_change_along_the_arm(interpolation):
+    values = [0, 45] if interpolation == "constant" else [0, 45, 60]
+    along = f"stations_over_length = [0, 0.5, 1], values = {values}"
+    text = FIBER.replace("10.0", f"{{ {along}, interpolation = '{interpolation}' }}")
+    angle = sr.Manipulator.from_toml(BODY + text).fibers[0].helical_angle
+    assert isinstance(angle, Pieces if interpolation == "constant" else Samples)
+    assert angle.stations_over_length == (0, 0.5, 1)
+    np.testing.assert_allclose(angle.values, np.radians(values))
 
 
 class TestMaterials:
@@ -170,12 +176,6 @@ class TestMaterials:
         ]
         arm = trunk.replace(section=Section(rings=tuple(rings)))
         assert sr.Manipulator.from_toml(arm.to_toml()) == arm
-
-
-def test_a_file_with_a_byte_order_mark_loads(tmp_path, trunk):
-    path = tmp_path / "trunk.toml"
-    path.write_text(trunk.to_toml(), encoding="utf-8-sig")
-    assert sr.Manipulator.load(path) == trunk
 
 
 def test_an_arm_of_one_material_may_be_given_with_its_modulus_and_density():
@@ -322,32 +322,15 @@ TWO = BODY.replace("0.5 }", "0.5, material = 'a' }, { inner_ratio = 0.6 }")
     ("text", "fault"),
     [
         (BODY + TENDON, "rings[0].material.young_modulus_pa: must be given in Pa for tendon"),
-        (BODY + FIBER + TENDON + TENDON, "rings[0].material.young_modulus_pa: must be given"),
-        (
-            BODY.replace("0.5 }", "0.5, material = {} }") + TENDON,
-            "rings[0].material.young_modulus_pa: must be given in Pa",
-        ),
         (
             BODY.replace("0.5 }", "0.5, material = 'ecoflex_00_30' }")
             + f"[section]\ncore = {{ poisson_ratio = 0.1 }}\n{FIBER}",
             "section.core.young_modulus_pa: must be given in Pa where materials differ",
         ),
-        (f"{BODY}{FIBER}ring = 1", "actuators[0].ring = 1: must be one of the section's rings: 0"),
         (f"{BODY}{FIBER}ring = 'x'", "actuators[0].ring = 'x': must be one of the section's"),
-        (
-            f"{BODY}{FIBER}activation_bounds = [[0, 1], [0, 2]]",
-            "actuators[0].activation_bounds = [[0, 1], [0, 2]]: must be one pair",
-        ),
-        (
-            BODY.replace("0.05 }", "0.05, taper_deg = 3 }") + FIBER,
-            "profile.taper_deg = 3: leaves no tip",
-        ),
         (f"{BODY}[section]\nbore_ratio = 0.6{FIBER}", "section.bore_ratio = 0.6: must be at most"),
         (BODY.replace("0.5 }", "0.5, outer_ratio = 0.9 }") + FIBER, "rings[0].outer_ratio = 0.9"),
-        (BODY.replace("length_m", "kind = 'round', length_m") + FIBER, "profile.kind = 'round'"),
         (BODY.replace("version = 2", "version = 3") + FIBER, "version = 3: must be 2"),
-        (BODY.replace("version = 2", "version = 1") + FIBER, "version = 1: must be 2"),
-        (BODY.replace("version = 2", "version = true") + FIBER, "version = True: must be 2"),
         (BODY.replace("version = 2", "") + FIBER, "version: required key is missing"),
         (f"{BODY}[[tendons]]\n{FIBER}", "tendons = [{}]: unknown key; write [[actuators]] with"),
         (f"{BODY}actuators = 3", "actuators = 3: must be a list"),
@@ -378,6 +361,12 @@ def test_a_modulus_that_different_materials_need_is_asked_of_each_where_it_stand
         f"{BODY}{FIBER}offset_deg = 1e400",
         f"{BODY}{FIBER}activation_bounds = [[[[0]]]]",
         f"{BODY}{FIBER}# {'x' * 1_000_000}",
+        f'{BODY}{FIBER}name = "a\\nb"',
+        f'{BODY}{FIBER}name = "\\ud800"',
+        f"{BODY}{FIBER}[profile]",
+        BODY + "[[actuators]]\n" * 10_000,
+        BODY + "base = [[0.5]]\n" + FIBER,
+        FIBER.replace("[[actuators]]", "[actuators]"),
     ],
 )
 def test_no_text_makes_the_reader_crash(text):
@@ -395,6 +384,7 @@ def test_no_short_text_makes_the_reader_crash(text):
 def test_no_value_in_place_of_another_makes_the_reader_crash(data):
     lines = [line for line in BAD_FILE.splitlines() if "=" in line]
     values = ["true", "-1", "[]", "{}", "'x'", "[[0]]", "1e999", "1979-05-27", "{a=[{b=1}]}"]
+    values += ["nan", "0", "90.0", "[-inf, 0]", "[[0, 1], [0]]", "[true, false]", "'linear'"]
     text = BAD_FILE
     for line in data.draw(st.lists(st.sampled_from(lines), min_size=1, max_size=8)):
         key = line.partition("=")[0]
@@ -409,6 +399,7 @@ def test_no_value_in_place_of_another_makes_the_reader_crash(data):
         ("name = 'Süd'".encode("latin-1"), "must be text in UTF-8, but byte 9 is none"),
         ("version = 2".encode("utf-16"), "must be text in UTF-8"),
         (bytes(range(256)), "must be"),
+        ("version = 2".encode("utf-16-le"), "is NUL"),
         (b"#" * 5_000_000, "must be at most 0.25 MB large"),
     ],
 )
@@ -424,13 +415,7 @@ def test_a_file_that_is_no_text_or_too_long_is_refused(content, message, tmp_pat
 
 SCHEMA = json_schema()
 
-TYPES = {
-    "object": dict,
-    "array": list,
-    "string": str,
-    "number": (int, float),
-    "integer": int,
-}
+TYPES = {"object": dict, "array": list, "string": str, "number": (int, float), "integer": int}
 SAYS_NOTHING = {"$schema", "$defs", "title", "description", "default", "examples"}
 
 
@@ -444,50 +429,37 @@ def _has_type(schema: Any, value: Any) -> bool:
     return not isinstance(value, bool) and any(isinstance(value, TYPES[name]) for name in names)
 
 
-def _properties(schema: Any, value: Any) -> bool:
-    known = schema["properties"]
-    return all(accepts(known[key], one) for key, one in value.items() if key in known)
-
-
 def _additional(schema: Any, value: Any) -> bool:
-    others = {key: one for key, one in value.items() if key not in schema.get("properties", {})}
-    rule = schema["additionalProperties"]
-    if isinstance(rule, bool):
-        return rule or not others
-    return all(accepts(rule, one) for one in others.values())
+    rule, known = schema["additionalProperties"], schema.get("properties", {})
+    others = [one for key, one in value.items() if key not in known]
+    return (rule or not others) if isinstance(rule, bool) else all(accepts(rule, x) for x in others)
 
 
 def _target(schema: Any) -> Any:
-    name = schema["$ref"].removeprefix("#/$defs/")
-    return SCHEMA["$defs"][name]
+    return SCHEMA["$defs"][schema["$ref"].removeprefix("#/$defs/")]
 
 
-def _limit(word: str, holds: Any) -> Any:
-    return lambda schema, value: not isinstance(value, int | float) or holds(value, schema[word])
+def _of(kind: Any, word: str, holds: Any) -> Any:
+    """What a word says of values of a kind alone."""
+    return lambda schema, value: not isinstance(value, kind) or holds(value, schema[word])
 
 
 WORDS = {
     "type": _has_type,
-    "properties": lambda schema, value: not isinstance(value, dict) or _properties(schema, value),
-    "additionalProperties": lambda schema, value: (
-        not isinstance(value, dict) or _additional(schema, value)
+    "properties": _of(
+        dict,
+        "properties",
+        lambda value, known: all(accepts(known[key], value[key]) for key in known.keys() & value),
     ),
-    "required": lambda schema, value: (
-        not isinstance(value, dict) or set(schema["required"]) <= value.keys()
-    ),
-    "items": lambda schema, value: (
-        not isinstance(value, list) or all(accepts(schema["items"], one) for one in value)
-    ),
-    "minItems": lambda schema, value: (
-        not isinstance(value, list) or len(value) >= schema["minItems"]
-    ),
-    "maxItems": lambda schema, value: (
-        not isinstance(value, list) or len(value) <= schema["maxItems"]
-    ),
-    "minimum": _limit("minimum", operator.ge),
-    "maximum": _limit("maximum", operator.le),
-    "exclusiveMinimum": _limit("exclusiveMinimum", operator.gt),
-    "exclusiveMaximum": _limit("exclusiveMaximum", operator.lt),
+    "additionalProperties": lambda s, value: not isinstance(value, dict) or _additional(s, value),
+    "required": _of(dict, "required", lambda value, keys: {*keys} <= value.keys()),
+    "items": _of(list, "items", lambda value, each: all(accepts(each, one) for one in value)),
+    "minItems": _of(list, "minItems", lambda value, least: len(value) >= least),
+    "maxItems": _of(list, "maxItems", lambda value, most: len(value) <= most),
+    "minimum": _of(int | float, "minimum", operator.ge),
+    "maximum": _of(int | float, "maximum", operator.le),
+    "exclusiveMinimum": _of(int | float, "exclusiveMinimum", operator.gt),
+    "exclusiveMaximum": _of(int | float, "exclusiveMaximum", operator.lt),
     "anyOf": lambda schema, value: any(accepts(one, value) for one in schema["anyOf"]),
     "oneOf": lambda schema, value: sum(accepts(one, value) for one in schema["oneOf"]) == 1,
     "allOf": lambda schema, value: all(accepts(one, value) for one in schema["allOf"]),
@@ -498,7 +470,7 @@ WORDS = {
 }
 
 
-@given(arm=any_arms())
+@given(arm=named_arms())
 def test_the_schema_accepts_every_saved_design(arm):
     assert accepts(SCHEMA, tomllib.loads(arm.to_toml()))
 
@@ -508,37 +480,21 @@ def test_the_schema_accepts_the_designs_of_the_repository(path: Path):
     assert accepts(SCHEMA, tomllib.loads(path.read_text(encoding="utf-8")))
 
 
-def test_the_schema_accepts_a_short_file():
-    assert accepts(SCHEMA, tomllib.loads(BODY + FIBER))
-
-
 @pytest.mark.parametrize(
     ("good", "bad"),
     [
         ("extent_deg", "extent"),
         ("20.0", "400.0"),
-        ("20.0", "'wide'"),
-        ("10.0", "-90"),
-        ("inner_ratio = 0.5", "inner_ratio = 1.0"),
-        ("inner_ratio = 0.5", ""),
-        ("version = 2", ""),
-        ("version = 2", "version = 3"),
-        ("version = 2", "version = 2\nlength_m = 1.0"),
-        ("outer_radius_m", "radii_m"),
         ("length_m = 1.0", "length_m = 0.0"),
-        ("length_m", "kind = 'round', length_m"),
+        ("inner_ratio = 0.5", "inner_ratio = 1.0"),
+        ("version = 2", "version = 3"),
         ('"fiber"', '"tendon"'),
-        ("10.0", "{ stations_over_length = [0, 1], value = [1, 2] }"),
         ("10.0", "{ stations_over_length = [0, 1], values = [1, 92] }"),
     ],
 )
 def test_the_schema_refuses_what_the_reader_refuses(good, bad):
-    assert good in BODY + FIBER
+    assert accepts(SCHEMA, tomllib.loads(BODY + FIBER))
     assert not accepts(SCHEMA, tomllib.loads((BODY + FIBER).replace(good, bad, 1)))
-
-
-def test_the_schema_refuses_a_file_full_of_faults():
-    assert not accepts(SCHEMA, tomllib.loads(BAD_FILE))
 
 
 def test_every_key_that_has_a_unit_says_what_it_is():

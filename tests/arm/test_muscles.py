@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -130,27 +128,6 @@ def test_an_oblique_muscle_is_a_fiber_that_does_not_wind(angle, offset, extent):
     )
 
 
-def test_oblique_muscles_of_both_hands_cancel_their_twist_and_bend_together():
-    pair = [
-        ObliqueMuscle(name=name, helical_angle=angle, extent=0.9, offset=0.2)
-        for name, angle in (("right", 0.8), ("left", -0.8))
-    ]
-    table = tables(arm(*pair), [0.0, 0.5])
-    together = table.curvature.sum(axis=2)
-    np.testing.assert_allclose(together[:, 2], 0.0, atol=1e-14)
-    np.testing.assert_allclose(together[:, :2], 2 * table.curvature[:, :2, 0], rtol=1e-13)
-    assert np.abs(table.curvature[:, 2, 0]).min() > 1.0
-
-
-def test_a_radial_muscle_all_around_makes_the_arm_longer_and_no_more():
-    """It contracts the girth; ν times that, in the share of the section it fills, is length."""
-    muscle = arm(RadialMuscle(extent=2 * math.pi))
-    table = tables(muscle, [0.0, 0.5])
-    np.testing.assert_allclose(table.extension, -0.4 * (1 - 0.6**2) / 2 * 2, rtol=1e-13)
-    np.testing.assert_allclose(table.curvature, 0.0, atol=1e-14)
-    assert sr.tip_positions(muscle, [[-0.5]])[0, 2] > 1.0
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -161,17 +138,8 @@ def test_a_radial_muscle_all_around_makes_the_arm_longer_and_no_more():
             r"helical_angle = Pieces\(.*must be a finite number",
         ),
         (
-            lambda: RadialMuscle(extent=1.0, ring=1.0),
-            "ring = 1: must be the index, from 0, or the name",
-        ),
-        (lambda: RadialMuscle(extent=1.0, ring=-1), "ring = -1: must be the index, from 0"),
-        (
             lambda: arm(RadialMuscle(extent=1.0, ring="skin", name="m")),
             r"^m.ring = 'skin': must be one of the section's rings: 0$",
-        ),
-        (
-            lambda: arm(RadialMuscle(extent=1.0, ring=1, name="m")),
-            r"^m.ring = 1: must be one of the section's rings: 0$",
         ),
     ],
 )
@@ -181,30 +149,6 @@ def test_an_impossible_muscle_is_refused(make, message):
 
 
 # Fiber architectures: what is refused, how they wind, where their bundles lie, how they split
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"bundles": True}, "whole number >= 1"),
-        ({"revolution": 1.0, "helical_angle": 0.2}, "exactly one of helical_angle and revolution"),
-        ({"revolution": None, "helical_angle": None}, "exactly one"),
-        ({"name": 3}, "name = 3: must be text"),
-        ({"activation_bounds": (1, 0)}, "lower <= upper"),
-        ({"activation_bounds": ((-1, 0),) * 2}, "must be one pair"),
-        ({"activation_bounds": ("a", "b")}, "must be a pair"),
-    ],
-)
-def test_an_impossible_fiber_is_refused(change, message):
-    with pytest.raises(sr.InvalidDesign, match=message):
-        sr.FiberArchitecture(**({"extent": 0.5, "helical_angle": 0.1} | change))
-
-
-def test_replacing_an_angle_by_a_revolution_and_back():
-    fiber = sr.FiberArchitecture(helical_angle=0.1, extent=0.5)
-    wound = fiber.replace(revolution=1.0)
-    assert (wound.helical_angle, wound.revolution) == (None, 1.0)
-    assert wound.replace(helical_angle=0.1) == fiber
 
 
 @given(arm=arms())

@@ -30,11 +30,6 @@ def tip(arm: sr.Manipulator, *activation: float) -> np.ndarray:
     return sr.tip_positions(arm, [activation], tol=1e-12)[0]
 
 
-def about_z(angle: float) -> np.ndarray:
-    cos, sin = math.cos(angle), math.sin(angle)
-    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_no_activation_shortens_a_named_design_to_nothing_or_folds_it_without_a_warning(name):
     arm = named(name)
@@ -85,16 +80,6 @@ def test_the_arm_of_the_laboratory_is_its_own_mirror_image():
     )
 
 
-def test_the_filament_turns_with_its_sectors():
-    """A third of a turn moves each activation on to the next sector."""
-    arm = designs.filament()
-    gamma = in_box(arm, 5)
-    turned = sr.tip_positions(arm, np.roll(gamma, 1, axis=1), tol=1e-10)
-    np.testing.assert_allclose(
-        turned, sr.tip_positions(arm, gamma, tol=1e-10) @ about_z(2 * math.pi / 3).T, atol=1e-9
-    )
-
-
 def test_the_right_and_left_muscles_of_the_trunk_are_mirror_images():
     arm = designs.elephant_trunk()
     swapped = [k ^ 1 for k in range(arm.bundles)]
@@ -140,26 +125,9 @@ def test_a_tendon_bends_the_robot_to_a_circle():
     np.testing.assert_allclose(tip(arm, 8, 0, 0), circle, rtol=0, atol=1e-12)
 
 
-def test_the_second_segment_stays_straight_under_the_tendons_of_the_first():
-    two, one = designs.three_tendon_robot(segments=2), designs.three_tendon_robot()
-    shape = sr.configuration(two, [5, 0, 2, 0, 0, 0], stations=[0.2, 0.4], tol=1e-12)
-    middle, end = shape.position.values
-    np.testing.assert_allclose(middle, tip(one, 5, 0, 2), rtol=0, atol=1e-12)
-    straight = middle + 0.2 * shape.directors.values[0, 2]
-    np.testing.assert_allclose(end, straight, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("segments", [0, 3, 1.5, True, "two"])
-def test_a_robot_of_another_number_of_segments_is_refused(segments):
+def test_a_robot_of_another_number_of_segments_is_refused():
     with pytest.raises(sr.InvalidInput, match="segments"):
-        designs.three_tendon_robot(segments=segments)
-
-
-def test_the_next_helical_tendon_does_the_same_a_quarter_turn_on():
-    arm = designs.helical_tendon_robot()
-    first, second = tip(arm, 15, 0, 0, 0), tip(arm, 0, 15, 0, 0)
-    assert np.linalg.norm(first[:2]) > 1e-3
-    np.testing.assert_allclose(second, about_z(math.pi / 2) @ first, rtol=0, atol=1e-10)
+        designs.three_tendon_robot(segments=3)
 
 
 def test_a_helical_tendon_bends_by_the_offset_and_the_slope_of_its_route():
@@ -182,13 +150,6 @@ def test_a_chamber_bends_the_pneumatic_arm_to_a_circle_away_from_it():
     angle = curvature * 0.15
     circle = [0, -radius * (1 - math.cos(angle)), radius * math.sin(angle)]
     np.testing.assert_allclose(tip(arm, pressure, 0, 0), circle, rtol=0, atol=1e-12)
-
-
-def test_equal_pressures_stretch_the_pneumatic_arm():
-    arm = designs.three_chamber_arm()
-    stretch = 3 * 1e5 * math.pi * 0.004**2 / arm.section.stiffness(0.0125).axial
-    stretched = 0.15 * (1 + float(stretch))
-    np.testing.assert_allclose(tip(arm, 1e5, 1e5, 1e5), [0.0, 0.0, stretched], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", NAMES)

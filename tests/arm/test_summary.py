@@ -136,60 +136,11 @@ def test_bending_beyond_the_theory_and_large_activations_are_warned_of():
     assert design_warnings(single(activation_bounds=(-0.9, 0.0))) == ()
 
 
-@pytest.mark.parametrize("bounds", [(-0.8, -0.3), (-0.5, 0.2), (-0.4, -0.4)])
-def test_the_range_of_curvature_is_that_of_all_activations(trunk, bounds):
-    arm = trunk.with_bounds(bounds)
-    ticks = np.linspace(*bounds, 13)
-    gamma = np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3)
-    u = tables(arm, np.linspace(0, 1, 11)).curvature[:, :2] @ gamma.T
-    kappa = np.linalg.norm(u, axis=1)
-    low, high = describe(arm).curvature
-    assert low <= kappa.min() + 1e-9
-    assert kappa.min() - low < 0.2
-    assert kappa.max() == pytest.approx(high, rel=1e-5)
-
-
-@given(arm=arms())
-def test_a_summary_is_that_of_the_parts(arm):
-    facts = describe(arm)
-    assert facts.base_radius == arm.profile.outer_radius
-    assert facts.tip_radius == arm.profile.radius(arm.length)
-    assert facts.radius_ratio == arm.section.rings[0].inner_ratio
-    assert facts.taper_ratio == facts.base_radius / facts.tip_radius
-    assert facts.extension == extension_range(arm)
-    assert facts.warnings == design_warnings(arm)
-
-
 def test_a_summary_prints_equal_neighbors_once():
     summary = describe(designs.three_tendon_robot())
     lines = str(summary).splitlines()
     assert "bundle strain     3 × -0.07866 to 0" in lines
     assert lines[-len(summary.validity) :] == list(summary.validity)
-
-
-def test_a_design_beyond_the_theory_has_no_summary(trunk):
-    with pytest.raises(sr.InvalidDesign, match="must keep ζ > 0"):
-        describe(trunk.with_bounds((-9.0, 0.0)))
-
-
-def test_the_summary_of_twice_as_many_bundles_costs_twice_as_much(trunk, monkeypatch):
-    """Each bundle alone is asked about without the others."""
-    asked = []
-    plain = softreach.arm.tables._resultants
-    monkeypatch.setattr(
-        softreach.arm.tables, "_resultants", lambda *a: asked.append(1) or plain(*a)
-    )
-
-    def calls(count: int) -> int:
-        arm = trunk.split("longitudinal", count)
-        arm = arm.with_bounds((-0.01, 0.0))
-        asked.clear()
-        bending_over_bounds.cache_clear()
-        describe(arm)
-        return len(asked)
-
-    ten, twenty, forty = map(calls, (10, 20, 40))
-    assert forty - twenty == 2 * (twenty - ten)
 
 
 # Laws of the range of bending: zonogons against all corners, their extremes along the arm
@@ -294,36 +245,6 @@ def test_an_arm_that_can_rest_can_be_straight(trunk):
 
 
 @given(arm=arms())
-def test_the_map_is_the_papers_equations_of_extension_and_curvature(arm):
-    """Section 2: a0, a1, b1 summed over bundles, with δ from the integrals."""
-    z = np.linspace(0, arm.length, 5)
-    gamma = in_box(arm, 1)[0]
-    table = tables(arm, z)
-    radius, ring = arm.profile.radius(z), arm.section.rings[0]
-    nu = ring.material.poisson_ratio
-    zeta, u = np.ones(5), np.zeros((5, 3))
-    bundle = iter(gamma)
-    for fiber in arm.fibers:
-        alpha = fiber.helical_angle_on(arm.profile, arm.section)
-        i0, i1, i3 = ring_integrals(ring.inner_ratio, arm.profile.taper, alpha, nu)
-        d0, d1, d3 = 4 * radius**2 * i0, 6 * radius**3 * i1, 6 * radius**3 * i3
-        turn = math.tan(alpha) * arm.profile.surface_coordinate(z)
-        for j in range(fiber.bundles):
-            g = next(bundle)
-            theta = fiber.offset + 2 * math.pi * j / fiber.bundles
-            a0 = fiber.extent / math.pi * g
-            chord = 2 * math.sin(fiber.extent / 2) / math.pi * g
-            a1, b1 = chord * math.cos(theta), chord * math.sin(theta)
-            size, phase = np.hypot(a1, b1), -np.arctan2(b1, a1)
-            zeta += d0 * a0 / (4 * radius**2)
-            u[:, 0] += -2 / (3 * radius**4) * d1 * size * np.sin(phase - turn)
-            u[:, 1] += -2 / (3 * radius**4) * d1 * size * np.cos(phase - turn)
-            u[:, 2] += 2 * (1 + nu) / (3 * radius**4) * d3 * a0
-    np.testing.assert_allclose(1 + table.extension @ gamma, zeta, rtol=1e-12)
-    np.testing.assert_allclose(table.curvature @ gamma, u, rtol=1e-9, atol=1e-11 / arm.length)
-
-
-@given(arm=arms())
 def test_the_range_of_extension_holds_every_sample(arm):
     corners = np.array(list(itertools.islice(itertools.product(*arm.bounds), 1024)))
     gamma = np.concatenate([in_box(arm, 200), corners])
@@ -402,21 +323,6 @@ def test_torsion_is_odd_and_the_rest_even_in_the_helical_angle(alpha, phi):
     np.testing.assert_array_equal(plus.torsion, -minus.torsion)
 
 
-@pytest.mark.parametrize("alpha_deg", [0, 45, 80, 88])
-@pytest.mark.parametrize("rho", [0.01, 0.5, 0.99])
-def test_quadrature_is_converged_to_rounding(rho, alpha_deg):
-    from scipy.integrate import quad
-
-    alpha, phi, nu = math.radians(alpha_deg), 0.1, 0.5
-
-    def k(x):
-        cone, helix = 1 + (x * math.tan(phi)) ** 2, 1 + (x * math.tan(alpha)) ** 2
-        return (1 + nu) / (cone * helix) - nu
-
-    exact = [quad(lambda x, p=p: x**p * k(x), rho, 1, epsabs=1e-14, limit=200)[0] for p in (1, 2)]
-    np.testing.assert_allclose(ring_integrals(rho, phi, alpha, nu)[:2], exact, atol=2e-13)
-
-
 def by_adaptive_quadrature(rho, phi, alpha, nu):
     """I0, I1, I3 in v = log x, decade by decade: what is near the axis gets as many nodes."""
     from scipy.integrate import quad
@@ -445,7 +351,7 @@ def by_adaptive_quadrature(rho, phi, alpha, nu):
 
 @pytest.mark.parametrize("rho", [0.0, 0.01, 0.049, 0.051, 0.5])
 @pytest.mark.parametrize("nu", [0.0, 0.5])
-@pytest.mark.parametrize("to_circumferential", [0.1, 0.05, 0.01, 1e-3, 1e-6, 1e-8])
+@pytest.mark.parametrize("to_circumferential", [1.57, 0.8, 0.1, 0.05, 0.01, 1e-3, 1e-6, 1e-8])
 def test_fibers_that_nearly_wind_around_the_axis_keep_all_digits(rho, nu, to_circumferential):
     alpha = math.pi / 2 - to_circumferential
     for phi in (0.0, 0.5):

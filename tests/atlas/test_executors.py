@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import textwrap
@@ -25,15 +24,6 @@ def test_shards_share_a_store_and_together_make_the_whole(whole, tmp_path):
     assert_same(build16(store, shard=(1, 2)).load(), whole)
     with pytest.raises(InvalidInput, match="shard = 2/2"):
         build16(store, shard=(2, 2))
-
-
-@pytest.mark.large
-def test_shards_may_start_at_the_same_moment(whole, tmp_path):
-    store = tmp_path / "a.zarr"
-    body = "build(sys.argv[1], shard=(int(sys.argv[2]), 2))"
-    tasks = [run_script(tmp_path, body, str(store), str(k)) for k in range(2)]
-    assert [ended(task)[1] for task in tasks] == ["", ""]
-    assert_same(open_atlas(store).load(), whole)
 
 
 def test_an_executor_of_threads_gives_the_same_numbers(whole, tmp_path):
@@ -134,46 +124,6 @@ def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     assert process.returncode == 0
     assert (tmp_path / "task.died").exists()
     assert_same(open_atlas(store).load(), whole)
-
-
-SBATCH = """#!/bin/sh
-while [ $# -gt 1 ]; do shift; done
-cp "$1" "$0.job"  # as SLURM does: who submits removes the script at once
-setsid sh "$0.job" > "$0.log" 2>&1 &
-echo $! > "$0.pid"
-echo Submitted batch job 1
-"""
-
-
-@pytest.mark.large
-def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
-    """A SLURM of this machine stands in for a cluster."""
-    pytest.importorskip("dask_jobqueue")
-    commands = tmp_path / "bin"
-    commands.mkdir()
-    for name, text in (("sbatch", SBATCH), ("scancel", "#!/bin/sh\nexit 0\n")):
-        (commands / name).write_text(text)
-        (commands / name).chmod(0o755)
-    monkeypatch.setenv("PATH", str(commands), prepend=":")
-    body = """
-        if __name__ == "__main__":
-            from dask_jobqueue import SLURMCluster
-            from distributed import Client
-            options = {"log_directory": sys.argv[2], "local_directory": sys.argv[2]}
-            options |= {"scheduler_options": {"dashboard_address": ":0"}, "interface": "lo"}
-            queue = SLURMCluster(cores=1, processes=1, memory="4GB", walltime="1:00:00", **options)
-            queue.scale(1)
-            with queue, Client(queue) as client:
-                build(sys.argv[1], executor=client)
-    """
-    process = run_script(tmp_path, body, str(tmp_path / "a.zarr"), str(tmp_path / "jobs"))
-    try:
-        said = ended(process)[1]
-    finally:
-        with contextlib.suppress(OSError):
-            os.killpg(int((commands / "sbatch.pid").read_text()), signal.SIGKILL)
-    assert process.returncode == 0, said
-    assert_same(open_atlas(tmp_path / "a.zarr").load(), whole)
 
 
 def test_workers_refuse_a_store_in_the_memory_of_another_process(process):

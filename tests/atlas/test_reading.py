@@ -25,7 +25,6 @@ from softreach.atlas import (
 )
 from softreach.atlas.executor import begin_design
 from softreach.atlas.metrics import METRIC_GROUPS
-from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command
 from softreach.cli.app import run
@@ -370,19 +369,6 @@ def test_the_command_line_writes_the_unit_behind_the_path(tmp_path, capsys):
     assert (found[f"{MODULUS}_pa"], found[END]) == ([2e5], [0.5])
 
 
-@pytest.mark.parametrize(
-    "table",
-    [
-        f'"{MODULUS}_pa" = [1e5, 2e5]\nleft.end_over_length = "0.5:1:2"',
-        '"rings[0]".material.young_modulus_pa = [1e5, 2e5]\n"left.end_over_length" = [0.5, 1]',
-    ],
-)
-def test_a_file_names_the_same_paths(table):
-    parsed = parse_space(f"[parameters]\n{table}", lambda _: sr.designs.minimal_trunk())
-    assert parsed == space()
-    assert DesignSpace.from_dict(space().to_dict()) == space()
-
-
 def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
     pytest.importorskip("matplotlib")
     from softreach.plot.atlas import plot_metric_map, sheet_axes
@@ -392,17 +378,6 @@ def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
     assert across.label == "E of rings[0].material (Pa)"
     assert up.label == "Z₁/L of left"
     assert plot_metric_map(atlas, "reach_height").get_xlabel() == across.label
-
-
-def test_designs_that_no_arm_can_have_are_known_before_anything_runs(tmp_path):
-    names = {"rings[0].inner_ratio": [0.5, 1.0], "rings[0].material.poisson_ratio": [0.4, 0.6]}
-    grid = DesignSpace.grid(sr.designs.minimal_trunk(), **names)
-    assert list(grid.gaps) == [1, 2, 3]
-    assert grid.gaps[3].count("must be") == 2
-    impossible = DesignSpace.grid(grid.base, **{"rings[0].inner_ratio": [1.0]})
-    with pytest.raises(InvalidInput, match="valid for at least one design"):
-        sr.build_atlas(impossible, tmp_path / "a.zarr", **TINY)
-    assert not (tmp_path / "a.zarr").exists()
 
 
 def test_one_number_is_not_varied_under_two_names():

@@ -360,32 +360,6 @@ def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatc
     assert atlas_status(store).messages == {}
 
 
-@pytest.mark.large
-def test_a_full_disk_costs_one_line_and_the_rest_can_be_resumed(tmp_path):
-    store = tmp_path / "a.zarr"
-    body = """
-        import resource
-        store = sys.argv[1]
-        if len(sys.argv) > 2:  # tips no longer fit into any file
-            from softreach.atlas.store import AtlasStore
-            AtlasStore.open(store).cube
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, -1))
-        shard = (0, 1) if len(sys.argv) > 2 else (0, 8)
-        from softreach.support.errors import SoftreachError
-        try:
-            build(store, shard=shard)
-        except SoftreachError as error:
-            sys.exit(str(error))
-    """
-    assert ended(run_script(tmp_path, body, str(store))) == (None, "")
-    _, said = ended(run_script(tmp_path, body, str(store), "full"))
-    assert said.count("\n") == 1
-    assert "cannot be written: File too large; what is done is safe" in said
-    assert atlas_status(store).done == 2
-    assert build16(store).volume.notnull().all()
-
-
 def test_trouble_of_the_disk_is_not_blamed_on_the_design(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")

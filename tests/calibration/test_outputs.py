@@ -109,13 +109,6 @@ def test_an_outlier_leaves_the_scale_of_a_picture_to_the_others():
     assert "1 beyond" in [text.get_text() for text in figure.axes[2].texts]
 
 
-def test_a_picture_of_something_else_is_refused(result):
-    pytest.importorskip("matplotlib")
-    for other in (ARM, type(result)):
-        with pytest.raises(InvalidInput, match="what `calibrate` returned"):
-            sr.plot.plot_calibration(other)
-
-
 def test_the_command_writes_what_python_finds(folder, capsys):
     arguments = ["calibrate", "arm.toml", "poses.csv", *FREE, "--no-rivals", "--hold-out", "0.2"]
     assert run([*arguments, "-o", "bench.toml", "--json"]) == 0

@@ -44,17 +44,11 @@ def uneven(n, m, seed=0):
     return points, rng.normal(size=(n, m))
 
 
-@pytest.mark.parametrize("m", [3, 4])
-@pytest.mark.parametrize("radius", [0.0, 1e-9, 0.02, 0.2, 1.0, 200.0, np.inf])
+@pytest.mark.parametrize("m", [1, 4])
+@pytest.mark.parametrize("radius", [0.0, 1e-9, 0.2, 200.0, np.inf])
 def test_equals_a_loop_over_all_pairs(m, radius):
     points, values = uneven(2000, m)
     assert_same(mean_value_distance(points, values, radius), by_all_pairs(points, values, radius))
-
-
-@pytest.mark.parametrize("m", [1, 2, 7])
-def test_values_may_have_any_number_of_components(m):
-    points, values = uneven(300, m)
-    assert_same(mean_value_distance(points, values, 0.3), by_all_pairs(points, values, 0.3))
 
 
 @given(
@@ -105,23 +99,7 @@ def test_an_isolated_point_has_no_mean():
     np.testing.assert_allclose(mean, [np.nan, np.sqrt(2), np.sqrt(2)])
 
 
-@pytest.mark.parametrize("radius", [0.0, 1.0])
-def test_one_point_is_isolated(radius):
-    mean, count = mean_value_distance(np.ones((1, 3)), np.ones((1, 3)), radius)
-    assert np.isnan(mean[0])
-    assert count[0] == 0
-
-
-def test_neighbors_come_from_all_points_whatever_the_queries():
-    points, values = uneven(2000, 3)
-    everywhere = mean_value_distance(points, values, 0.1)
-    queries = np.array([1999, 3, 3, 700, 0])
-    found = mean_value_distance(points, values, 0.1, queries)
-    np.testing.assert_array_equal(found[0], everywhere[0][queries])
-    np.testing.assert_array_equal(found[1], everywhere[1][queries])
-
-
-@pytest.mark.parametrize("radius", [0.0, 1e-9, 0.02, 0.2, 1.0, 200.0, np.inf])
+@pytest.mark.parametrize("radius", [0.0, 0.02, 200.0, np.inf])
 @pytest.mark.parametrize("flat", [False, True])
 def test_a_few_queries_of_many_points_equal_a_loop_over_all_pairs(radius, flat):
     points, values = uneven(120_000, 3)
@@ -221,11 +199,6 @@ def test_alpha_shapes_full_of_holes_come_apart_too(rng):
     assert (faces_at_edges(triangles) == 1).all()
     assert enclosed_volume(points, triangles) == pytest.approx(hull.volume, rel=1e-3)
     assert np.isfinite(points).all()
-
-
-def test_an_open_surface_is_as_it_was():
-    vertices, faces = wedges(2)
-    assert len(parted(vertices, faces[:-1])[1]) == len(faces) - 1
 
 
 # Curves in which a plane cuts a surface

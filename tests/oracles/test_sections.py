@@ -46,20 +46,6 @@ def test_a_core_and_a_ring_resist_as_their_polynomials():
     np.testing.assert_allclose(resists, [*expected, mass], rtol=1e-13)
 
 
-def test_three_overlapping_rings_are_the_laboratory_s_arm():
-    outer = 0.09 / 20
-    ring = Layer(
-        inner=outer * 5 / 6, outer=outer, young_modulus=1.4e6 * 48 / 360, poisson_ratio=0.495
-    )
-    core = Layer(outer=outer * 5 / 6, young_modulus=0.1278e6, poisson_ratio=0.5)
-    resists = stiffness([core, ring, ring, ring])
-    np.testing.assert_allclose(
-        [resists.axial, resists.bending_1, resists.torsion],
-        [16.53165, 1.132275e-4, 7.569322e-5],
-        rtol=5e-7,
-    )
-
-
 def test_a_straight_muscle_pulls_with_the_modulus_times_its_area_moments():
     force, moment = active_load(Drive(layer=RING, sector=SECTOR, direction=along))
     area = (0.05**2 - 0.03**2) / 2 * (SECTOR[1] - SECTOR[0])

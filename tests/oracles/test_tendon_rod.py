@@ -76,21 +76,6 @@ def test_distributed_tendon_loads_balance_as_the_cut_part_does():
     np.testing.assert_allclose(walked.curvature, direct[:, :3], atol=1e-8)
 
 
-def test_frames_stay_orthonormal_and_start_at_the_base():
-    shape = follower_shape(TAPERED, [HELIX], np.linspace(0, LENGTH, 5))
-    gram = shape.frame @ shape.frame.transpose(0, 2, 1)
-    np.testing.assert_allclose(gram, np.broadcast_to(np.eye(3), gram.shape), atol=1e-10)
-    np.testing.assert_allclose(shape.frame[0], np.eye(3), atol=1e-10)
-    np.testing.assert_allclose(shape.place[0], 0, atol=1e-12)
-
-
-def test_turning_the_tendons_turns_the_shape():
-    turned = replace(HELIX, angle=lambda z: 0.6 + 1.1 + 7.0 * z)
-    before, after = (follower_shape(ROD, [tendon], [LENGTH]).place[0] for tendon in (HELIX, turned))
-    c, s = math.cos(1.1), math.sin(1.1)
-    np.testing.assert_allclose(after, [[c, -s, 0], [s, c, 0], [0, 0, 1]] @ before, atol=1e-10)
-
-
 def test_the_linear_law_is_that_of_the_follower_load_for_parallel_tendons():
     exact = follower_shape(TAPERED, [STRAIGHT], [0.2, LENGTH])
     linear = linear_shape(TAPERED, [STRAIGHT], [0.2, LENGTH])

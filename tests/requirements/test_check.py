@@ -256,16 +256,6 @@ def test_what_is_refused_at_once_is_missed_by_at_least_as_much(arm, seed):
         assert finding.excess <= found[finding.name].excess + 1e-9
 
 
-def test_no_tip_is_farther_than_the_longest_arm():
-    from softreach.requirements.findings import longest_reach
-
-    arm = ARM.with_bounds((0.0, 0.8))  # which lengthens
-    tips = sr.tip_positions(arm, np.full((1, 3), 0.8))
-    straight = sr.designs.minimal_trunk()
-    assert np.linalg.norm(tips) <= longest_reach(arm)
-    assert longest_reach(straight) == pytest.approx(straight.length, rel=1e-5)
-
-
 def test_many_places_are_met_in_blocks_that_change_nothing(monkeypatch):
     from softreach.requirements import poses
 
@@ -371,9 +361,6 @@ def test_a_check_passes_on_what_sets_warn_of(monkeypatch):
     with pytest.warns(SoftreachWarning, match="rough"):
         sr.check(ARM, needs, accuracy=0.1)
     checks.quick_check(ARM, needs, 0.1)  # on the way of a search nothing is said
-
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 @pytest.fixture

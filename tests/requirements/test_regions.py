@@ -143,11 +143,3 @@ def test_faces_that_look_inward_are_turned():
     turned = Mesh(mesh.vertices, mesh.faces[:, ::-1])
     assert turned.distance([[0.1, 0.2, 0.3]])[0] < 0
     assert turned.volume == pytest.approx(BOX.volume)
-
-
-def test_a_mesh_comes_from_a_file_in_its_unit(tmp_path):
-    trimesh = pytest.importorskip("trimesh")
-    trimesh.creation.box(extents=(10, 20, 30)).export(tmp_path / "part.stl")
-    mesh = Mesh.load(tmp_path / "part.stl", unit="mm")
-    assert mesh.volume == pytest.approx(6e-6)
-    assert len(mesh.vertices) == 8

@@ -145,19 +145,6 @@ def test_an_impossible_box_is_refused(bounds, names, message):
         ActivationBox.between(bounds, names)
 
 
-@pytest.mark.parametrize(
-    ("activations", "message"),
-    [
-        (np.zeros((3, 3)), r"activations.shape = \(3, 3\): must be .*of shape \(n, 2\)"),
-        (np.zeros((1, 1, 2)), r"activations.shape = \(1, 1, 2\)"),
-        ([[0, 0], [0, np.nan]], r"activations\[1\] = .*finite numbers"),
-    ],
-)
-def test_what_is_no_activation_is_refused(activations, message):
-    with pytest.raises(InvalidInput, match=message):
-        ActivationBox.between([[-1, 0], [-1, 0]], "ab").check(activations)
-
-
 def test_activations_outside_the_bounds_are_taken_as_they_are():
     box = ActivationBox.between([[-1, 0], [-1, 0]], "ab")
     np.testing.assert_array_equal(box.check([[-5, 5]]), [[-5.0, 5.0]])

@@ -24,7 +24,7 @@ from softreach.rod.loaded.tables import ArmBody, LoadTables
 from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidInput
-from tests.bodies import Uniform, oracle_rod, rubber, uniform
+from tests.bodies import Uniform, oracle_rod, rubber, uniform, weighed
 from tests.oracles import column, elastica
 from tests.oracles.chain import Chain
 
@@ -189,15 +189,6 @@ def test_an_asymmetry_within_the_tolerance_is_none():
     assert every.is_ring.tolist() == [True, False]
 
 
-def test_turning_gravity_and_the_arm_changes_nothing_but_the_directions():
-    tilt = np.radians(20)
-    there = trunk(25.0, (9.81 * np.sin(tilt), 0.0, -9.81 * np.cos(tilt)))
-    back = trunk(25.0, (-9.81 * np.sin(tilt), 0.0, -9.81 * np.cos(tilt)))
-    one, other = (sr.equilibria(arm, np.zeros(3)) for arm in (there, back))
-    np.testing.assert_allclose(one.tips * [-1, 1, 1], other.tips, atol=1e-6)
-    np.testing.assert_array_equal(one.status, other.status)
-
-
 @pytest.mark.parametrize("restrict", [free_bundles, with_unstable])
 def test_those_of_a_view_are_those_of_the_arm(restrict):
     arm = trunk(12.0, arm=TRUNK.with_bounds([(-5 / 3, 0), (-0.5, -0.5), (-5 / 3, 0)]))
@@ -348,12 +339,6 @@ NOTHING = (0.0, 0.0, 0.0)
 def held(arm):
     """The arm with every activation bound to zero, so that its tip asks for few steps."""
     return arm.with_bounds(np.zeros((arm.bundles, 2)))
-
-
-def weighed(arm, load, gravity):
-    """The arm with E such that its load number is `load`."""
-    young = 1000 * 9.81 * arm.length**3 / (load * arm.profile.outer_radius**2)
-    return rubber(arm, Loads(gravity=gravity), young)
 
 
 @pytest.mark.parametrize("arm", [CYLINDER, STIFF_TRUNK], ids=["cylinder", "trunk"])

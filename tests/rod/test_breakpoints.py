@@ -148,14 +148,6 @@ def test_the_order_of_the_integrator_stays_across_breakpoints():
     np.testing.assert_allclose(found, 6.0, atol=0.3)
 
 
-def test_steps_across_breakpoints_would_lose_the_order():
-    """Uniform steps in S, as on an arm without breakpoints, are at first order or near it."""
-    arm = broken()
-    rule = FreeRod(arm).rule
-    uniform = np.linspace(0.0, arm.profile.slender_length, 24)
-    assert orders(rule, uniform, in_box(arm, 20), times=3).mean() < 3.0
-
-
 @pytest.mark.parametrize("gone", range(len(BREAKS)))
 def test_no_breakpoint_can_be_left_out(gone):
     """Without any one of them as a boundary the error is larger many times."""
@@ -177,14 +169,6 @@ def walk():
     arm = broken()
     ends = np.array([0.0, *arm.breakpoints, 0.95, arm.length])
     return ends, walked(arm, in_box(arm, 1)[0], ends)
-
-
-def test_the_tip_is_that_of_the_rod_equations_walked_piece_by_piece(walk):
-    arm = broken()
-    gamma, expected = in_box(arm, 1), walk[1][-1, :3]
-    for tol in (1e-4, 1e-6, 1e-9):
-        error = np.linalg.norm(sr.tip_positions(arm, gamma, tol=tol)[0] - expected)
-        assert error <= tol * arm.length
 
 
 @given(arm=any_arms(), tol=st.sampled_from([1e-4, 1e-6, 1e-8]))
@@ -239,14 +223,6 @@ def test_steps_end_at_breakpoints_that_no_station_asks_for(walk, tol):
     assert missed.max() <= tol
 
 
-def test_frames_are_orthonormal_at_breakpoints():
-    arm = broken()
-    z = np.union1d(arm.breakpoints, np.linspace(0, 1, 11))
-    frames = FreeRod(arm, 1e-6).frames(in_box(arm, 5), z).directors
-    gram = np.einsum("...ij,...kj->...ik", frames, frames)
-    np.testing.assert_allclose(gram, np.broadcast_to(np.eye(3), gram.shape), atol=1e-13)
-
-
 def test_strains_at_a_breakpoint_are_those_of_the_piece_that_begins_there():
     """At the base too; and at the tip those of the piece that ends."""
     arm = broken()
@@ -262,18 +238,6 @@ def test_strains_at_a_breakpoint_are_those_of_the_piece_that_begins_there():
     assert min(jumps[end] for end in (0.5, 0.55)) > 1e-3  # kinks of routing and angle
     last = rod.strains(in_box(arm, 1), [1 - 1e-12, 1.0]).curvature[0]
     np.testing.assert_allclose(last[1], last[0], rtol=1e-9)
-
-
-def test_a_breakpoint_where_nothing_changes_changes_nothing(trunk):
-    """A curve of radii on one straight line, cut where it is smooth."""
-    places = (0.0, 0.3, 0.5, 1.0)
-    radii = tuple(trunk.profile.radius(places).tolist())
-    cut = trunk.replace(profile=SampledTaper(length=1.0, stations_over_length=places, radii=radii))
-    gamma = in_box(trunk, 20)
-    for tol in (1e-4, 1e-8):
-        apart = sr.tip_positions(cut, gamma, tol=tol) - sr.tip_positions(trunk, gamma, tol=tol)
-        assert np.linalg.norm(apart, axis=1).max() <= 2 * tol
-    assert FreeRod(cut).steps <= FreeRod(trunk).steps + len(places)
 
 
 @pytest.mark.parametrize(

@@ -29,7 +29,6 @@ from softreach.sampling import SAMPLERS
 from softreach.support.errors import InvalidDesign
 from softreach.workspace import ReachablePoint
 from tests.laws import tensions_of_lengths
-from tests.oracles import column, elastica
 from tests.oracles.pulled_tendons import HeavyPulledArm, PulledArm
 
 LENGTH, RADIUS, MODULUS, DISTANCE = 0.3, 0.01, 1e6, 0.008
@@ -79,19 +78,6 @@ def pulled_arms(draw):
 def random_activations(arm, n, seed=0):
     low, high = arm.bounds.T
     return low + np.random.default_rng(seed).random((n, arm.bundles)) * (high - low)
-
-
-def test_one_parallel_tendon_takes_its_length_from_the_arm():
-    """q = τ L (1/K0 + ρ²/K1), as bending and shortening share the work."""
-    (tension,) = tensions_of_lengths(arm_of(tendons(1)), [[0.01]])[0]
-    assert tension == pytest.approx(0.01 / LENGTH / (1 / K0 + DISTANCE**2 / K1), rel=1e-12)
-
-
-def test_a_tendon_that_is_anchored_halfway_is_shortened_there_alone():
-    halfway = arm_of(tendons(1, end_over_length=0.5, activation_bounds=(0.0, 0.005)))
-    (tension,) = tensions_of_lengths(halfway, [[0.005]])[0]
-    assert tension == pytest.approx(0.01 / LENGTH / (1 / K0 + DISTANCE**2 / K1), rel=1e-12)
-    assert np.isfinite(as_tip_map(halfway).tips([[0.005]])).all()
 
 
 def test_a_soft_cable_stretches_in_series():
@@ -272,35 +258,9 @@ def rod(loads=None, radius=THIN, density=DENSITY, young=YOUNG):
     )
 
 
-BENDING = YOUNG * math.pi / 4 * THIN**4
-WEIGHT = DENSITY * math.pi * THIN**2  # per length, for g = 1 m/s²
 THICK = rod(sr.Loads(gravity=(9.81, 0.0, 0.0)), radius=0.05, young=1e6)
 FREE = rod()
 both = pytest.mark.parametrize("arm", [FREE, THICK], ids=["free", "loaded"])
-
-
-@pytest.mark.parametrize("load", [1.0, 10.0])
-def test_a_tip_force_bends_an_elastica(load):
-    force = load * BENDING / ONE**2
-    bent = rod(sr.Loads(gravity=(0, 0, 0), tip_force=(force, 0, 0)))
-    tip = as_tip_map(bent, 1e-9).tips(AT_REST)[0]
-    np.testing.assert_allclose(tip[[0, 2]], elastica.tip_loaded(load), atol=2e-8)
-
-
-@pytest.mark.parametrize("load", [1.0, 4.0, 10.0, 50.0])
-def test_a_heavy_cantilever_drops_as_published(load):
-    gravity = load * BENDING / (WEIGHT * ONE**3)
-    tip = as_tip_map(rod(sr.Loads(gravity=(0, gravity, 0))), 1e-9, warn=False).tips(AT_REST)[0]
-    np.testing.assert_allclose(tip[[1, 2]], elastica.heavy(load), atol=2e-7)
-
-
-@pytest.mark.parametrize(("share", "rings"), [(0.99, 0), (1.01, 1)])
-def test_a_column_leans_above_its_greatest_height(share, rings):
-    gravity = share * column.greenhill() * BENDING / (WEIGHT * ONE**3)
-    every = sr.equilibria(rod(sr.Loads(gravity=(0, 0, -gravity))), [])
-    assert every.is_ring.sum() == rings
-    assert (every.status == TipStatus.STABLE).sum() == 1
-    assert every.status[every.followed] == (TipStatus.UNSTABLE if rings else TipStatus.STABLE)
 
 
 def test_without_loads_it_stays_straight():

@@ -17,17 +17,11 @@ from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, LoadTables
 from softreach.rod.tip_map import TipStatus, has_tip
-from tests.bodies import oracle_rod, posture_shapes, rubber, uniform
+from tests.bodies import oracle_rod, posture_shapes, rubber, straight, uniform
 from tests.oracles import bend, elastica, linear_strains, loaded_rod, sorosim
 
 NOTHING = Loads(gravity=(0.0, 0.0, 0.0))
 REST = np.zeros((1, 3))
-
-
-def straight(body, loads, length=1.0, steps=32):
-    """The solver of a straight passive rod."""
-    arm = designs.minimal_trunk(taper=0.0, length=length)
-    return Solver(LoadTables(arm, loads, body), steps, 1e-10)
 
 
 def test_a_tip_force_and_a_moment_bend_an_elastica():

@@ -16,10 +16,9 @@ from softreach.rod.loaded import solver as equilibrium
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
-from softreach.support.errors import InvalidDesign
-from tests.bodies import by_lines, oracle_rod, posture_shapes, rubber, uniform
+from tests.bodies import by_lines, oracle_rod, posture_shapes, rubber, straight, uniform
+from tests.laws import differences
 from tests.oracles import column, elastica, loaded_rod
 
 TRUNK = designs.minimal_trunk()
@@ -60,21 +59,6 @@ of_kinds = pytest.mark.parametrize(
 
 def loaded(loads, tol=1e-9, arm=TRUNK, **material):
     return LoadedRod(rubber(arm, loads, **material), tol)
-
-
-def straight(body, loads, length=1.0, steps=32):
-    """The solver of a straight passive rod."""
-    arm = designs.minimal_trunk(taper=0.0, length=length)
-    return Solver(LoadTables(arm, loads, body), steps, 1e-10)
-
-
-def differences(f, gamma, step):
-    """Fourth-order central differences of f along every column of gamma, on a last axis."""
-    columns = []
-    for e in step * np.eye(gamma.shape[1]):
-        near, far = (f(gamma + k * e) - f(gamma - k * e) for k in (1, 2))
-        columns.append((8 * near - far) / (12 * step))
-    return np.stack(columns, axis=-1)
 
 
 @of_kinds
@@ -186,13 +170,6 @@ def test_a_hanging_rod_stretches_by_the_weight_beyond_each_section():
     np.testing.assert_allclose(tip, [0, 0, 1 + (7.5 + 4.0) / 40.0], atol=1e-12)
 
 
-def test_a_tip_moment_winds_an_arc_and_a_following_one_the_same():
-    for loads in (Loads(tip_moment=(0, 2.0, 0)), Loads(follower_moment=(0, 2.0, 0))):
-        found = straight(uniform(1.0), loads)
-        tip = Postures.of(found).find(np.zeros((1, 3))).tips[0]
-        np.testing.assert_allclose(tip, [(1 - math.cos(2)) / 2, 0, math.sin(2) / 2], atol=1e-11)
-
-
 def test_stiff_arms_approach_the_free_one_as_one_over_their_stiffness():
     free = FreeRod(TRUNK, 1e-12).tips(GAMMA)
     apart = [
@@ -213,36 +190,11 @@ def test_slopes_and_turns_are_the_differences_of_tips_and_frames(loads):
         frames = found.frames(gamma, [1.0])
         return np.concatenate([frames.directors[:, 0], frames.position], axis=1)
 
-    directors, changes = pose(GAMMA)[:, :3], differences(pose, GAMMA, 1e-3)
+    directors, changes = pose(GAMMA)[:, :3], differences(pose, GAMMA)
     np.testing.assert_allclose(motions.slopes, changes[:, 3], atol=2e-8)
     np.testing.assert_allclose(motions.directions, directors[:, 2], atol=1e-9)
     expected = np.cross(motions.rotations[:, None], directors[..., None], axis=2)
     np.testing.assert_allclose(changes[:, :3], expected, atol=1e-7)
-
-
-def test_compliance_is_the_difference_of_tips_by_a_force_and_symmetric():
-    force = np.array([6e-3, -5e-3, 7e-3])
-    compliance = loaded(Loads(gravity=SIDE)).compliance(GAMMA)
-    there, back = (
-        loaded(Loads(gravity=SIDE, tip_force=tuple(sign * force))).tips(GAMMA) for sign in (1, -1)
-    )
-    np.testing.assert_allclose(compliance @ force, (there - back) / 2, atol=1e-8)
-    np.testing.assert_allclose(compliance, np.swapaxes(compliance, 1, 2), atol=1e-8)
-
-
-def test_strains_are_how_frames_change_along_the_arm():
-    found = loaded(Loads(gravity=SIDE, payload=0.3), 1e-10)
-    middle, step = np.array([0.3, 0.7]), 1e-3
-    frames = found.frames(GAMMA, (middle[:, None] + step * np.arange(-2, 3)).ravel())
-    r = frames.position.reshape(len(GAMMA), 2, 5, 3)
-    d = frames.directors.reshape(len(GAMMA), 2, 5, 3, 3)
-    weights = np.array([1, -8, 0, 8, -1]) / (12 * step)
-    dr, dd = np.einsum("nsoc,o->nsc", r, weights), np.einsum("nsoic,o->nsic", d, weights)
-    strains = found.strains(GAMMA, middle)
-    np.testing.assert_allclose(dr, strains.extension[..., None] * d[:, :, 2, 2], atol=1e-7)
-    u = np.einsum("nsi,nsic->nsc", strains.curvature, d[:, :, 2])
-    expected = strains.extension[..., None, None] * np.cross(u[:, :, None], d[:, :, 2])
-    np.testing.assert_allclose(dd, expected, atol=1e-6)
 
 
 def upright():
@@ -336,10 +288,3 @@ def test_what_is_found_at_once_is_what_is_followed_from_rest(gravity):
     assert (followed.status == TipStatus.STABLE).mean() > 0.95
     np.testing.assert_allclose(found.tips, followed.tips, atol=1e-7)
     np.testing.assert_array_equal(found.status, followed.status)
-
-
-def test_loads_that_are_no_numbers_are_refused_by_name():
-    with pytest.raises(InvalidDesign, match="gravity"):
-        Loads(gravity=(0, 0))
-    with pytest.raises(InvalidDesign, match="payload"):
-        Loads(payload=-1)

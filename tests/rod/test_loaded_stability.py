@@ -17,7 +17,7 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import ArmBody, LoadTables
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import oracle_rod, rubber
+from tests.bodies import oracle_rod, rubber, weighed
 from tests.oracles import column
 from tests.oracles.chain import Chain
 
@@ -40,12 +40,6 @@ class Inextensible:
 
     def mass_per_length(self, z):
         return self.whole.mass_per_length(z)
-
-
-def weighed(arm, load, gravity=UP, **loads):
-    """The arm with E such that its load number is `load`."""
-    young = 1000 * 9.81 * arm.length**3 / (load * arm.profile.outer_radius**2)
-    return rubber(arm, Loads(gravity=gravity, **loads), young)
 
 
 def solver_of(arm, body=None):

@@ -91,10 +91,7 @@ def test_files_and_parameters_hold_markers():
     ("markers", "message"),
     [
         ((Marker(name="a"), Marker(name="a")), r"markers\[1\].name = 'a': must differ"),
-        ((Marker(name="a", station="disc"),), "markers.a.station = 'disc': must be Z in m or a"),
         ((Marker(name="a", station=1.1),), "markers.a.station = 1.1: must be on the arm"),
-        ((Marker(name="a.b"),), "must be one line without dots"),
-        (("a",), "must be Markers"),
         (3, "must be Markers"),
     ],
 )
@@ -261,8 +258,6 @@ def test_files_and_parameters_hold_rigid_pieces():
 @pytest.mark.parametrize(
     ("pieces", "message"),
     [
-        ((RigidPiece(start=0.4),), r"rigid_pieces\[0\].start = 0.4: must be on the arm"),
-        ((RigidPiece(end="x"),), r"rigid_pieces\[0\].end = 'x': must be Z in m: the arm has no"),
         ((RigidPiece(start=0.2, end=0.1),), r"rigid_pieces\[0\].end = 0.1: must be above"),
         ((Marker(name="a"),), "must be RigidPieces"),
     ],

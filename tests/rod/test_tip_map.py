@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import Chamber, LinearTaper, Loads, Material, Ring, Section, Tendon, designs
+from softreach.arm import Loads, designs
 from softreach.rod import tip_positions
 from softreach.rod.free import FreeRod
 from softreach.rod.inputs import activation_measures
 from softreach.rod.rods import as_tip_map, free_bundles, in_steps, measured_bundles
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
+from tests.inverse.test_units import CHAMBER, TENDONS, arm_of
 from tests.laws import in_box
 
 
@@ -67,12 +68,6 @@ def test_what_is_no_arm_is_refused(arm):
         as_tip_map(arm)
 
 
-@pytest.mark.parametrize("tol", [0, 1e-13, -1, np.nan, np.inf, None, "small", True])
-def test_a_tolerance_out_of_range_is_refused(trunk, tol):
-    with pytest.raises(InvalidInput, match="tol = "):
-        as_tip_map(trunk, tol)
-
-
 def test_an_arm_beyond_the_theory_is_refused_every_time(trunk):
     for _ in range(2):
         with pytest.raises(InvalidDesign, match="must keep ζ > 0"):
@@ -80,19 +75,6 @@ def test_an_arm_beyond_the_theory_is_refused_every_time(trunk):
 
 
 # Activations of different units are compared in their own ranges
-
-
-TENDONS = Tendon(name="tendon", distance_ratio=0.9, bundles=3, activation_bounds=(0, 8))
-CHAMBER = Chamber(name="middle", distance_ratio=0, radius_ratio=0.25, activation_bounds=(0, 5e4))
-
-
-def arm_of(*actuators):
-    ring = Ring(inner_ratio=0.5, material=Material(young_modulus=1e5))
-    return sr.Manipulator(
-        profile=LinearTaper(length=0.2, outer_radius=0.015, taper=0.01),
-        section=Section(rings=(ring,)),
-        actuators=actuators,
-    )
 
 
 def test_strains_count_as_they_are(trunk):

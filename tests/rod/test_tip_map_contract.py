@@ -28,7 +28,7 @@ from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.kinds import fibers_and_a_tendon
-from tests.laws import arms, in_box, integrated_tip
+from tests.laws import arms, differences, in_box, integrated_tip
 
 Make = Callable[[Manipulator, float], TipMap]
 
@@ -94,15 +94,6 @@ def activations(rod: TipMap, n: int, seed: int = 1) -> np.ndarray:
     """All corners of the box, and random activations in it."""
     cube = np.random.default_rng(seed).random((n, rod.box.bundles))
     return np.concatenate([rod.box.corners(), rod.box.from_cube(cube)])
-
-
-def differences(f: Callable[[np.ndarray], np.ndarray], gamma: np.ndarray, step: float):
-    """Fourth-order central differences of f along every bundle, on a last axis."""
-    columns = []
-    for e in step * np.eye(gamma.shape[1]):
-        near, far = (f(gamma + k * e) - f(gamma - k * e) for k in (1, 2))
-        columns.append((8 * near - far) / (12 * step))
-    return np.stack(columns, axis=-1)
 
 
 @settings(max_examples=8)
@@ -182,7 +173,7 @@ def test_slopes_are_the_central_differences_of_the_tips(make, arm):
     tips, slopes = rod.tips_and_slopes(gamma)
     assert slopes.shape == (len(gamma), 3, rod.box.bundles)
     np.testing.assert_allclose(tips, rod.tips(gamma), atol=1e-13 * rod.length)
-    expected = differences(rod.tips, gamma, 1e-3)
+    expected = differences(rod.tips, gamma)
     np.testing.assert_allclose(slopes, expected, atol=1e-8 * rod.length)
 
 
@@ -200,7 +191,7 @@ def test_twists_move_the_tip_as_slopes_do_and_turn_its_frame(make, arm):
     def directors(gamma):
         return rod.frames(gamma, [rod.length]).directors[:, 0]
 
-    turned = differences(directors, gamma, 1e-3)  # (n, director, axis, bundle)
+    turned = differences(directors, gamma)  # (n, director, axis, bundle)
     expected = np.cross(angular[:, None], directors(gamma)[..., None], axis=2)
     np.testing.assert_allclose(turned, expected, atol=1e-8)
 
