@@ -34,9 +34,8 @@ from softreach.rod.tip_map import (
     position_slopes,
 )
 from softreach.support import parallel
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-
-Array = NDArray[np.float64]
 
 _LEVER = 4.0  # of what is off by turning at the tip, over what is off by moving, per length
 

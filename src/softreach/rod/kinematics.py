@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach import schema
 from softreach.arm.driving import body_of
@@ -20,25 +20,12 @@ from softreach.rod.rods import ArmMap, as_tip_map, with_unstable
 from softreach.rod.tip_map import Frame, Frames, Shapes, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "configuration",
-    "marked",
-    "marker_positions",
-    "marker_sections",
-    "rest_configuration",
-    "shape_dataset",
-    "stations_along",
-    "tip_jacobian",
-    "tip_positions",
-]
-
-Array = NDArray[np.float64]
 
 _LINES_TOGETHER = 256  # samples
 

@@ -32,11 +32,8 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import Tables, both_sides, tables
 from softreach.kernels.rod.frames import relative_strains
 from softreach.rod.activation_box import ActivationBox
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-
-__all__ = ["Linearization"]
-
-Array = NDArray[np.float64]
 
 _STATIONS = 201
 _SAFETY = 1.02  # for quadrature, and for the steps of the map as it is computed

@@ -34,20 +34,6 @@ from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
 
-__all__ = [
-    "ArmMap",
-    "all_inputs",
-    "as_tip_map",
-    "coarsened",
-    "effective",
-    "free_bundles",
-    "in_steps",
-    "measured_bundles",
-    "of_tip",
-    "refined",
-    "with_unstable",
-]
-
 
 @dataclass(frozen=True, repr=False)
 class ArmMap(TipMap):

@@ -21,11 +21,10 @@ from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
 from softreach.support import parallel
-from softreach.support.arrays import read_only
+from softreach.support.arrays import Array, read_only
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
-Array = NDArray[np.float64]
 Differences = Callable[[Array], Array]
 
 _SAFETY = 2.0

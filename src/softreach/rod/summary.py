@@ -26,12 +26,9 @@ from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, bending_over_bounds
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidInput
 from softreach.support.quantity import columns
-
-__all__ = ["DesignSummary", "describe", "design_warnings"]
-
-Array = NDArray[np.float64]
 
 _TEXTS = ("lacking", "validity", "warnings")
 _UNITS = {"helical_angles": "rad", "revolutions": "rad", "base_radius": "m", "tip_radius": "m"}

@@ -20,11 +20,10 @@ from softreach.arm.stations import Marker
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
 from softreach.support.arguments import as_number
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput, Range, counted
 from softreach.support.lazy import lazy
 
-Array = NDArray[np.float64]
 Status = NDArray[np.int8]
 Frame = Literal["world", "base"]
 """Frame of places: the world, or that of the base, whose z is along the straight arm."""
