@@ -102,7 +102,7 @@ def test_fibers_turn_by_the_integral_of_their_angle_across_all_breakpoints(
     ends = [begin, *sorted(z for z in inside if begin < z < end), end]
     expected = sum(quad(rate, *piece, epsabs=1e-12, epsrel=1e-12)[0] for piece in pairwise(ends))
     one = fiber(angle, ring, start_over_length=start)
-    found = one.rotation(profile, SECTION, np.array([end]))[0]
+    found = one.rotation(profile, SECTION.ring(ring), np.array([end]))[0]
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-10)
 
 
@@ -157,7 +157,7 @@ def test_a_ring_between_others_has_the_angle_of_its_own_rim():
     one = FiberArchitecture(helical_angle=0.6, extent=0.5, ring=0)
     profile = LinearTaper(length=1.0, outer_radius=0.1)
     lead = 2 * math.pi * 0.05 / math.tan(0.6)
-    turned = one.rotation(profile, section, np.array([lead]))
+    turned = one.rotation(profile, section.ring(one.ring), np.array([lead]))
     np.testing.assert_allclose(turned, 2 * math.pi, rtol=1e-13)
 
 

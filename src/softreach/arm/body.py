@@ -196,7 +196,7 @@ class Body:
         """Those actuators that are fiber architectures."""
         return tuple(each for each in self.actuators if isinstance(each, FiberArchitecture))
 
-    @property
+    @lazy
     def bundles(self) -> int:
         """m, number of independent activations."""
         return sum(actuator.bundles for actuator in self.actuators)
