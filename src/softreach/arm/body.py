@@ -246,11 +246,6 @@ class Body:
         rigid = np.any([(stations >= start) & (stations < end) for start, end in to_tip], axis=0)
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
-    @property
-    def fiber_directions(self) -> tuple[str, ...]:
-        """Direction of contraction within each bundle; see `Actuator.fiber_direction`."""
-        return tuple(actuator.fiber_direction for actuator in self.bundle_actuators)
-
     def outline(self, z: ArrayLike) -> Outline:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)

@@ -116,11 +116,6 @@ class Driving:
         return self.offsets[:, None] + ends_over(self.gains, bounds)
 
     @lazy
-    def widths(self) -> Array:
-        """Largest |∂γ/∂x| of an affine map, shape (inner bundle, input)."""
-        return np.abs(self.gains)
-
-    @lazy
     def gains(self) -> Array:
         """Activation of each bundle of the inner arm per effective input, (bundle, input)."""
         names, alone = self.arm.bundle_names, list(self.arm.undriven)
@@ -237,7 +232,9 @@ def _inner_arm(arm: Manipulator) -> Manipulator:
     ends = np.cumsum([each.bundles for each in body.actuators])
     shares = zip(body.actuators, np.split(_fitting(bounds, columns, rates), ends), strict=False)
     actuators = (
-        each.by_tension(own) if isinstance(each, LengthTendon) else each.with_bounds(own)
+        each.by_tension(own)
+        if isinstance(each, LengthTendon)
+        else each.replace(activation_bounds=own)
         for each, own in shares
     )
     return body.replace(actuators=tuple(actuators))

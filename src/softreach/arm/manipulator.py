@@ -193,8 +193,8 @@ class Manipulator(Body):
         pairs = np.broadcast_to(np.asarray(activation_bounds, float), (self.bundles, 2))
         ends = np.cumsum([actuator.bundles for actuator in self.actuators], dtype=int)
         shares = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
-        actuators = tuple(actuator.with_bounds(share) for actuator, share in shares)
-        return self.replace(actuators=actuators)
+        actuators = (actuator.replace(activation_bounds=share) for actuator, share in shares)
+        return self.replace(actuators=tuple(actuators))
 
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.

@@ -149,7 +149,7 @@ class Inputs:
             half_widths[self._columns] = own
         if self.driving is None:
             return half_widths
-        return self.driving.widths @ half_widths if self.driving.is_affine else None
+        return np.abs(self.driving.gains) @ half_widths if self.driving.is_affine else None
 
 
 def _bounds(driving: Driving) -> ActivationBox:

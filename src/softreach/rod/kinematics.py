@@ -111,7 +111,9 @@ def marker_positions(
     """
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
     gamma = tip_map.check_activations("activations", activations)
-    return _markers(tip_map, gamma)
+    if not len(z := marker_sections(tip_map.arm)):
+        return np.empty((len(gamma), 0, 3))
+    return marked(tip_map.arm, z, tip_map.frames(gamma, z))
 
 
 def marker_sections(arm: Manipulator) -> Array:
@@ -133,13 +135,6 @@ def marked(arm: Manipulator, z: Array, frames: Frames) -> Array:
     section, offsets = np.searchsorted(z, stations), [marker.offset for marker in arm.markers]
     turned = np.einsum("mk,nmkx->nmx", np.array(offsets), frames.directors[:, section])
     return frames.position[:, section] + turned
-
-
-def _markers(tip_map: TipMap, gamma: Array) -> Array:
-    z = marker_sections(tip_map.arm)
-    return (
-        marked(tip_map.arm, z, tip_map.frames(gamma, z)) if len(z) else np.empty((len(gamma), 0, 3))
-    )
 
 
 def configuration(
@@ -174,8 +169,16 @@ def configuration(
     values = as_floats("activation", activation)
     gamma = tip_map.check_activations("activation", np.atleast_2d(values))
     z, status = stations_along(tip_map, stations), np.empty(len(gamma), np.int8)
-    shapes = tip_map.shapes(gamma, z, z, status)
-    others = {"marker_position": _markers(tip_map, gamma), **_lines(tip_map, gamma)}
+    nodes = quadrature(body_of(tip_map.arm))[0] if tip_map.arm.bundles else np.empty(0)
+    framed, strained = np.union1d(z, marker_sections(tip_map.arm)), np.union1d(z, nodes)
+    position, directors, *strains = tip_map.shapes(gamma, framed, strained, status)
+    at_z, at_nodes = np.searchsorted(strained, z), np.searchsorted(strained, nodes)
+    frames_at = np.searchsorted(framed, z)
+    shapes = Shapes(
+        position[:, frames_at], directors[:, frames_at], *(each[:, at_z] for each in strains)
+    )
+    others = _lines(tip_map, gamma, *(each[:, at_nodes] for each in strains))
+    others["marker_position"] = marked(tip_map.arm, framed, Frames(position, directors))
     dataset = shape_dataset(tip_map, gamma, z, shapes, **others)
     if tip_map.supports_unstable:
         dataset = schema.with_status(dataset, status)
@@ -226,15 +229,14 @@ def shape_dataset(
     )
 
 
-def _lines(tip_map: ArmMap, gamma: Array) -> dict[str, Array]:
+def _lines(tip_map: ArmMap, gamma: Array, curvature: Array, extension: Array) -> dict[str, Array]:
     """Lengths of the lines of bundles, and what drives and displacements activate there."""
     arm, length = tip_map.arm, np.empty((len(gamma), tip_map.arm.bundles))
     if not arm.bundles:
         return {}
-    nodes = quadrature(body_of(arm))[0]
-    for block in parallel.blocks(len(gamma), _LINES_TOGETHER):
-        curvature, extension = tip_map.strains(gamma[block], nodes)
-        length[block] = lengths_of_strains(arm, curvature * extension[..., None], extension)
+    for b in parallel.blocks(len(gamma), _LINES_TOGETHER):
+        turn = curvature[b] * extension[b, :, None]
+        length[b] = lengths_of_strains(arm, turn, extension[b])
     if arm.is_direct:
         return {"line_length": length}
     activation = tip_map.inputs.activations(gamma)[:, : arm.bundles]

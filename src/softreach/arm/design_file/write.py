@@ -9,9 +9,8 @@ from typing import Any
 
 from softreach.arm.along import AlongArm, Samples
 from softreach.arm.design_file.keys import KINDS, Key, degrees_text, keys_of
-from softreach.arm.drives import BundleNumbers
 from softreach.arm.material import Material
-from softreach.arm.number import Station
+from softreach.arm.number import NamedFloats, Station
 from softreach.arm.part import Part
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
@@ -129,7 +128,7 @@ def _ordered_keys(kind: type) -> list[Key]:
 
 
 def _text(key: str, value: Any) -> str:
-    if isinstance(value, BundleNumbers):
+    if isinstance(value, NamedFloats):
         return inline_table((key_text(name), value_text(x)) for name, x in value.items())
     number = degrees_text if key.endswith("_deg") else value_text
     if isinstance(value, AlongArm):
