@@ -167,7 +167,7 @@ class Body:
             if z > self.length
         ]
         for k, piece in enumerate(self.rigid_pieces):
-            faults += _behind(f"rigid_pieces[{k}]", piece.place_faults(self.length))
+            faults += behind(f"rigid_pieces[{k}]", piece.place_faults(self.length))
         rest = self.rest.curvature(np.linspace(0.0, 1.0, 65))
         turn = self.length * float(np.linalg.norm(rest, axis=1).mean())
         if turn > MOST_TURN:
@@ -179,7 +179,7 @@ class Body:
         parts = self.profile, self.section
         for each in self.actuators:
             own = each.place_faults(self.length) or each.section_faults(*parts)
-            faults += _behind(each.name, [*own, *_far_faults(each, self.profile)])
+            faults += behind(each.name, [*own, *_far_faults(each, self.profile)])
         return faults
 
     def replace(self, **changes: Any) -> Self:
@@ -261,7 +261,7 @@ class Body:
         )
 
 
-def _behind(owner: str, faults: Iterable[Fault]) -> list[Fault]:
+def behind(owner: str, faults: Iterable[Fault]) -> list[Fault]:
     """Faults of a part under its name; those of the section have theirs."""
     return [
         fault

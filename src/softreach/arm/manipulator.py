@@ -15,7 +15,7 @@ from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
-from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence, mass
+from softreach.arm.body import Body, behind, kind_faults, kinds_in_a_sequence, mass
 from softreach.arm.drives import Drive, drive_faults
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
@@ -87,9 +87,7 @@ class Manipulator(Body):
         if faults:
             return faults
         for marker in self.markers:
-            owner = f"markers.{marker.name}"
-            own = marker.place_faults(self.length)
-            faults += [fault._replace(path=f"{owner}.{fault.path}") for fault in own]
+            faults += behind(f"markers.{marker.name}", marker.place_faults(self.length))
         if self.point is not None and self.pointed is None:
             faults.append(Fault("point", self.point, self._points))
         names = [actuator.name for actuator in self.actuators], self.bundle_names

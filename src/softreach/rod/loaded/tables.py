@@ -95,7 +95,7 @@ def load_phase(arm: Manipulator, loads: Loads, body: ArmBody) -> LoadPhase:
     mass = body.mass_per_length(z)
     with np.errstate(over="ignore"):
         force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
-        swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
+        swing = force * (1.0 + force * axial) * softest + (0.5 * loads.moment_size * softest) ** 2
         table = tables(arm, z)
         longest, grown = (
             1.0 + ends_over(part, arm.bounds).T
@@ -118,14 +118,6 @@ def _force(loads: Loads, z: Array, mass: Array) -> Array:
     points = sum((math.hypot(*load.force) * (load.station >= z) for load in loads.point_loads), 0.0)
     at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
     return at_tip + along + points
-
-
-def _moment(loads: Loads) -> float:
-    """The sizes of all moments, added, that of the payload on its lever among them [N m]."""
-    weight = loads.payload * math.hypot(*loads.gravity)
-    moments = [loads.tip_moment, loads.follower_moment]
-    moments += [load.moment for load in loads.point_loads]
-    return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*moment) for moment in moments)
 
 
 class StepTables(NamedTuple):
