@@ -111,6 +111,10 @@ def marker_positions(
     """
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
     gamma = tip_map.check_activations("activations", activations)
+    return _markers(tip_map, gamma)
+
+
+def _markers(tip_map: TipMap, gamma: Array) -> Array:
     if not len(z := marker_sections(tip_map.arm)):
         return np.empty((len(gamma), 0, 3))
     return marked(tip_map.arm, z, tip_map.frames(gamma, z))
@@ -170,15 +174,12 @@ def configuration(
     gamma = tip_map.check_activations("activation", np.atleast_2d(values))
     z, status = stations_along(tip_map, stations), np.empty(len(gamma), np.int8)
     nodes = quadrature(body_of(tip_map.arm))[0] if tip_map.arm.bundles else np.empty(0)
-    framed, strained = np.union1d(z, marker_sections(tip_map.arm)), np.union1d(z, nodes)
-    position, directors, *strains = tip_map.shapes(gamma, framed, strained, status)
-    at_z, at_nodes = np.searchsorted(strained, z), np.searchsorted(strained, nodes)
-    frames_at = np.searchsorted(framed, z)
-    shapes = Shapes(
-        position[:, frames_at], directors[:, frames_at], *(each[:, at_z] for each in strains)
-    )
-    others = _lines(tip_map, gamma, *(each[:, at_nodes] for each in strains))
-    others["marker_position"] = marked(tip_map.arm, framed, Frames(position, directors))
+    strained = np.union1d(z, nodes)
+    *frames, curvature, extension = tip_map.shapes(gamma, z, strained, status)
+    at, on_lines = np.searchsorted(strained, z), np.searchsorted(strained, nodes)
+    others = _lines(tip_map, gamma, curvature[:, on_lines], extension[:, on_lines])
+    others["marker_position"] = _markers(tip_map, gamma)
+    shapes = Shapes(*frames, curvature[:, at], extension[:, at])
     dataset = shape_dataset(tip_map, gamma, z, shapes, **others)
     if tip_map.supports_unstable:
         dataset = schema.with_status(dataset, status)
