@@ -271,13 +271,14 @@ class LoadTables:
         width, fractions = -np.diff(edges), np.array(NODES)
         s = edges[:-1, None] - width[:, None] * fractions
         z = profile.station(s)
-        z[:, 0], z[:, -1] = profile.station(edges[:-1]), profile.station(edges[1:])
+        ends = profile.station(edges)
+        z[:, 0], z[:, -1] = ends[:-1], ends[1:]
         inward = _inward(z)
         at = tables(self.arm, inward.ravel())
-        radius = profile.radius(inward)
-        measure = width[:, None] * radius
+        measure = width[:, None] * profile.radius(inward)
         axial, bending, torsion = (c.reshape(z.shape) for c in self.body.compliance(inward.ravel()))
         force = self._forces(z) @ self.axes.T
+        inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
         scalars = np.concatenate(
             [np.stack([bending, torsion - bending, axial], axis=-1), force], axis=-1
         )
@@ -290,8 +291,8 @@ class LoadTables:
             ),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
-            self._moments(profile.station(edges[:-1])),
-            self._firsts(profile.station(edges)),
+            self._moments(ends[:-1]),
+            np.array([0, *inner, len(edges) - 1], np.int64),
         )
 
     def _pieces(self, s: Array, width: Array) -> Array:
@@ -333,10 +334,6 @@ class LoadTables:
             step = _step_inward(z, load.station)
             moments[step : step + 1] += self.axes @ np.array(load.moment)
         return moments
-
-    def _firsts(self, ends: Array) -> Index:
-        inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
-        return np.array([0, *inner, len(ends) - 1], np.int64)
 
 
 def _step_inward(ends: Array, station: float) -> int:
