@@ -74,7 +74,7 @@ def test_fibers_turn_by_the_integral_of_their_angle_across_all_breakpoints(
     ends = [begin, *sorted(z for z in inside if begin < z < end), end]
     expected = sum(quad(rate, *piece, epsabs=1e-12, epsrel=1e-12)[0] for piece in pairwise(ends))
     one = fiber(angle, ring, start_over_length=start)
-    found = one.rotation(profile, SECTION, np.array([end]))[0]
+    found = one.rotation(profile, SECTION.ring(ring), np.array([end]))[0]
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-10)
 
 

@@ -160,7 +160,7 @@ SOFT = "dragon_skin_30"
 
 @pytest.fixture
 def silicone(trunk):
-    return edits.with_ring_material(trunk, 0, SOFT)
+    return edits.with_changed_ring(trunk, 0, material=SOFT)
 
 
 @pytest.mark.parametrize("kind", edits.ACTUATOR_KINDS)
@@ -224,25 +224,25 @@ def test_removing_a_ring_leaves_actuators_in_theirs(silicone):
 
 def test_an_actuator_moves_into_another_ring_alone(silicone):
     arm = edits.with_ring(silicone)
-    moved = edits.with_actuator_ring(arm, "left", 1)
+    moved = edits.with_changed_actuator(arm, "left", ring=1)
     assert [arm.section.rings.index(arm.section.ring(one.ring)) for one in moved.actuators] == [
         int(one.name == "left") for one in arm.actuators
     ]
 
 
 def test_renaming_a_ring_keeps_its_actuators(silicone):
-    named = edits.with_ring_name(silicone, 0, "skin")
+    named = edits.with_changed_ring(silicone, 0, name="skin")
     inside = named.replace(actuators=tuple(one.replace(ring="skin") for one in named.actuators))
-    again = edits.with_ring_name(inside, 0, "wall")
+    again = edits.with_changed_ring(inside, 0, name="wall")
     assert [again.section.ring(one.ring).name for one in again.actuators] == ["wall"] * 3
 
 
 def test_a_name_that_another_has_is_refused(silicone):
     with pytest.raises(InvalidDesign, match="must differ"):
-        edits.with_actuator_name(silicone, "left", "right")
-    two = edits.with_ring_name(edits.with_ring(silicone), 0, "skin")
+        edits.with_changed_actuator(silicone, "left", name="right")
+    two = edits.with_changed_ring(edits.with_ring(silicone), 0, name="skin")
     with pytest.raises(InvalidDesign, match="must differ"):
-        edits.with_ring_name(two, 1, "skin")
+        edits.with_changed_ring(two, 1, name="skin")
 
 
 def test_core_and_rings_take_named_materials(silicone):

@@ -229,11 +229,10 @@ def test_in_a_rigid_piece_nothing_is_deformed_and_beside_it_nothing_changes():
 def test_a_rigid_piece_at_the_base_lifts_the_arm():
     rigid = arm(rigid_pieces=(RigidPiece(end=LENGTH - SHORT),))
     expected = sr.tip_positions(arm(SHORT), FREE) + [0.0, 0.0, LENGTH - SHORT]
-    turned = (
-        arm(SHORT).actuators[0].rotation(rigid.profile, rigid.section, np.array([LENGTH - SHORT]))
-    )
+    fiber, end = arm(SHORT).actuators[0], np.array([LENGTH - SHORT])
+    turned = fiber.rotation(rigid.profile, rigid.section.ring(fiber.ring), end)
     # the fiber winds on through the piece
-    offset = arm(SHORT).actuators[0].offset - float(turned[0])
+    offset = fiber.offset - float(turned[0])
     fiber = rigid.actuators[0].replace(offset=offset)
     made = rigid.replace(actuators=(fiber, rigid.actuators[1]))
     np.testing.assert_allclose(sr.tip_positions(made, FREE), expected, atol=1e-7)

@@ -167,7 +167,7 @@ class Body:
             if z > self.length
         ]
         for k, piece in enumerate(self.rigid_pieces):
-            faults += _behind(f"rigid_pieces[{k}]", piece.place_faults(self.length))
+            faults += behind(f"rigid_pieces[{k}]", piece.place_faults(self.length))
         rest = self.rest.curvature(np.linspace(0.0, 1.0, 65))
         turn = self.length * float(np.linalg.norm(rest, axis=1).mean())
         if turn > MOST_TURN:
@@ -179,7 +179,7 @@ class Body:
         parts = self.profile, self.section
         for each in self.actuators:
             own = each.place_faults(self.length) or each.section_faults(*parts)
-            faults += _behind(each.name, [*own, *_far_faults(each, self.profile)])
+            faults += behind(each.name, [*own, *_far_faults(each, self.profile)])
         return faults
 
     def replace(self, **changes: Any) -> Self:
@@ -196,7 +196,7 @@ class Body:
         """Those actuators that are fiber architectures."""
         return tuple(each for each in self.actuators if isinstance(each, FiberArchitecture))
 
-    @property
+    @lazy
     def bundles(self) -> int:
         """m, number of independent activations."""
         return sum(actuator.bundles for actuator in self.actuators)
@@ -246,11 +246,6 @@ class Body:
         rigid = np.any([(stations >= start) & (stations < end) for start, end in to_tip], axis=0)
         return Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
 
-    @property
-    def fiber_directions(self) -> tuple[str, ...]:
-        """Direction of contraction within each bundle; see `Actuator.fiber_direction`."""
-        return tuple(actuator.fiber_direction for actuator in self.bundle_actuators)
-
     def outline(self, z: ArrayLike) -> Outline:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)
@@ -266,7 +261,7 @@ class Body:
         )
 
 
-def _behind(owner: str, faults: Iterable[Fault]) -> list[Fault]:
+def behind(owner: str, faults: Iterable[Fault]) -> list[Fault]:
     """Faults of a part under its name; those of the section have theirs."""
     return [
         fault

@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 _FINITE = Range(-MOST, MOST)
 
 
-class BundleNumbers(NamedFloats):
-    """Numbers of bundles by the bundles' names; frozen."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Drive(Part):
     """An input u that activates bundles: γ = offset + gain dz(u) of each that it names.
@@ -47,7 +43,7 @@ class Drive(Part):
     """(lower, upper) of u [unit]."""
     gains: Mapping[str, float]
     """Activation per u of each bundle that it drives, by the bundle's name."""
-    offsets: Mapping[str, float] = BundleNumbers()
+    offsets: Mapping[str, float] = NamedFloats()
     """Activation of these bundles at u = 0; 0 where none is given."""
     dead_zone: float = number("u0", "", "largest |u| without effect", low=0.0, default=0.0)
     """Largest |u| that has no effect [unit]."""
@@ -57,7 +53,7 @@ class Drive(Part):
         low, high = (float(plain(bound)) for bound in self.bounds)
         object.__setattr__(self, "bounds", (low, high))
         for field in ("gains", "offsets"):
-            object.__setattr__(self, field, BundleNumbers(getattr(self, field)))
+            object.__setattr__(self, field, NamedFloats(getattr(self, field)))
 
     @classmethod
     def antagonists(

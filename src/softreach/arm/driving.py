@@ -57,8 +57,12 @@ class Driving:
 
     @lazy
     def driven(self) -> Manipulator:
-        """The arm, without dead zones if x are effective inputs."""
-        return without_dead_zones(self.arm) if self.is_effective else self.arm
+        """The arm; if x are effective inputs, with drives that begin beyond their dead zones."""
+        if not self.is_effective or not any(drive.dead_zone for drive in self.arm.drives):
+            return self.arm
+        ends = ((drive, drive.effective(np.array(drive.bounds))[0]) for drive in self.arm.drives)
+        drives = (drive.replace(bounds=tuple(u.tolist()), dead_zone=0.0) for drive, u in ends)
+        return self.arm.replace(drives=tuple(drives))
 
     @lazy
     def law(self) -> LengthLaw:
@@ -114,11 +118,6 @@ class Driving:
         for k, drive in enumerate(self.driven.drives):
             bounds[k] = drive.effective(bounds[k])[0]
         return self.offsets[:, None] + ends_over(self.gains, bounds)
-
-    @lazy
-    def widths(self) -> Array:
-        """Largest |∂γ/∂x| of an affine map, shape (inner bundle, input)."""
-        return np.abs(self.gains)
 
     @lazy
     def gains(self) -> Array:
@@ -195,16 +194,6 @@ class Driving:
         return x + np.sign(x) * zones
 
 
-def without_dead_zones(arm: Manipulator) -> Manipulator:
-    """The arm with inputs that begin beyond the dead zones of its drives: it goes as far."""
-    if not any(drive.dead_zone for drive in arm.drives):
-        return arm
-    ends = [tuple(drive.effective(np.array(drive.bounds))[0].tolist()) for drive in arm.drives]
-    pairs = zip(arm.drives, ends, strict=True)
-    drives = (drive.replace(bounds=bounds, dead_zone=0.0) for drive, bounds in pairs)
-    return arm.replace(drives=tuple(drives))
-
-
 def inner_arm(arm: Manipulator) -> Manipulator:
     """The arm as tables and kernels see it, with bounds that hold what activations lead to.
 
@@ -237,7 +226,9 @@ def _inner_arm(arm: Manipulator) -> Manipulator:
     ends = np.cumsum([each.bundles for each in body.actuators])
     shares = zip(body.actuators, np.split(_fitting(bounds, columns, rates), ends), strict=False)
     actuators = (
-        each.by_tension(own) if isinstance(each, LengthTendon) else each.with_bounds(own)
+        each.by_tension(own)
+        if isinstance(each, LengthTendon)
+        else each.replace(activation_bounds=own)
         for each, own in shares
     )
     return body.replace(actuators=tuple(actuators))

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.actuators import (
-    Actuator,
     Chamber,
     FiberArchitecture,
     ObliqueMuscle,
@@ -18,8 +17,7 @@ from softreach.arm.actuators import (
     Tendon,
 )
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.material import named_material
-from softreach.arm.section import Ring, Section
+from softreach.arm.section import Ring
 from softreach.support.errors import InvalidInput
 
 ACTUATOR_KINDS = ("fiber", "oblique muscle", "radial muscle", "tendon", "chamber")
@@ -74,21 +72,12 @@ def without_actuator(arm: Manipulator, name: str) -> Manipulator:
     return arm.replace(actuators=others)
 
 
-def with_actuator_name(arm: Manipulator, old: str, new: str) -> Manipulator:
-    """The arm with one of its actuators renamed.
+def with_changed_actuator(arm: Manipulator, name: str, /, **changes: Any) -> Manipulator:
+    """The arm with other values of one of its actuators, such as its name or its ring.
 
     Raises:
-        InvalidDesign: Another one has this name.
+        InvalidDesign: Another one has this name, or a value is not what it must be.
     """
-    return _with_changed(arm, old, name=new)
-
-
-def with_actuator_ring(arm: Manipulator, name: str, ring: int) -> Manipulator:
-    """The arm with one of its actuators in another ring, counted from 0."""
-    return _with_changed(arm, name, ring=ring)
-
-
-def _with_changed(arm: Manipulator, name: str, /, **changes: Any) -> Manipulator:
     parts = (part.replace(**changes) if part.name == name else part for part in arm.actuators)
     return arm.replace(actuators=tuple(parts))
 
@@ -128,56 +117,43 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
         hint = f"move or remove {', '.join(inside)} first"
         raise InvalidInput("rings", ring_label(arm, index), "without actuators to be removed", hint)
     kept = tuple(ring for k, ring in enumerate(rings) if k != index)
-
-    def counted_again(part: Actuator) -> Actuator:
-        if not isinstance(part, SectorActuator) or isinstance(part.ring, str):
-            return part
-        return part.replace(ring=part.ring - (part.ring > index))
-
-    actuators = tuple(map(counted_again, arm.actuators))
+    actuators = tuple(
+        part.replace(ring=part.ring - (part.ring > index))
+        if isinstance(part, SectorActuator) and isinstance(part.ring, int)
+        else part
+        for part in arm.actuators
+    )
     return arm.replace(section=arm.section.replace(rings=kept), actuators=actuators)
 
 
-def with_ring_name(arm: Manipulator, index: int, name: str) -> Manipulator:
-    """The arm with one of its rings renamed; actuators stay in it.
+def with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Manipulator:
+    """The arm with other values of one of its rings, such as its material; actuators stay in it.
 
     Raises:
-        InvalidDesign: Another ring has this name.
+        InvalidDesign: Another ring has this name, or different materials, of which one has no
+            Young's modulus.
     """
-    old, section = arm.section.rings[index].name, _with_changed_ring(arm, index, name=name)
-    moved = tuple(
-        part.replace(ring=index) if isinstance(part, SectorActuator) and part.ring == old else part
+    rings, old = [*arm.section.rings], arm.section.rings[index]
+    rings[index] = old.replace(**changes)
+    section, is_renamed = arm.section.replace(rings=tuple(rings)), rings[index].name != old.name
+    actuators = tuple(
+        part.replace(ring=index)
+        if is_renamed and isinstance(part, SectorActuator) and part.ring == old.name
+        else part
         for part in arm.actuators
     )
-    return arm.replace(section=section, actuators=moved)
-
-
-def with_ring_material(arm: Manipulator, index: int, material: str) -> Manipulator:
-    """The arm with one of its rings made of a named material.
-
-    Raises:
-        InvalidDesign: Different materials, of which one has no Young's modulus.
-    """
-    return arm.replace(section=_with_changed_ring(arm, index, material=named_material(material)))
-
-
-def _with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Section:
-    rings = [*arm.section.rings]
-    rings[index] = rings[index].replace(**changes)
-    return arm.section.replace(rings=tuple(rings))
+    return arm.replace(section=section, actuators=actuators)
 
 
 def with_material(arm: Manipulator, material: str) -> Manipulator:
     """The arm with all of its rings made of one named material."""
-    matter = named_material(material)
-    rings = tuple(ring.replace(material=matter) for ring in arm.section.rings)
+    rings = tuple(ring.replace(material=material) for ring in arm.section.rings)
     return arm.replace(section=arm.section.replace(rings=rings))
 
 
 def with_core(arm: Manipulator, material: str) -> Manipulator:
     """The arm with a core of a named material; "" for that of the innermost ring."""
-    matter = named_material(material) if material else None
-    return arm.replace(section=arm.section.replace(core=matter))
+    return arm.replace(section=arm.section.replace(core=material or None))
 
 
 def ring_label(arm: Manipulator, index: int) -> str:

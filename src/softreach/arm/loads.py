@@ -119,12 +119,17 @@ class Loads(Part):
         if gravity:
             per_length += gravity * float(section.mass_per_length_at(profile, 0.0))
         force = payload + math.hypot(*self.tip_force) + math.hypot(*self.follower_force)
-        moment = payload * math.hypot(*self.payload_arm)
-        moment += math.hypot(*self.tip_moment) + math.hypot(*self.follower_moment)
-        for load in self.point_loads:
-            force += math.hypot(*load.force)
-            moment += math.hypot(*load.moment)
-        return per_length, force + moment / profile.length
+        force += sum(math.hypot(*load.force) for load in self.point_loads)
+        return per_length, force + self.moment_size / profile.length
+
+    @property
+    def moment_size(self) -> float:
+        """The sizes of all moments, added, that of the payload on its lever among them [N m]."""
+        moments = [self.tip_moment, self.follower_moment]
+        moments += [load.moment for load in self.point_loads]
+        weight = self.payload * math.hypot(*self.gravity)
+        lever = math.hypot(*self.payload_arm)
+        return weight * lever + sum(math.hypot(*moment) for moment in moments)
 
     def seen_from(self, base: Base) -> Self:
         """The same in the frame of a base: everything that does not follow the tip is turned."""

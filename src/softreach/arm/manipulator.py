@@ -15,7 +15,7 @@ from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
-from softreach.arm.body import Body, kind_faults, kinds_in_a_sequence, mass
+from softreach.arm.body import Body, behind, kind_faults, kinds_in_a_sequence, mass
 from softreach.arm.drives import Drive, drive_faults
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
@@ -87,9 +87,7 @@ class Manipulator(Body):
         if faults:
             return faults
         for marker in self.markers:
-            owner = f"markers.{marker.name}"
-            own = marker.place_faults(self.length)
-            faults += [fault._replace(path=f"{owner}.{fault.path}") for fault in own]
+            faults += behind(f"markers.{marker.name}", marker.place_faults(self.length))
         if self.point is not None and self.pointed is None:
             faults.append(Fault("point", self.point, self._points))
         names = [actuator.name for actuator in self.actuators], self.bundle_names
@@ -193,8 +191,8 @@ class Manipulator(Body):
         pairs = np.broadcast_to(np.asarray(activation_bounds, float), (self.bundles, 2))
         ends = np.cumsum([actuator.bundles for actuator in self.actuators], dtype=int)
         shares = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
-        actuators = tuple(actuator.with_bounds(share) for actuator, share in shares)
-        return self.replace(actuators=actuators)
+        actuators = (actuator.replace(activation_bounds=share) for actuator, share in shares)
+        return self.replace(actuators=tuple(actuators))
 
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.

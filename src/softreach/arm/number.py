@@ -292,7 +292,12 @@ def fields_of(kind: type) -> Mapping[str, Number]:
     """Numbers of a kind of part by their fields, those of the kind itself before inherited ones."""
     numbers: dict[str, Number] = {}
     inherited: dict[str, dataclasses.Field[Any]] = getattr(kind, "__dataclass_fields__", {})
-    fields = [(owner, field) for owner in kind.__mro__ for field in _own_fields(owner)]
+    fields = [
+        (owner, vars(owner)["__dataclass_fields__"][name])
+        for owner in kind.__mro__
+        for name in inspect.get_annotations(owner)
+        if name in vars(owner).get("__dataclass_fields__", {})
+    ]
     known = {field.name for owner, field in fields if "number" in field.metadata or _is_ours(owner)}
     for owner, field in fields:
         declared = field.metadata.get("number")
@@ -360,11 +365,6 @@ def as_numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
         return as_floats("values", values)
     except InvalidInput:
         return np.empty(0)
-
-
-def _own_fields(owner: type) -> list[dataclasses.Field[Any]]:
-    declared: dict[str, dataclasses.Field[Any]] = vars(owner).get("__dataclass_fields__", {})
-    return [declared[name] for name in inspect.get_annotations(owner) if name in declared]
 
 
 def _plain_number(owner: type, field: dataclasses.Field[Any]) -> Number | None:

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.along import monotone_cubic
 from softreach.arm.number import number, series_faults, stations
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
-from softreach.support.arrays import Array, as_floats
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import Fault, InvalidDesign, Range
 from softreach.support.lazy import lazy
 
@@ -70,13 +70,13 @@ class Profile(Part, ABC):
         In S the bending of each fiber has constant magnitude and rotates at a constant rate, so
         that uniform steps in S share the bending evenly.
         """
-        z = as_floats("z", z)
+        z = np.asarray(z, float)
         piece = self._piece(z)
         return self._slender_knots[piece] + self._slender_gap(piece, z - self._knots[piece])
 
     def station(self, s: ArrayLike) -> Array:
         """Z(S) [m], the inverse of `slender_coordinate`."""
-        s = as_floats("s", s)
+        s = np.asarray(s, float)
         piece = np.searchsorted(self._slender_knots[1:-1], s, "right")
         return self._knots[piece] + self._length_gap(piece, s - self._slender_knots[piece])
 
@@ -86,7 +86,7 @@ class Profile(Part, ABC):
         Its slope there is ratio · tan φ. Times tan α it is the rotation Θ of a fiber of constant
         helical angle α on that cone: theory (14). Here by Gauss quadrature in each piece.
         """
-        z = as_floats("z", z)
+        z = np.asarray(z, float)
 
         def secant(station: Array) -> Array:
             return np.hypot(1.0, ratio * self.slope(station)) / (ratio * self.radius(station))
@@ -110,14 +110,14 @@ class Profile(Part, ABC):
         gaps = self._slender_gap(np.arange(len(self._knots) - 1), np.diff(self._knots))
         return np.concatenate([[0.0], np.cumsum(gaps)])
 
-    def _piece(self, z: Array) -> NDArray[np.intp]:
+    def _piece(self, z: Array) -> Index:
         return np.searchsorted(self._knots[1:-1], z, "right")
 
-    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+    def _slender_gap(self, piece: Index, gap: Array) -> Array:
         """∫ dZ/R2 [-] over the first `gap` [m] of a piece, by Gauss quadrature."""
         return _integral(lambda station: 1.0 / self.radius(station), self._knots[piece], gap)
 
-    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+    def _length_gap(self, piece: Index, gap: Array) -> Array:
         """Length [m] over which the first `gap` [-] of S in a piece extends, by Newton's method."""
         width = np.diff(self._knots)[piece]
         length = width * gap / np.diff(self._slender_knots)[piece]
@@ -177,7 +177,7 @@ class LinearTaper(Profile):
         return float(self.radius(self.length))
 
     def radius(self, z: ArrayLike) -> Array:
-        return self.outer_radius - as_floats("z", z) * np.tan(self.taper)
+        return self.outer_radius - np.asarray(z, float) * np.tan(self.taper)
 
     def slope(self, z: ArrayLike) -> Array:
         """tan φ, the same everywhere [-]."""
@@ -185,12 +185,12 @@ class LinearTaper(Profile):
 
     def slender_coordinate(self, z: ArrayLike) -> Array:
         """S(Z) = Z/R2(0) · log(1 - q)/(-q) [-], with q = Z tan φ/R2(0): theory (15)."""
-        z = as_floats("z", z)
+        z = np.asarray(z, float)
         return z / self.outer_radius * _relative_log(z * np.tan(self.taper) / self.outer_radius)
 
     def station(self, s: ArrayLike) -> Array:
         """Z(S) = R2(0) S (exp(y) - 1)/y [m] with y = -S tan φ: theory (16)."""
-        s = as_floats("s", s)
+        s = np.asarray(s, float)
         return self.outer_radius * s * _relative_expm1(-s * np.tan(self.taper))
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
@@ -246,11 +246,11 @@ class PiecewiseTaper(_RadiiAtStations):
     """
 
     def radius(self, z: ArrayLike) -> Array:
-        return np.interp(as_floats("z", z), self._knots, self.radii)
+        return np.interp(np.asarray(z, float), self._knots, self.radii)
 
     def slope(self, z: ArrayLike) -> Array:
         """tan φ(Z) [-]; at a station, that of the piece which begins there."""
-        return self._slopes[self._piece(as_floats("z", z))]
+        return self._slopes[self._piece(np.asarray(z, float))]
 
     @lazy
     def _slopes(self) -> Array:
@@ -258,17 +258,17 @@ class PiecewiseTaper(_RadiiAtStations):
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """∫ dZ/(R cos φ) [-], piece by piece: theory (17)."""
-        z = as_floats("z", z)
+        z = np.asarray(z, float)
         piece, secant = self._piece(z), np.hypot(1.0, ratio * self._slopes) / ratio
         before = np.concatenate([[0.0], np.cumsum(np.diff(self._slender_knots) * secant)])
         last = self._slender_gap(piece, z - self._knots[piece])
         return before[piece] + last * secant[piece]
 
-    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+    def _slender_gap(self, piece: Index, gap: Array) -> Array:
         start, slope = np.asarray(self.radii)[piece], self._slopes[piece]
         return gap / start * _relative_log(gap * slope / start)
 
-    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+    def _length_gap(self, piece: Index, gap: Array) -> Array:
         return np.asarray(self.radii)[piece] * gap * _relative_expm1(-gap * self._slopes[piece])
 
 
@@ -281,10 +281,10 @@ class SampledTaper(_RadiiAtStations):
     """
 
     def radius(self, z: ArrayLike) -> Array:
-        return self._curve(as_floats("z", z) / self.length)
+        return self._curve(np.asarray(z, float) / self.length)
 
     def slope(self, z: ArrayLike) -> Array:
-        return -self._curve_slope(as_floats("z", z) / self.length) / self.length
+        return -self._curve_slope(np.asarray(z, float) / self.length) / self.length
 
     @lazy
     def _curve(self) -> Any:

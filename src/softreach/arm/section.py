@@ -188,11 +188,11 @@ class Section(Part):
         Raises:
             InvalidDesign: There is none.
         """
+        if isinstance(which, int) and 0 <= which < len(self.rings):
+            return which
         names = [ring.name for ring in self.rings]
         if isinstance(which, str) and which in names:
             return names.index(which)
-        if isinstance(which, int) and 0 <= which < len(names):
-            return which
         known = ", ".join(f"{k} ({name})" if name else str(k) for k, name in enumerate(names))
         raise InvalidDesign([Fault("ring", which, f"must be one of the section's rings: {known}")])
 
@@ -254,11 +254,15 @@ class Section(Part):
         Args:
             radius: R2 [m].
         """
-        outer = np.asarray(radius, float)
-        area, inertia = np.pi * self._sum(_modulus, 2), np.pi / 4 * self._sum(_modulus, 4)
+        outer, (axial, bending, torsion) = np.asarray(radius, float), self._relative_stiffness
+        return Stiffness(axial * outer**2, bending * outer**4, torsion * outer**4)
+
+    @lazy
+    def _relative_stiffness(self) -> tuple[float, float, float]:
+        """K0/R2² [Pa], K1/R2⁴ and K3/R2⁴ [Pa]."""
         shear = self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
-        polar = np.pi / 4 * shear
-        return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)
+        bending = np.pi / 4 * self._sum(_modulus, 4)
+        return np.pi * self._sum(_modulus, 2), bending, np.pi / 4 * shear
 
     def mass_per_length(self, radius: ArrayLike) -> Array:
         """Σ ρ π (R2² - R1²) [kg/m] at R2 [m], that of the materials: theory (49).

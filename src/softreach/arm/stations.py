@@ -89,12 +89,6 @@ class Located(Part):
         ratio = getattr(self, f"{field}_over_length")
         return length * ratio if place is None else float(place)
 
-    def station_over_length_at(self, field: str, length: float) -> float:
-        """The same over L [-]."""
-        if getattr(self, field) is None:
-            return getattr(self, f"{field}_over_length")
-        return self.station_at(field, length) / length
-
     def place_faults(self, length: float) -> list[Fault]:
         """Faults of places that an arm of a length [m] does not have."""
         allowed = f"must be on the arm, at most {length:g} m"
@@ -134,8 +128,9 @@ class Span(Located):
 
     def span_over_length(self, length: float) -> tuple[float, float]:
         """The same over L [-]."""
-        start, end = (self.station_over_length_at(field, length) for field in ("start", "end"))
-        return start, end
+        start, end = (z / length for z in self.span(length))
+        start = self.start_over_length if self.start is None else start
+        return start, self.end_over_length if self.end is None else end
 
     def place_faults(self, length: float) -> list[Fault]:
         """Faults of ends that an arm of a length [m] does not have."""

@@ -20,7 +20,7 @@ from softreach.cloud.clouds import tip_map_of
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.steps import pilot_activations
-from softreach.rod.tip_map import Strains, TipMap, loads_too_heavy, no_equilibrium_message
+from softreach.rod.tip_map import Strains, TipMap, no_equilibrium
 from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_given, as_instance, as_integer
@@ -177,7 +177,7 @@ def strain_ranges(tip_map: ArmMap, z: Array) -> tuple[Array, Array, Array]:
     gamma = pilot_activations(inner.arm, inner.box)
     strains = inner.strains(gamma, z)
     if np.isnan(strains.extension).all():
-        raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
+        raise no_equilibrium(len(gamma), "an equilibrium")
     return _sampled(strains)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.kernels.branches.spread import MOST_IN_BINS, choose_apart, choose_in_bins
-from softreach.rod.tip_map import TipMap, no_stable_equilibrium
+from softreach.rod.tip_map import TipMap, no_equilibrium
 from softreach.sampling import sample_cube
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
@@ -163,7 +163,7 @@ def seeds(tip_map: TipMap, coarse: TipMap) -> Seeds:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
     samples = _with_tips(tip_map, gamma, coarse)
     if not len(samples.gamma):
-        raise no_stable_equilibrium(len(gamma))
+        raise no_equilibrium(len(gamma))
     return samples
 
 

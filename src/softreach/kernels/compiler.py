@@ -19,8 +19,6 @@ from numba.core.dispatcher import Dispatcher
 
 from softreach.support.interruption import check_stopped
 
-__all__ = ["FAST", "inline", "kernel", "not_kept", "pasted", "strict"]
-
 _LOG = logging.getLogger(__name__)
 
 not_kept: list[str] = []

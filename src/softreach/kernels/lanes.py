@@ -5,8 +5,6 @@ from __future__ import annotations
 from softreach.kernels.compiler import inline
 from softreach.kernels.rod.tips import load
 
-__all__ = ["LANES", "copy", "get", "get_four", "load_all", "put", "put_four", "turn_at"]
-
 LANES = 32
 """Rods side by side: whole blocks only, so that a rod's result never depends on its neighbors.
 

@@ -26,9 +26,6 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 from numba.core.typed_passes import NativeLowering
 
-__all__ = ["KernelDispatcher", "PartedDispatcher", "loaded", "missing"]
-
-
 _PRIVATE: tuple[tuple[Any, tuple[str, ...]], ...] = (
     (JITCodeLibrary, ("_finalize_dynamic_globals", "_get_module_for_linking", "_finalized")),
     (JITCodeLibrary, ("_codegen", "_final_module", "_linking_libraries", "_reload_init")),

@@ -5,8 +5,6 @@ from __future__ import annotations
 from softreach.kernels import vector
 from softreach.kernels.compiler import strict
 
-__all__ = ["cross", "difference", "dot", "minus", "row", "times"]
-
 row = strict(vector.row)
 difference = strict(vector.difference)
 minus = strict(vector.minus)

@@ -8,21 +8,6 @@ from __future__ import annotations
 
 from softreach.kernels.compiler import inline
 
-__all__ = [
-    "back",
-    "cofactors",
-    "combination",
-    "cross",
-    "difference",
-    "dot",
-    "matrix",
-    "minus",
-    "plus",
-    "row",
-    "times",
-    "turned",
-]
-
 
 @inline
 def row(points, i):

@@ -100,7 +100,8 @@ def plot_cross_section(
 
 def _needs_legend(arm: Manipulator) -> bool:
     """True where colors alone leave open what is what."""
-    plain = set(arm.outline(0.0).shape) == {"sector"} and set(arm.fiber_directions) == {"along"}
+    along = {actuator.fiber_direction for actuator in arm.actuators} == {"along"}
+    plain = along and set(arm.outline(0.0).shape) == {"sector"}
     return not plain or len(_section_materials(arm.section)) > 1
 
 
@@ -220,8 +221,9 @@ class _Placed:
 def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> list[_Placed]:
     outline = arm.outline(z)
     sizes = (outline.center[0], outline.extent, outline.inner_ratio[0], outline.outer_ratio[0])
+    ways = [actuator.fiber_direction for actuator in arm.bundle_actuators]
     return [
-        _Placed(k, outline.shape[k], arm.fiber_directions[k], *(float(size[k]) for size in sizes))
+        _Placed(k, outline.shape[k], ways[k], *(float(size[k]) for size in sizes))
         for k in bundles
         if outline.acts[0, k]
     ]

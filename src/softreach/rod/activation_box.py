@@ -8,11 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.support.arrays import as_rows, labeled, read_only
+from softreach.support.arrays import Array, as_rows, labeled, read_only
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

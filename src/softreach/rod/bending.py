@@ -24,8 +24,6 @@ from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 
-__all__ = ["BendingRange", "bending_over_bounds", "some_corners", "worst_inputs"]
-
 _MOST_CORNERS = 10  # inputs of which all corners are tried
 _OF_BENDING = 256  # samples for which bending is looked at, which loads make dear
 _AROUND = 64  # samples for each place tried around the worst

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from threading import RLock
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,9 +34,8 @@ from softreach.rod.tip_map import (
     position_slopes,
 )
 from softreach.support import parallel
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-
-Array = NDArray[np.float64]
 
 _LEVER = 4.0  # of what is off by turning at the tip, over what is off by moving, per length
 
@@ -268,19 +267,8 @@ def _tables_at(arm: Manipulator, stations: bytes) -> Tables:
     return tables(arm, np.frombuffer(stations))
 
 
-class LinearStrains(NamedTuple):
-    """Strains that are linear in the activations, (n, station) of each."""
-
-    curvature: Array
-    """Uγ [1/m] in the directors, per length of η."""
-    extension: Array
-    """ζ = 1 + z·γ [-]."""
-    rest_length_factor: Array
-    """η [-], what fibers and muscles make of the length of matter at rest: theory (7)."""
-
-
-def linear_strains(table: Tables, gamma: Array) -> LinearStrains:
-    """Uγ, ζ and η at the stations of a table.
+def linear_strains(table: Tables, gamma: Array) -> tuple[Array, Array, Array]:
+    """Uγ, ζ = 1 + z·γ and η at the stations of a table: theory (7).
 
     Samples vary fastest in memory, so that all values at one station lie side by side. The sum runs
     over the bundles in their order, whatever BLAS and its threads would do.
@@ -288,24 +276,25 @@ def linear_strains(table: Tables, gamma: Array) -> LinearStrains:
     Args:
         table: z and U, and the part of z in η.
         gamma: Activations, shape (n, bundles).
+
+    Returns:
+        Curvature [1/m] in the directors, per length of η, shape (n, station, 3); ζ [-] and η [-],
+        what fibers and muscles make of the length of matter at rest, shape (n, station) each.
     """
     parts = [table.curvature, table.extension[:, None]]
     parts += [table.rest_length_factor[:, None]] if table.has_forces else []
     rows, bundles = np.concatenate(parts, axis=1), np.ascontiguousarray(gamma.T)
     columns = rows.shape[1]
-    total, term = np.empty((len(rows), columns, len(gamma))), np.empty((columns, len(gamma)))
-    if not len(bundles):
-        total[:] = 0.0
-    for row, out in zip(
-        rows if len(bundles) else (), total, strict=False
-    ):  # station by station, so that terms stay cached
-        np.multiply(row[:, :1], bundles[0], out=out)
-        for j in range(1, len(bundles)):
-            out += np.multiply(row[:, j : j + 1], bundles[j], out=term)
+    total, term = np.zeros((len(rows), columns, len(gamma))), np.empty((columns, len(gamma)))
+    for row, out in zip(rows, total, strict=True):  # station by station, so that terms stay cached
+        for j, bundle in enumerate(bundles):
+            product = np.multiply(row[:, j : j + 1], bundle, out=term if j else out)
+            if j:
+                out += product
     total[:, 3:] += 1.0
     extension = total[:, 3].T
     eta = total[:, 4].T if table.has_forces else extension
-    return LinearStrains(np.moveaxis(total[:, :3], 2, 0), extension, eta)
+    return np.moveaxis(total[:, :3], 2, 0), extension, eta
 
 
 def per_length(curvature: Array, extension: Array, eta: Array) -> Strains:

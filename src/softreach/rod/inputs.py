@@ -15,11 +15,8 @@ from numpy.typing import NDArray
 from softreach.arm.driving import Driving, inner_arm
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-
-__all__ = ["Inputs", "activation_measures"]
-
-Array = NDArray[np.float64]
 
 _OF_LENGTHS = 0.03
 """Tolerance of shapes of which lengths are taken, over that of tips."""
@@ -152,7 +149,7 @@ class Inputs:
             half_widths[self._columns] = own
         if self.driving is None:
             return half_widths
-        return self.driving.widths @ half_widths if self.driving.is_affine else None
+        return np.abs(self.driving.gains) @ half_widths if self.driving.is_affine else None
 
 
 def _bounds(driving: Driving) -> ActivationBox:

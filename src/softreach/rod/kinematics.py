@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach import schema
 from softreach.arm.driving import body_of
@@ -20,25 +20,12 @@ from softreach.rod.rods import ArmMap, as_tip_map, with_unstable
 from softreach.rod.tip_map import Frame, Frames, Shapes, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "configuration",
-    "marked",
-    "marker_positions",
-    "marker_sections",
-    "rest_configuration",
-    "shape_dataset",
-    "stations_along",
-    "tip_jacobian",
-    "tip_positions",
-]
-
-Array = NDArray[np.float64]
 
 _LINES_TOGETHER = 256  # samples
 
@@ -127,6 +114,12 @@ def marker_positions(
     return _markers(tip_map, gamma)
 
 
+def _markers(tip_map: TipMap, gamma: Array) -> Array:
+    if not len(z := marker_sections(tip_map.arm)):
+        return np.empty((len(gamma), 0, 3))
+    return marked(tip_map.arm, z, tip_map.frames(gamma, z))
+
+
 def marker_sections(arm: Manipulator) -> Array:
     """Z of the sections of all markers [m], ascending."""
     return np.unique([marker.station_at("station", arm.length) for marker in arm.markers])
@@ -146,13 +139,6 @@ def marked(arm: Manipulator, z: Array, frames: Frames) -> Array:
     section, offsets = np.searchsorted(z, stations), [marker.offset for marker in arm.markers]
     turned = np.einsum("mk,nmkx->nmx", np.array(offsets), frames.directors[:, section])
     return frames.position[:, section] + turned
-
-
-def _markers(tip_map: TipMap, gamma: Array) -> Array:
-    z = marker_sections(tip_map.arm)
-    return (
-        marked(tip_map.arm, z, tip_map.frames(gamma, z)) if len(z) else np.empty((len(gamma), 0, 3))
-    )
 
 
 def configuration(
@@ -187,8 +173,13 @@ def configuration(
     values = as_floats("activation", activation)
     gamma = tip_map.check_activations("activation", np.atleast_2d(values))
     z, status = stations_along(tip_map, stations), np.empty(len(gamma), np.int8)
-    shapes = tip_map.shapes(gamma, z, z, status)
-    others = {"marker_position": _markers(tip_map, gamma), **_lines(tip_map, gamma)}
+    nodes = quadrature(body_of(tip_map.arm))[0] if tip_map.arm.bundles else np.empty(0)
+    strained = np.union1d(z, nodes)
+    *frames, curvature, extension = tip_map.shapes(gamma, z, strained, status)
+    at, on_lines = np.searchsorted(strained, z), np.searchsorted(strained, nodes)
+    others = _lines(tip_map, gamma, curvature[:, on_lines], extension[:, on_lines])
+    others["marker_position"] = _markers(tip_map, gamma)
+    shapes = Shapes(*frames, curvature[:, at], extension[:, at])
     dataset = shape_dataset(tip_map, gamma, z, shapes, **others)
     if tip_map.supports_unstable:
         dataset = schema.with_status(dataset, status)
@@ -239,15 +230,14 @@ def shape_dataset(
     )
 
 
-def _lines(tip_map: ArmMap, gamma: Array) -> dict[str, Array]:
+def _lines(tip_map: ArmMap, gamma: Array, curvature: Array, extension: Array) -> dict[str, Array]:
     """Lengths of the lines of bundles, and what drives and displacements activate there."""
     arm, length = tip_map.arm, np.empty((len(gamma), tip_map.arm.bundles))
     if not arm.bundles:
         return {}
-    nodes = quadrature(body_of(arm))[0]
-    for block in parallel.blocks(len(gamma), _LINES_TOGETHER):
-        curvature, extension = tip_map.strains(gamma[block], nodes)
-        length[block] = lengths_of_strains(arm, curvature * extension[..., None], extension)
+    for b in parallel.blocks(len(gamma), _LINES_TOGETHER):
+        turn = curvature[b] * extension[b, :, None]
+        length[b] = lengths_of_strains(arm, turn, extension[b])
     if arm.is_direct:
         return {"line_length": length}
     activation = tip_map.inputs.activations(gamma)[:, : arm.bundles]

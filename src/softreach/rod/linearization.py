@@ -32,11 +32,8 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import Tables, both_sides, tables
 from softreach.kernels.rod.frames import relative_strains
 from softreach.rod.activation_box import ActivationBox
+from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-
-__all__ = ["Linearization"]
-
-Array = NDArray[np.float64]
 
 _STATIONS = 201
 _SAFETY = 1.02  # for quadrature, and for the steps of the map as it is computed
@@ -166,7 +163,9 @@ class Linearization:
         of_each = self.curvature[:, :, free] * half_widths[free]
         if len(free) > _MOST_SIGNS:
             return np.linalg.norm(of_each, axis=1).sum(axis=1)[None]
-        return np.linalg.norm(np.einsum("scj,dj->dsc", of_each, _signs(len(free))), axis=2)
+        bits = np.arange(1 << (len(free) - 1))[:, None] >> np.arange(len(free)) & 1
+        signs = np.array(1.0 - 2.0 * bits, np.float64)  # but for that of all together
+        return np.linalg.norm(np.einsum("scj,dj->dsc", of_each, signs), axis=2)
 
 
 def _with_rigid_end(table: Tables, end: float, reach: float) -> Tables:
@@ -179,12 +178,6 @@ def _with_rigid_end(table: Tables, end: float, reach: float) -> Tables:
     extension = ending(table.extension)
     resting = ending(table.rest_length_factor) if table.has_forces else extension
     return Tables(z, extension, ending(table.curvature), resting)
-
-
-def _signs(count: int) -> Array:
-    """All signs of so many numbers, but for that of all together, shape (d, count)."""
-    bits = np.arange(1 << max(count - 1, 0))[:, None] >> np.arange(count) & 1
-    return np.array(1.0 - 2.0 * bits, np.float64)
 
 
 def _integrals(values: Array, z: Array) -> Array:

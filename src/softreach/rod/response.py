@@ -20,22 +20,8 @@ from softreach.arm.tables import compliance, tables
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
 from softreach.rod.free import ArmRod
 from softreach.support import parallel
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-
-__all__ = [
-    "NodeTables",
-    "Response",
-    "RodState",
-    "StepGrid",
-    "dead_force",
-    "linear_response",
-    "node_tables",
-    "payload_weight",
-    "rod_state",
-    "step_grid",
-]
-
-Array = NDArray[np.float64]
 
 _TOGETHER = 64
 """Samples to a task."""

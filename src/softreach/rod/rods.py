@@ -34,20 +34,6 @@ from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
 
-__all__ = [
-    "ArmMap",
-    "all_inputs",
-    "as_tip_map",
-    "coarsened",
-    "effective",
-    "free_bundles",
-    "in_steps",
-    "measured_bundles",
-    "of_tip",
-    "refined",
-    "with_unstable",
-]
-
 
 @dataclass(frozen=True, repr=False)
 class ArmMap(TipMap):
@@ -137,7 +123,8 @@ class ArmMap(TipMap):
         directions: Array | None = None,
     ) -> None:
         """Put tips, and what else is asked for, of inputs into place."""
-        if self._is_rod:
+        is_whole = self.unstable or not self.supports_unstable
+        if is_whole and self.inputs.are_activations and self.pose.is_identity:
             others = {"twists": twists, "status": status, "directions": directions}
             self.rod.fill(gamma, tips, slopes, **others)
             return
@@ -161,12 +148,6 @@ class ArmMap(TipMap):
             if room is not None and values is not None and room is not values:
                 self.inputs.along_x(room, of_drives, values)
         self._drop(lost, status, tips, slopes, twists, directions)
-
-    @lazy
-    def _is_rod(self) -> bool:
-        """True if nothing changes of what the rod gives."""
-        is_whole = self.unstable or not self.supports_unstable
-        return is_whole and self.inputs.are_activations and self.pose.is_identity
 
     def _known(self, inner: Array) -> tuple[Array, NDArray[np.intp]]:
         """Activations with the lower bounds where no tensions were found, and their rows."""

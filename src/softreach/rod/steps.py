@@ -21,11 +21,10 @@ from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
 from softreach.support import parallel
-from softreach.support.arrays import read_only
+from softreach.support.arrays import Array, read_only
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
-Array = NDArray[np.float64]
 Differences = Callable[[Array], Array]
 
 _SAFETY = 2.0
@@ -180,7 +179,7 @@ class StepRule:
             errors = difference(pilot)
             error = float(errors.max())
             if error <= allowed:
-                worse, errors = worsened(difference, pilot, errors, self.box)
+                worse, errors = _worsened(difference, pilot, errors, self.box)
                 error = float(errors.max())
                 if error <= allowed:
                     return steps
@@ -316,19 +315,12 @@ def _bending_corners(arm: Manipulator) -> Array:
     return np.unique((helps > 0).astype(float), axis=0)
 
 
-def worsened(
-    error: Callable[[Array], Array], pilot: Array, known: Array, box: ActivationBox
+def _worsened(
+    error: Differences, pilot: Array, known: Array, box: ActivationBox
 ) -> tuple[Array, Array]:
-    """Activations of larger error, by moving one bundle to a bound at a time, from the worst.
+    """Activations of larger error, and that: one bundle at a time goes to a bound, from the worst.
 
-    Args:
-        error: Errors of activations (n, bundles), shape (n,).
-        pilot: Activations to begin with, shape (n, bundles).
-        known: Their errors, shape (n,).
-        box: The bounds.
-
-    Returns:
-        Ends of the searches, shape (at most 8, bundles), and the errors there.
+    The errors of the pilot are known.
     """
     chosen = np.argsort(-known, kind="stable")[:_SEARCHED]
     gamma, worst = pilot[chosen].copy(), known[chosen].copy()

@@ -26,12 +26,9 @@ from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, bending_over_bounds
+from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidInput
 from softreach.support.quantity import columns
-
-__all__ = ["DesignSummary", "describe", "design_warnings"]
-
-Array = NDArray[np.float64]
 
 _TEXTS = ("lacking", "validity", "warnings")
 _UNITS = {"helical_angles": "rad", "revolutions": "rad", "base_radius": "m", "tip_radius": "m"}
@@ -90,17 +87,11 @@ class DesignSummary:
         rows, texts = [], [*self.lacking, *self.validity, *self.warnings]
         for name, value in vars(self).items():
             if value is not None and np.size(value) and name not in _TEXTS:
-                numbers = (
-                    _spans(value)
-                    if isinstance(value, np.ndarray) and value.ndim == 2
-                    else _in_row(np.ravel(value))
-                )
+                numbers = ", ".join(f"{number:.4g}" for number in np.ravel(value))
+                if isinstance(value, np.ndarray) and value.ndim == 2:
+                    numbers = _spans(value)
                 rows.append((name.replace("_", " "), f"{numbers} {_UNITS.get(name, '')}".rstrip()))
         return "\n".join([*columns(rows), *texts])
-
-
-def _in_row(numbers: Array) -> str:
-    return ", ".join(f"{number:.4g}" for number in numbers)
 
 
 def _spans(ends: Array) -> str:

@@ -20,11 +20,10 @@ from softreach.arm.stations import Marker
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
 from softreach.support.arguments import as_number
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput, Range, counted
 from softreach.support.lazy import lazy
 
-Array = NDArray[np.float64]
 Status = NDArray[np.int8]
 Frame = Literal["world", "base"]
 """Frame of places: the world, or that of the base, whose z is along the straight arm."""
@@ -470,24 +469,11 @@ def check_tol(tol: float) -> float:
 
 
 def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> str:
-    """The sentence "none of 9 activations tried has a stable equilibrium".
-
-    Args:
-        tried: Number of activations.
-        sought: The thing that they do not have.
-    """
+    """The sentence "none of 9 activations tried has a stable equilibrium"."""
     return f"none of {tried} activations tried has {sought}"
 
 
-def loads_too_heavy(missing: str) -> InvalidInput:
-    """Error of loads under which nothing is left to go on with.
-
-    Args:
-        missing: As `no_equilibrium_message` says it.
-    """
+def no_equilibrium(tried: int, sought: str = "a stable equilibrium") -> InvalidInput:
+    """Error of loads under which none of so many activations has what is sought."""
+    missing = no_equilibrium_message(tried, sought)
     return InvalidInput("loads", missing, "such that some have one", "lighten the load")
-
-
-def no_stable_equilibrium(tried: int) -> InvalidInput:
-    """Error of loads under which none of so many activations has a stable equilibrium."""
-    return loads_too_heavy(no_equilibrium_message(tried))

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from softreach.kernels.box.simplices import corner_steps
 from softreach.kernels.image.contour import stretches
 from softreach.rod.rods import refined
-from softreach.rod.tip_map import Held, TipMap, no_stable_equilibrium
+from softreach.rod.tip_map import Held, TipMap, no_equilibrium
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
@@ -72,7 +72,7 @@ def grid_tips(
         tips[rows] = tip_map.tips(tip_map.box.from_free_cube(places[rows]))
         progress(0)
     if tip_map.supports_unstable and np.isnan(tips[:, 0]).all():
-        raise no_stable_equilibrium(len(tips))
+        raise no_equilibrium(len(tips))
     return tips
 
 
@@ -181,7 +181,7 @@ class LiftedGrid:
             return cls.of_one_sheet(grid_tips(tip_map, n, progress, ticks), n, m)
         progress(0)
         if not len(held.node):
-            raise no_stable_equilibrium(len(nodes))
+            raise no_equilibrium(len(nodes))
         return _lifted(held, n, m)
 
     @classmethod

@@ -17,7 +17,7 @@ from softreach.kernels.box.bounded_descent import (
 )
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
-from softreach.rod.tip_map import BLOCK, TipMap, no_stable_equilibrium
+from softreach.rod.tip_map import BLOCK, TipMap, no_equilibrium
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
@@ -282,7 +282,7 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
         return gamma, tips
     stable = np.isfinite(tips[:, 0])
     if not stable.any():
-        raise no_stable_equilibrium(len(tips))
+        raise no_equilibrium(len(tips))
     return gamma[stable], tips[stable]
 
 

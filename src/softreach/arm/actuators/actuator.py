@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.along import AlongArm
 from softreach.arm.number import MOST, Number, as_numbers, number
@@ -105,7 +104,10 @@ class Actuator(Span, ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "activation_bounds", _plain_bounds(self.activation_bounds))
+        pairs = np.atleast_2d(np.asarray(self.activation_bounds, float)).tolist()
+        bounds = [(low, high) for low, high in pairs]
+        bounds = bounds[0] if all(pair == bounds[0] for pair in bounds) else tuple(bounds)
+        object.__setattr__(self, "activation_bounds", bounds)
 
     @property
     def numbers(self) -> dict[str, Number]:
@@ -167,10 +169,6 @@ class Actuator(Span, ABC):
     def bounds(self) -> Array:
         """Lower and upper activation of each bundle [unit], shape (bundles, 2)."""
         return np.broadcast_to(np.asarray(self.activation_bounds, float), (self.bundles, 2))
-
-    def with_bounds(self, bounds: ArrayLike) -> Self:
-        """A copy with other bounds [unit], shape (bundles, 2)."""
-        return self.replace(activation_bounds=bounds)
 
     @property
     def bundle_names(self) -> tuple[str, ...]:
@@ -253,8 +251,3 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
         several = f", or {bundles} pairs: one for each bundle" if bundles > 1 else ""
         allowed = f"must be one pair{several}"
     return [Fault("activation_bounds", bounds, allowed)] if allowed else []
-
-
-def _plain_bounds(bounds: ArrayLike) -> Bounds:
-    pairs = [(low, high) for low, high in np.atleast_2d(np.asarray(bounds, float)).tolist()]
-    return pairs[0] if all(pair == pairs[0] for pair in pairs) else tuple(pairs)

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
 
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.actuators.sector import RingIntegrals, SectorActuator, cone_integrals
-from softreach.arm.along import AlongArm, Pieces
+from softreach.arm.along import AlongArm, Pieces, values_along
 from softreach.arm.number import number
 from softreach.arm.profile import Profile
-from softreach.arm.section import Section
+from softreach.arm.section import Ring, Section
 from softreach.support.arrays import Array
 
 # Enough for machine precision between two samples of an angle.
@@ -60,18 +61,16 @@ class FiberArchitecture(SectorActuator):
 
     def helical_angle_on(self, profile: Profile, section: Section) -> float | AlongArm:
         """α at the outer radius of the ring [rad], which the revolution fixes."""
-        if self.helical_angle is not None:
-            return self.helical_angle
-        ratio, (start, end) = section.ring(self.ring).outer_ratio, self.span(profile.length)
-        turn = profile.surface_coordinate(end, ratio)
-        if start > 0.0:
-            turn -= profile.surface_coordinate(start, ratio)
-        return math.atan((self.revolution or 0.0) / float(turn))
+        return self._angle(profile, section.ring(self.ring))
+
+    def _angle(self, profile: Profile, ring: Ring) -> float | AlongArm:
+        given = self.helical_angle
+        return _even_angle(self, profile, ring.outer_ratio) if given is None else given
 
     def revolution_on(self, profile: Profile, section: Section) -> float:
         """Ω = Θ(L) [rad], which the helical angle fixes: theory (14)."""
         end = np.asarray(self.span(profile.length)[1:])
-        return float(self.rotation(profile, section, end)[0])
+        return float(self.rotation(profile, section.ring(self.ring), end)[0])
 
     def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
         if field == "revolution":
@@ -80,16 +79,15 @@ class FiberArchitecture(SectorActuator):
             return self.helical_angle_on(profile, section)
         return super()._following(field, other, profile, section)
 
-    def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
+    def integrals(self, profile: Profile, ring: Ring, z: Array) -> RingIntegrals:
         """I0, I1, I3 for the local taper and helical angle: theory (3)."""
-        angle = self.helical_angle_on(profile, section)
-        local = angle(z / profile.length) if isinstance(angle, AlongArm) else np.full(len(z), angle)
-        return cone_integrals(section.ring(self.ring), profile.slope(z), local)
+        local = values_along(self._angle(profile, ring), z / profile.length)
+        return cone_integrals(ring, profile.slope(z), local)
 
-    def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
+    def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
         """Θ(Z) = ∫ tan α dZ/(R cos φ) from where it begins [rad]: theory (50)."""
-        angle, ratio = self.helical_angle_on(profile, section), section.ring(self.ring).outer_ratio
-        start, _ = self.span(profile.length)
+        angle, ratio = self._angle(profile, ring), ring.outer_ratio
+        start = self.station_at("start", profile.length)
         if isinstance(angle, AlongArm):
             turned = _rotation_from_base(profile, ratio, angle, np.append(z, start))
             return turned[:-1] - turned[-1]
@@ -97,6 +95,16 @@ class FiberArchitecture(SectorActuator):
         if start > 0.0:
             turned = turned - profile.surface_coordinate(start, ratio)
         return turned * np.tan(angle)
+
+
+@lru_cache(maxsize=64)
+def _even_angle(fiber: FiberArchitecture, profile: Profile, ratio: float) -> float:
+    """α of a revolution on the cone of a ring [rad]; each table of an arm asks for it."""
+    start, end = fiber.span(profile.length)
+    turn = profile.surface_coordinate(end, ratio)
+    if start > 0.0:
+        turn -= profile.surface_coordinate(start, ratio)
+    return math.atan((fiber.revolution or 0.0) / float(turn))
 
 
 def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Array) -> Array:
@@ -153,12 +161,11 @@ class ObliqueMuscle(SectorActuator):
             return "along"
         return "right-handed" if self.helical_angle > 0 else "left-handed"
 
-    def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
+    def integrals(self, profile: Profile, ring: Ring, z: Array) -> RingIntegrals:
         """I0, I1, I3 with the local taper and the angle of the fibers: theory (3)."""
-        angle = np.full(len(z), self.helical_angle)
-        return cone_integrals(section.ring(self.ring), profile.slope(z), angle)
+        return cone_integrals(ring, profile.slope(z), np.full(len(z), self.helical_angle))
 
-    def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
+    def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
         return np.zeros(len(z))
 
 
@@ -181,13 +188,12 @@ class RadialMuscle(SectorActuator):
     def fiber_direction(self) -> str:
         return "radial"
 
-    def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
+    def integrals(self, profile: Profile, ring: Ring, z: Array) -> RingIntegrals:
         """I0 = -ν (1 - ρ²)/2, I1 = -ν (1 - ρ³)/3, I3 = 0 [-]."""
-        ring = section.ring(self.ring)
         nu, rho, each = ring.material.poisson_ratio, ring.radius_ratio, np.ones(len(z))
         return RingIntegrals(
             -nu * (1.0 - rho**2) / 2.0 * each, -nu * (1.0 - rho**3) / 3.0 * each, 0.0 * each
         )
 
-    def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
+    def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
         return np.zeros(len(z))

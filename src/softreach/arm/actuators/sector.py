@@ -53,11 +53,11 @@ class SectorActuator(PolarActuator):
     """(lower, upper) of γ for every bundle, or one pair per bundle [-]; γ < 0 contracts."""
 
     @abstractmethod
-    def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
-        """I0, I1, I3 at stations Z [m], each of shape (station,): theory (3)."""
+    def integrals(self, profile: Profile, ring: Ring, z: Array) -> RingIntegrals:
+        """I0, I1, I3 of its ring at stations Z [m], each of shape (station,): theory (3)."""
 
     @abstractmethod
-    def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
+    def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
         """Θ(Z) [rad]: how far the sectors have turned at stations Z [m] from where they begin."""
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
@@ -67,8 +67,8 @@ class SectorActuator(PolarActuator):
         """
         ring = section.ring(self.ring)
         radius, scale = profile.radius(z) * ring.outer_ratio, np.pi * ring.modulus
-        axial, bending, torsion = self.integrals(profile, section, z)
-        theta = self.angles(profile, section, z)
+        axial, bending, torsion = self.integrals(profile, ring, z)
+        theta = self.angles(profile, ring, z)
         share, mean = self.extent / np.pi, 2.0 * np.sin(self.extent / 2.0) / np.pi
         bend = (scale * radius**3 * bending * mean)[:, None]
         twist = (scale * radius**3 * torsion * share)[:, None]
@@ -78,7 +78,7 @@ class SectorActuator(PolarActuator):
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
         ring, each = section.ring(self.ring), np.ones(self.bundles)
-        center = self.angles(profile, section, z)
+        center = self.angles(profile, ring, z)
         return Outline(
             center=center,
             extent=self.extent * each,
@@ -100,9 +100,9 @@ class SectorActuator(PolarActuator):
         allowed = f"must be given in Pa for {self.name!r}, which acts on measured stiffnesses"
         return [Fault(f"rings[{index}].material.young_modulus", None, allowed)]
 
-    def angles(self, profile: Profile, section: Section, z: Array) -> Array:
+    def angles(self, profile: Profile, ring: Ring, z: Array) -> Array:
         """θ0 + 2πj/n + Θ(Z) [rad], shape (station, bundle): theory (11)."""
-        return self.start_angles + self.rotation(profile, section, z)[:, None]
+        return self.start_angles + self.rotation(profile, ring, z)[:, None]
 
     def _faults(self) -> list[Fault]:
         ring, faults = self.ring, super()._faults()
@@ -125,16 +125,14 @@ def ring_integrals(
     Returns:
         I0, I1, I3 [-], each of the broadcast shape of the arguments.
     """
-    ratio, phi, alpha, nu = (
-        np.asarray(a, float)[..., None]
-        for a in np.broadcast_arrays(radius_ratio, taper, helical_angle, poisson_ratio)
-    )
+    each = np.broadcast_arrays(radius_ratio, taper, helical_angle, poisson_ratio)
+    ratio, phi, alpha, nu = np.array(each, float)[..., None]
     x, weight = _nodes(ratio, np.abs(np.tan(alpha)))
     cone = 1.0 + (x * np.tan(phi)) ** 2
     helix = 1.0 + (x * np.tan(alpha)) ** 2
     k = (1.0 + nu) / (cone * helix) - nu
     t = x * np.tan(alpha) / (helix * np.sqrt(cone))
-    return RingIntegrals(*(np.sum(weight * f, axis=-1) for f in (x * k, x**2 * k, x**2 * t)))
+    return RingIntegrals(*np.sum(weight * np.stack([x * k, x**2 * k, x**2 * t]), axis=-1))
 
 
 def _nodes(ratio: Array, tangent: Array) -> tuple[Array, Array]:
@@ -164,4 +162,4 @@ def cone_integrals(ring: Ring, slope: Array, angle: Array) -> RingIntegrals:
     pairs, station = np.unique(slope + 1j * angle, return_inverse=True)
     of_ring = np.arctan(pairs.real * ring.outer_ratio)
     each = ring_integrals(ring.radius_ratio, of_ring, pairs.imag, ring.material.poisson_ratio)
-    return RingIntegrals(*(integral[station] for integral in each))
+    return RingIntegrals(*np.stack(each)[:, station])

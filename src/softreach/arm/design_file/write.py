@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
+from functools import cache
 from typing import Any
 
 from softreach.arm.along import AlongArm, Samples
-from softreach.arm.design_file.keys import KINDS, degrees_text, keys_of
-from softreach.arm.drives import BundleNumbers
+from softreach.arm.design_file.keys import KINDS, Key, degrees_text, keys_of
 from softreach.arm.material import Material
-from softreach.arm.number import Station
+from softreach.arm.number import NamedFloats, Station
 from softreach.arm.part import Part
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
@@ -111,7 +111,7 @@ def _material_text(material: Material, names: Mapping[str, Material]) -> str:
 
 def _pairs(part: Part, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
     """Keys and texts of what is not the default."""
-    for key in sorted(keys_of(type(part)).values(), key=lambda key: _rank(key.field)):
+    for key in _ordered_keys(type(part)):
         value = getattr(part, key.field)
         if key.field in without or value is None or key.of_names != isinstance(value, Station):
             continue
@@ -119,12 +119,16 @@ def _pairs(part: Part, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str
             yield key.name, _text(key.name, value)
 
 
-def _rank(field: str) -> int:
-    return _ORDER.index(field if field in _ORDER else "")
+@cache
+def _ordered_keys(kind: type) -> list[Key]:
+    def rank(key: Key) -> int:
+        return _ORDER.index(key.field if key.field in _ORDER else "")
+
+    return sorted(keys_of(kind).values(), key=rank)
 
 
 def _text(key: str, value: Any) -> str:
-    if isinstance(value, BundleNumbers):
+    if isinstance(value, NamedFloats):
         return inline_table((key_text(name), value_text(x)) for name, x in value.items())
     number = degrees_text if key.endswith("_deg") else value_text
     if isinstance(value, AlongArm):

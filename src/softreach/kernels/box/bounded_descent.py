@@ -17,8 +17,6 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["FIRST_DAMPING", "NOWHERE", "Running", "box_steps", "judge", "next_trials"]
-
 NOWHERE = 1e150
 """Coordinate of tips that do not count; no distance may be infinite here."""
 FIRST_DAMPING = 1e-2

@@ -17,8 +17,6 @@ import numpy as np
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.vector import dot, minus, row, times
 
-__all__ = ["near_cells", "project"]
-
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-13  # of the largest terms
 _SHORTEST_NEWTON = 0.2  # part of a step below which its best part is looked for

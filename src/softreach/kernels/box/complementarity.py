@@ -14,8 +14,6 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["complementary"]
-
 _ROUNDING = 1e-13  # of the terms of A x - b
 _BARRED = 2
 _SINGULAR = 1e-11  # of a diagonal element, below which a pivot is rounding

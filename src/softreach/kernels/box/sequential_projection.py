@@ -15,8 +15,6 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["FIRST_PROXIMITY", "LONGEST_STEP", "NOWHERE", "Running", "judge", "next_trials"]
-
 NOWHERE = 1e100
 """Coordinate of tips that do not count."""
 FIRST_PROXIMITY = 0.3

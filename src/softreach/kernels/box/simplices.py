@@ -17,8 +17,6 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["chains", "corner_bits", "corner_steps", "kuhn_simplices", "strides"]
-
 Ints = NDArray[np.int64]
 
 

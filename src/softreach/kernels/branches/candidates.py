@@ -27,8 +27,6 @@ from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.image.activation_mesh import axes_of, image_faces, orientation, tetrahedron
 from softreach.kernels.vector import combination, cross, dot, matrix, minus, plus, row, times
 
-__all__ = ["MOST_STARTS", "find_starts"]
-
 MOST_STARTS = 1024
 """Starts kept for one target; a fold to a point has a whole curve of them."""
 

@@ -26,17 +26,6 @@ from softreach.kernels.vector import (
     times,
 )
 
-__all__ = [
-    "CONVERGED",
-    "RUNNING",
-    "STAGNATED",
-    "Search",
-    "conditions",
-    "merge_equal",
-    "newton_step",
-    "second_preimages",
-]
-
 RUNNING, CONVERGED, STAGNATED = 0, 1, 2
 
 _LONGEST_STEP = 0.25  # in ranges of the bounds

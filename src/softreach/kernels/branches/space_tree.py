@@ -9,8 +9,6 @@ import numpy as np
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.vector import row
 
-__all__ = ["SpaceTree", "leaf_at", "listed", "sort_into_children"]
-
 
 class SpaceTree(NamedTuple):
     """Nodes are cubes; a node's eight children follow each other, x slowest."""

@@ -6,8 +6,6 @@ import math
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["MOST_IN_BINS", "choose_apart", "choose_in_bins"]
-
 MOST_IN_BINS = 1024
 """Seeds that are looked at for one target, a power of two."""
 _MET = 0.1  # part of the squared way to a target that may be left

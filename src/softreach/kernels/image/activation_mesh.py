@@ -15,16 +15,6 @@ from softreach.kernels.box.simplices import kuhn_simplices
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.vector import cross, difference, dot, matrix, minus, row, times
 
-__all__ = [
-    "ActivationMesh",
-    "axes_of",
-    "face_planes",
-    "image_faces",
-    "interpolation_errors",
-    "orientation",
-    "tetrahedron",
-]
-
 # Each tetrahedron of a cell walks from corner 0 to corner 7 by these two, along axes in some order.
 _PATHS = tuple((int(second), int(third)) for _, second, third, _ in kuhn_simplices(3))
 _AXES = tuple(

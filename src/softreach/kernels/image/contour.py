@@ -27,8 +27,6 @@ from softreach.kernels.box.simplices import chains, corner_bits, corner_steps
 from softreach.kernels.compiler import strict
 from softreach.kernels.strict_vector import cross, difference, dot, minus, times
 
-__all__ = ["EXACT_BITS", "Star", "critical_triangles", "stars", "stretches"]
-
 EXACT_BITS = 16
 """Bits of the largest difference of two vertices of a simplex: 3 · 16 + 3 of a float's 53."""
 

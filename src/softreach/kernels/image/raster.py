@@ -17,24 +17,6 @@ from numpy.typing import NDArray
 
 from softreach.kernels.compiler import kernel, strict
 
-__all__ = [
-    "Crossings",
-    "add_counts",
-    "bin_triangles",
-    "claim_corners",
-    "cover_at",
-    "crossings",
-    "empty_crossings",
-    "extent",
-    "first_crossings",
-    "joined_crossings",
-    "left_of_edge",
-    "most_crossings",
-    "twice_area",
-    "upward",
-]
-
-
 Ints = NDArray[np.int64]
 
 

@@ -23,15 +23,6 @@ from softreach.kernels.points.predicates import EPS, ORIENT_BOUND, dot3, edge, e
 from softreach.kernels.points.triangulation import FACES, corners
 from softreach.kernels.strict_vector import cross, difference, dot
 
-__all__ = [
-    "boundary_faces",
-    "join_pieces",
-    "join_regions",
-    "least_radii",
-    "measure_cells",
-    "radius_of_one_region",
-]
-
 DIGITS = 2.0**26  # a value this many times its rounding error is good to eight digits
 LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two products
 SLACK = 2.0**-33  # of a radius: what is typed or computed has so many digits

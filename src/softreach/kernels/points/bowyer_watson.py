@@ -46,8 +46,6 @@ from softreach.kernels.points.triangulation import (
     set_first_cell,
 )
 
-__all__ = ["triangulate"]
-
 CROWDED = 50_000  # cells beside those that are usual
 USUAL = 16  # cells of a point, at most
 REMADE = 3  # times that a cell is made and dug out again, at most

@@ -18,18 +18,6 @@ import numpy as np
 
 from softreach.kernels.compiler import strict
 
-__all__ = [
-    "BOTTOM",
-    "SCRATCH",
-    "add",
-    "difference",
-    "multiply",
-    "scratch",
-    "sign",
-    "subtract",
-    "value",
-]
-
 SCRATCH = 65_536  # floats; an expansion of the predicates has fewer than 1,100 terms
 BOTTOM = np.intp(0)  # typed: a literal 0 would compile every function once more
 SPLITTER = 134_217_729.0  # 2^27 + 1, cuts 53 bits in two halves

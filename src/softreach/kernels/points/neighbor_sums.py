@@ -15,16 +15,6 @@ import numpy as np
 
 from softreach.kernels.compiler import kernel, strict
 
-__all__ = [
-    "PLACE_BITS",
-    "SHIFTS",
-    "find_windows",
-    "neighbor_sums",
-    "sort_keys",
-    "stable_order",
-    "window_keys",
-]
-
 PLACE_BITS = 21  # of each of the three parts of a key
 _ROW = 1 << 2 * PLACE_BITS
 _COLUMN = 1 << PLACE_BITS

@@ -23,8 +23,6 @@ from softreach.kernels.points.expansions import (
     subtract,
 )
 
-__all__ = ["collinear", "insphere", "insphere_filter", "orient", "orient_filter"]
-
 EPS = 2.0**-53
 ORIENT_BOUND = 6 * 7.1 * EPS  # permanent <= 6 x y z
 INSPHERE_BOUND = 24 * 16.1 * EPS  # permanent <= 24 x y z lift

@@ -15,8 +15,6 @@ import numpy as np
 
 from softreach.kernels.compiler import strict
 
-__all__ = ["insertion_order"]
-
 BITS = 16  # per axis; the round stands above the 48 bits of the curve
 ROUNDS = 6
 QUANTILES = 1024

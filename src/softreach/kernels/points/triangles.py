@@ -9,16 +9,6 @@ import numpy as np
 from softreach.kernels.compiler import inline, kernel, strict
 from softreach.kernels.strict_vector import dot, minus, row, times
 
-__all__ = [
-    "DROPPED",
-    "FLAT",
-    "OPEN",
-    "distances_to_faces",
-    "fill_triangles",
-    "judge_images",
-    "nearest_faces",
-]
-
 
 @strict
 def distances_to_faces(points, vertices, faces, incident, starts, near, out):

@@ -12,24 +12,6 @@ import numpy as np
 
 from softreach.kernels.compiler import strict
 
-__all__ = [
-    "DEAD",
-    "FACES",
-    "GHOST",
-    "Edges",
-    "Triangulation",
-    "compact",
-    "corners",
-    "empty_edges",
-    "empty_table",
-    "empty_triangulation",
-    "enlarged",
-    "face",
-    "fill",
-    "ghost_slot",
-    "set_first_cell",
-]
-
 GHOST, DEAD = np.intp(-1), np.intp(-2)  # typed: a literal compiles its functions once more
 BITS = 6
 SIDE = 1 << BITS

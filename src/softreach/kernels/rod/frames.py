@@ -13,9 +13,6 @@ from softreach.kernels.rod.tips import BEND_ROWS
 from softreach.kernels.rod.twist import act, exp_coefficients
 from softreach.kernels.vector import combination, cross
 
-__all__ = ["frames", "relative_strains"]
-
-
 _BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)
 # typed: a literal would compile the function of a node once more
 

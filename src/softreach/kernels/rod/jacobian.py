@@ -24,8 +24,6 @@ from softreach.kernels.rod.tips import (
 )
 from softreach.kernels.rod.twist import add, bracket, dexp
 
-__all__ = ["jacobians"]
-
 
 @inline
 def _change(rest_length, weights, a):

@@ -18,8 +18,6 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["GAUSS", "NODES", "WEIGHTS", "respond"]
-
 _R = 15.0**0.5
 NODES = np.array([0.5 - _R / 10.0, 0.5, 0.5 + _R / 10.0])
 """Gauss nodes of a step, from 0 to 1."""

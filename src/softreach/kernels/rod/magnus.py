@@ -12,8 +12,6 @@ import math
 from softreach.kernels.compiler import inline
 from softreach.kernels.rod.twist import add, bracket, cobracket, scaled
 
-__all__ = ["NODES", "exponent", "exponent_and_parts", "exponent_derivative", "pulled_back"]
-
 NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 """Gauss-Legendre nodes of the unit step, base first."""
 

@@ -26,9 +26,6 @@ from softreach.kernels.rod.tips import (
 )
 from softreach.kernels.rod.twist import act, exp_derivatives
 
-__all__ = ["slopes"]
-
-
 # Scratch of a group of lanes: for each coordinate what multiplies changes of the tables' rows, the
 # rows of R, what multiplies dΩ in each coordinate, and the parts of the exponent.
 _AXIS, _SIX = NODE_ROWS * TOGETHER, 6 * TOGETHER

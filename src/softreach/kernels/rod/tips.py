@@ -12,20 +12,6 @@ from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.rod.magnus import exponent
 from softreach.kernels.rod.twist import act
 
-__all__ = [
-    "LANES",
-    "TIP",
-    "WORK",
-    "clear_tips",
-    "load",
-    "node_values",
-    "nodes_at",
-    "pack",
-    "room",
-    "tips",
-    "walk",
-]
-
 LANES = 128
 """Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""
 

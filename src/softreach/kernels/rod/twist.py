@@ -12,17 +12,6 @@ import math
 from softreach.kernels.compiler import inline
 from softreach.kernels.vector import cross
 
-__all__ = [
-    "act",
-    "add",
-    "bracket",
-    "cobracket",
-    "dexp",
-    "exp_coefficients",
-    "exp_derivatives",
-    "scaled",
-]
-
 _TERMS = range(8)
 """Terms kept of each series in θ²: exact to rounding for θ <= 1, to 1e-13 for θ <= 1.5."""
 

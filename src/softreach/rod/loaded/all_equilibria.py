@@ -284,7 +284,7 @@ def _resolving(solver: Solver, gamma: Array) -> Solver:
     """With steps halved until the whole map of directions is roughly right."""
     points = icosphere(2)[0]
     while 2 * solver.steps <= _MOST_STEPS:
-        finer = solver.halved()
+        finer = replace(solver, steps=2 * solver.steps)
         apart = solver.base_map(gamma)(points) - finer.base_map(gamma)(points)
         if np.linalg.norm(apart, axis=1).max() <= _ROUGHLY:
             break

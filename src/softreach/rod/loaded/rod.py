@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.body import load_number
 from softreach.arm.loads import Loads
-from softreach.arm.manipulator import Manipulator
 from softreach.rod.free import (
     ArmRod,
     FreeRod,
@@ -32,7 +31,7 @@ from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.shooting import Equilibria, LoadedShapes, turn_between
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, LoadPhase, LoadTables
+from softreach.rod.loaded.tables import ArmBody, LoadTables
 from softreach.rod.response import (
     NodeTables,
     linear_response,
@@ -105,7 +104,10 @@ class LoadedRod(ArmRod):
             InvalidInput: Loads so heavy that no number of steps resolves what they do.
         """
         tables = LoadTables(self.arm, self.loads, self.body)
-        _check_steps(self.arm, tables.phase)
+        if (steps := tables.phase.fewest_steps) > _MOST_STEPS:
+            load = f"of load number {load_number(self.arm):.3g}"
+            allowed = f"lighter: they need {steps:,} steps, at most {_MOST_STEPS} allowed"
+            raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
         return tables
 
     @property
@@ -385,13 +387,6 @@ def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
 
 def _distances(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=-1)
-
-
-def _check_steps(arm: Manipulator, phase: LoadPhase) -> None:
-    if phase.fewest_steps > _MOST_STEPS:
-        load, most = f"of load number {load_number(arm):.3g}", f"at most {_MOST_STEPS} allowed"
-        allowed = f"lighter: they need {phase.fewest_steps:,} steps, {most}"
-        raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
 
 
 def _checked(steps: int | None, tol: float) -> int:

@@ -44,17 +44,12 @@ class Equilibria(NamedTuple):
 
     def of(self, rows: slice | Mask | Index) -> Equilibria:
         """Some of them; a slice shares memory."""
-        tips, status, margin, frame = self
-        return Equilibria(tips[rows], status[rows], margin[rows], frame[rows])
+        return Equilibria(*(values[rows] for values in self))
 
     def put(self, rows: slice | Index, others: Equilibria) -> None:
         """Replace some of them."""
         for values, new in zip(self, others, strict=True):
             values[rows] = new
-
-    def without_lost_tips(self) -> Equilibria:
-        """The same, with tips NaN where none is found."""
-        return self._replace(tips=np.where(self.is_found[:, None], self.tips, np.nan))
 
     def only(self, good: Mask) -> Equilibria:
         """The same, undecided where they are not good."""

@@ -54,14 +54,6 @@ class Solver:
     def _steps(self) -> StepTables:
         return self.tables.uniform(self.steps)
 
-    @property
-    def _tiny(self) -> float:
-        return max(_OF_TOL * self.tol, 1e-13)
-
-    def halved(self) -> Solver:
-        """The same with twice the steps."""
-        return Solver(self.tables, 2 * self.steps, self.tol)
-
     def judge(self) -> Solver:
         """The same with twice the steps, or as many as let one end at every breakpoint."""
         steps = max(2 * self.steps, enough_for_all_breaks(self.tables.arm))
@@ -69,7 +61,8 @@ class Solver:
 
     def search(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Equilibria:
         """Searches under shares of the loads, from frames or from the unloaded arm."""
-        return shoot(gamma, self.tables, guesses, self._steps, self._tiny, shares)
+        tiny = max(_OF_TOL * self.tol, 1e-13)
+        return shoot(gamma, self.tables, guesses, self._steps, tiny, shares)
 
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
@@ -86,7 +79,8 @@ class Solver:
         self, gamma: Array, rows: slice | Index, found: Equilibria, equilibria: Equilibria
     ) -> None:
         """Put down what is found at some rows of all activations."""
-        equilibria.put(rows, found.without_lost_tips())
+        tips = np.where(found.is_found[:, None], found.tips, np.nan)
+        equilibria.put(rows, found._replace(tips=tips))
         if self.tables.phase.squeeze >= 1.0:
             self._give_up_squeezed(gamma, np.arange(len(gamma))[rows], equilibria)
 

@@ -95,7 +95,7 @@ def load_phase(arm: Manipulator, loads: Loads, body: ArmBody) -> LoadPhase:
     mass = body.mass_per_length(z)
     with np.errstate(over="ignore"):
         force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
-        swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
+        swing = force * (1.0 + force * axial) * softest + (0.5 * loads.moment_size * softest) ** 2
         table = tables(arm, z)
         longest, grown = (
             1.0 + ends_over(part, arm.bounds).T
@@ -118,14 +118,6 @@ def _force(loads: Loads, z: Array, mass: Array) -> Array:
     points = sum((math.hypot(*load.force) * (load.station >= z) for load in loads.point_loads), 0.0)
     at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
     return at_tip + along + points
-
-
-def _moment(loads: Loads) -> float:
-    """The sizes of all moments, added, that of the payload on its lever among them [N m]."""
-    weight = loads.payload * math.hypot(*loads.gravity)
-    moments = [loads.tip_moment, loads.follower_moment]
-    moments += [load.moment for load in loads.point_loads]
-    return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*moment) for moment in moments)
 
 
 class StepTables(NamedTuple):
@@ -279,13 +271,14 @@ class LoadTables:
         width, fractions = -np.diff(edges), np.array(NODES)
         s = edges[:-1, None] - width[:, None] * fractions
         z = profile.station(s)
-        z[:, 0], z[:, -1] = profile.station(edges[:-1]), profile.station(edges[1:])
+        ends = profile.station(edges)
+        z[:, 0], z[:, -1] = ends[:-1], ends[1:]
         inward = _inward(z)
         at = tables(self.arm, inward.ravel())
-        radius = profile.radius(inward)
-        measure = width[:, None] * radius
+        measure = width[:, None] * profile.radius(inward)
         axial, bending, torsion = (c.reshape(z.shape) for c in self.body.compliance(inward.ravel()))
         force = self._forces(z) @ self.axes.T
+        inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
         scalars = np.concatenate(
             [np.stack([bending, torsion - bending, axial], axis=-1), force], axis=-1
         )
@@ -298,8 +291,8 @@ class LoadTables:
             ),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
-            self._moments(profile.station(edges[:-1])),
-            self._firsts(profile.station(edges)),
+            self._moments(ends[:-1]),
+            np.array([0, *inner, len(edges) - 1], np.int64),
         )
 
     def _pieces(self, s: Array, width: Array) -> Array:
@@ -341,10 +334,6 @@ class LoadTables:
             step = _step_inward(z, load.station)
             moments[step : step + 1] += self.axes @ np.array(load.moment)
         return moments
-
-    def _firsts(self, ends: Array) -> Index:
-        inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
-        return np.array([0, *inner, len(ends) - 1], np.int64)
 
 
 def _step_inward(ends: Array, station: float) -> int:

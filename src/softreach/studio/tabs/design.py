@@ -234,7 +234,7 @@ def _add_matter(panel: Fields, part: Part) -> None:
     if ring is not None:
         of_ring = of_design(
             lambda arm: arm.section.rings[ring].material.name,
-            lambda arm, name: edits.with_ring_material(arm, ring, name) if name else arm,
+            lambda arm, name: edits.with_changed_ring(arm, ring, material=name) if name else arm,
         )
         _material(panel, "material", _AS_TYPED, of_ring)
     if ring == 0:
@@ -244,7 +244,7 @@ def _add_matter(panel: Fields, part: Part) -> None:
         rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}
         at = of_design(
             lambda arm: arm.section.rings.index(arm.section.ring(_home(arm, part))),
-            lambda arm, ring: edits.with_actuator_ring(arm, part.actuator, ring),
+            lambda arm, ring: edits.with_changed_actuator(arm, part.actuator, ring=ring),
         )
         panel.dropdown("in ring", rings, at, "The ring that it lies in")
 
@@ -261,8 +261,8 @@ def _home(arm: Manipulator, part: Part) -> int | str:
 
 def _renamed(arm: Manipulator, part: Part, name: str) -> Manipulator:
     if part.ring is not None:
-        return edits.with_ring_name(arm, part.ring, name)
-    return edits.with_actuator_name(arm, part.actuator, name)
+        return edits.with_changed_ring(arm, part.ring, name=name)
+    return edits.with_changed_actuator(arm, part.actuator, name=name)
 
 
 def _without(arm: Manipulator, part: Part) -> Manipulator:
