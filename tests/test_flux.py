@@ -14,7 +14,7 @@ from softreach.arm.parameters import changed
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
+from softreach.workspace import ReachableSet, reachable_set, volume_gradient
 from softreach.workspace.flux import grid_faces, signed_volume
 from softreach.workspace.image import DIAGONAL
 from softreach.workspace.measure import extrapolated_hull
@@ -97,9 +97,9 @@ def pressed(x: np.ndarray) -> np.ndarray:
 pytestmark = pytest.mark.filterwarnings("ignore:volume .* may be off")
 
 
-def solid(arm: Manipulator | TipMap, **options) -> ReachableSolid:
+def solid(arm: Manipulator | TipMap, **options) -> ReachableSet:
     found = reachable_set(arm, **options)
-    assert isinstance(found, ReachableSolid)
+    assert found.dimension == 3
     return found
 
 
