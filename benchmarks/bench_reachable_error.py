@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import softreach as sr
 from softreach.arm import FiberArchitecture, Manipulator
-from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace import ReachableSet, reachable_set
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def random_arm(bundles: int, rng: np.random.Generator) -> Manipulator:
     )
 
 
-def missed_volume(found: ReachableSolid, rng: np.random.Generator) -> float:
+def missed_volume(found: ReachableSet, rng: np.random.Generator) -> float:
     """Volume within half a cell outside that is reached after all [m³]."""
     grid, cell = found.grid, found.grid.attrs["cell"]
     low = np.array([float(grid[a][0]) for a in "xyz"])
@@ -82,7 +82,7 @@ def missed_volume(found: ReachableSolid, rng: np.random.Generator) -> float:
     return float(np.prod(high - low) * len(near) / drawn * reached)
 
 
-def reachable(found: ReachableSolid, places: Array, rng: np.random.Generator) -> NDArray[np.bool_]:
+def reachable(found: ReachableSet, places: Array, rng: np.random.Generator) -> NDArray[np.bool_]:
     """Whether a search from some of many starts ends on each place."""
     from scipy.spatial import KDTree
 
@@ -95,7 +95,7 @@ def reachable(found: ReachableSolid, places: Array, rng: np.random.Generator) ->
     return best < 1e-3 * found.grid.attrs["cell"]
 
 
-def least_distance(found: ReachableSolid, places: Array, start: Array) -> Array:
+def least_distance(found: ReachableSet, places: Array, start: Array) -> Array:
     """Distances [m] after 40 damped steps in angles t, activations being low + width sin² t."""
     rod, box = found.tip_map, found.tip_map.box
     angle = np.arcsin(np.sqrt(np.clip(box.to_cube(start), 1e-4, 1.0 - 1e-4)))
@@ -125,7 +125,6 @@ def measured(bundles: int, seed: int) -> list[Row]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sr.errors.SoftreachWarning)
         fine = reachable_set(arm, accuracy=FINE[bundles])
-        assert isinstance(fine, ReachableSolid)
         true = fine.volume + (missed_volume(fine, rng) if bundles > 3 else 0.0)
         for accuracy in ACCURACIES:
             start = time.perf_counter()

@@ -6,7 +6,7 @@ import numpy as np
 
 from softreach.arm import Manipulator, designs
 from softreach.rod.tip_map import TipMap
-from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace import ReachableSet, reachable_set
 
 
 def trunk_at(revolution_deg: float, taper_deg: float) -> Manipulator:
@@ -14,10 +14,10 @@ def trunk_at(revolution_deg: float, taper_deg: float) -> Manipulator:
     return designs.minimal_trunk(np.radians(revolution_deg), np.radians(taper_deg))
 
 
-def solid(arm: Manipulator | TipMap, **options) -> ReachableSolid:
+def solid(arm: Manipulator | TipMap, **options) -> ReachableSet:
     """The set, which has an inside."""
     found = reachable_set(arm, **options)
-    assert isinstance(found, ReachableSolid)
+    assert found.dimension == 3
     return found
 
 

@@ -23,9 +23,6 @@ from softreach.arm.actuators import LengthTendon
 from softreach.arm.loads import PointLoad
 from softreach.rod.rods import as_tip_map, effective, free_bundles, measured_bundles
 from softreach.workspace import (
-    ReachableCurve,
-    ReachableSolid,
-    ReachableSurface,
     reachable_set,
     volume_gradient,
 )
@@ -83,7 +80,7 @@ def by_length(count: int, bounds, **numbers) -> Manipulator:
 def test_a_dead_zone_leaves_the_set_of_the_arm_without_it(zone):
     kinked = reachable_set(driven((-1.0, 1.0), zone))
     plain = reachable_set(driven((-(1.0 - zone), 1.0 - zone)))
-    assert isinstance(kinked, ReachableSolid)
+    assert kinked.dimension == 3
     assert kinked.volume == pytest.approx(plain.volume, rel=1e-9)
     assert kinked.volume_error < 1e-3 * kinked.volume
     known = {0.05: 2.40334903e-4, 0.3: 1.33132731e-4}[zone]  # composite Gauss rules, nine digits
@@ -97,15 +94,15 @@ def test_drives_of_unequal_ranges_keep_what_lies_beyond_their_dead_zones():
     plain = reachable_set(driven(((0.0, 0.8), (-0.5, 0.2))))
     assert kinked.volume == pytest.approx(plain.volume, rel=1e-9)
     held = reachable_set(driven(((-0.1, 0.1), (-0.7, 0.4)), zone))
-    assert isinstance(held, ReachableSurface)  # the first drive never acts
+    assert held.dimension == 2  # the first drive never acts
 
 
 @pytest.mark.parametrize("zone", [0.05, 0.3])
 def test_lengths_and_areas_do_not_feel_a_dead_zone(zone):
-    for pairs, kind, size in ((1, ReachableCurve, "curve_length"), (2, ReachableSurface, "area")):
+    for pairs, size in ((1, "curve_length"), (2, "area")):
         kinked = reachable_set(driven((-1.0, 1.0), zone, pairs=pairs, chamber=False))
         plain = reachable_set(driven((zone - 1.0, 1.0 - zone), pairs=pairs, chamber=False))
-        assert isinstance(kinked, kind)
+        assert kinked.dimension == pairs
         value, error = getattr(kinked, size), getattr(kinked, f"{size}_error")
         assert value == pytest.approx(getattr(plain, size), rel=1e-9)
         assert error < 1e-4 * value

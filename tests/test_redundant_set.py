@@ -10,12 +10,11 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.activation_box import ActivationBox
+from softreach.kernels.box.box_projection import project
 from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidInput, SoftreachWarning
-from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.cells import smallest_memory
-from softreach.workspace.wrap import damped_steps
 from tests.sets import is_closed, solid
 
 
@@ -57,7 +56,7 @@ def twelve_bundles() -> Manipulator:
 
 
 @pytest.fixture(scope="module")
-def five() -> ReachableSolid:
+def five() -> ReachableSet:
     return solid(five_bundles(), accuracy=1e-2)
 
 
@@ -140,9 +139,10 @@ def test_damped_steps_solve_linear_problems_within_bounds():
     residual, slopes = rng.normal(size=(n, 3)), rng.normal(size=(n, 3, m))
     widths = high - low
     weight = 1e-3 * ((slopes * widths) ** 2).sum(axis=(1, 2)) / 3
-    box = ActivationBox.between(np.stack([low, high], axis=1), [f"{j}" for j in range(m)])
-    trial, left = damped_steps(box, gamma, residual, slopes, weight)
-    step, scaled = (trial - gamma) / widths, slopes * widths
+    step, multiplier, scaled = np.empty((n, m)), np.zeros((n, 3)), slopes * widths
+    room = (low - gamma) / widths, (high - gamma) / widths
+    project(np.zeros((n, m)), scaled, -residual, weight, *room, step, multiplier)
+    trial, left = gamma + step * widths, weight * np.linalg.norm(multiplier, axis=1)
     ahead = residual + np.einsum("nij,nj->ni", scaled, step)
     assert np.linalg.norm(ahead, axis=1) == pytest.approx(left, abs=1e-9)
     gradient = np.einsum("nij,ni->nj", scaled, ahead) + weight[:, None] * step

@@ -24,7 +24,7 @@ from softreach.inverse import solve_inverse
 from softreach.inverse.solutions import Status
 from softreach.rod.rods import as_tip_map
 from softreach.support.errors import NotPossible
-from softreach.workspace import ReachableSolid, reachable_set, volume_gradient
+from softreach.workspace import ReachableSet, reachable_set, volume_gradient
 from softreach.workspace.cells import cells_of
 from tests.sets import is_closed, solid
 
@@ -45,15 +45,15 @@ def two_segments() -> Manipulator:
     )
 
 
-def corners(found: ReachableSolid) -> np.ndarray:
+def corners(found: ReachableSet) -> np.ndarray:
     box = found.tip_map.box
     return np.array(list(itertools.product([0.0, 1.0], repeat=box.dimension)))
 
 
 @pytest.fixture(scope="module", params=[0.05, 0.01])
-def shell(request) -> ReachableSolid:
+def shell(request) -> ReachableSet:
     found = reachable_set(two_segments(), accuracy=request.param)
-    assert isinstance(found, ReachableSolid)
+    assert found.dimension == 3
     return found
 
 
@@ -114,7 +114,7 @@ def test_a_sheet_of_microns_has_a_thickness_and_leads_with_it(capsys):
     area, thickness = found.shell
     assert thickness.value == pytest.approx(found.volume / area.value)
     assert thickness.value == pytest.approx(19.5e-6, rel=1e-2)
-    assert repr(found).startswith("ReachableSolid: a shell of area 0.0572653 ")
+    assert repr(found).startswith("ReachableSet: a shell of area 0.0572653 ")
     assert float(found.to_dataset().shell_thickness) == thickness.value
     assert solid(designs.minimal_trunk(), accuracy=0.1).shell is None
     assert run(["reach", "three_tendon_robot", "--json"]) == 0

@@ -15,10 +15,7 @@ from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held, TipMap, TipStatus
 from softreach.support.errors import InvalidInput
 from softreach.workspace import (
-    ReachableCurve,
-    ReachableRegion,
-    ReachableSolid,
-    ReachableSurface,
+    ReachableSet,
     reachable_set,
 )
 from softreach.workspace.reach import rasterized_set
@@ -157,7 +154,7 @@ def cusp_area(bend: float = 0.0) -> float:
 
 
 @pytest.fixture(scope="module")
-def cusp() -> ReachableSolid:
+def cusp() -> ReachableSet:
     return rasterized_set(Cusp(), 12, 0.04, 3e-3)
 
 
@@ -190,7 +187,7 @@ def test_places_of_sheets_that_do_not_meet_count_once(cusp):
 @pytest.mark.large
 def test_sheets_of_two_bundles_have_the_area_of_all(cusp):
     surface = reachable_set(Cusp(bounds=Cusp().bounds[:2]), accuracy=0.02)
-    assert isinstance(surface, ReachableSurface)
+    assert surface.dimension == 2
     assert surface.area == pytest.approx(cusp_area(1.0), abs=surface.area_error + 0.01)
     assert surface.area_error < 0.05 * surface.area
 
@@ -231,7 +228,7 @@ class FlatCusp(Cusp):
 def test_a_region_of_a_plane_has_all_sheets_up_to_their_edges(monkeypatch):
     monkeypatch.setattr("softreach.workspace.postures._MOST_ALONG", 24)
     region = reachable_set(FlatCusp(), accuracy=0.2)
-    assert isinstance(region, ReachableRegion)
+    assert region.outline is not None
     assert region.area == pytest.approx(cusp_area(), abs=region.area_error + 0.01)
     between = 2 * FOLD * 1.05**2.5 / 2.5
     assert region.hysteresis_share == pytest.approx(between / (2.1 * 2.05), abs=0.01)
@@ -253,7 +250,7 @@ class Switch(Cusp):
 
 def test_a_curve_of_two_branches_ends_where_these_end():
     curve = reachable_set(Switch())
-    assert isinstance(curve, ReachableCurve)
+    assert curve.dimension == 1
     fold = np.sqrt(1 / 3)
     longest = stable_roots(1.0, 1.0)[-1] - fold
     assert curve.curve_length == pytest.approx(2 * longest, abs=curve.curve_length_error)

@@ -13,12 +13,9 @@ from softreach.cloud.clouds import compute_cloud
 from softreach.geometry.hull import convex_hull
 from softreach.inverse import solve_inverse
 from softreach.rod import as_tip_map, tip_positions
-from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.support.errors import InvalidInput, NotPossible, SoftreachWarning
 from softreach.workspace import (
-    ReachableCurve,
-    ReachablePoint,
-    ReachableSolid,
-    ReachableSurface,
+    ReachableSet,
     Surface,
     reach,
     reachable_set,
@@ -30,18 +27,18 @@ from tests.sets import is_closed, solid, trunk_at
 
 
 @pytest.fixture(scope="module")
-def best(trunk: Manipulator) -> ReachableSolid:
+def best(trunk: Manipulator) -> ReachableSet:
     """The paper's best design."""
     return solid(trunk)
 
 
 @pytest.fixture(scope="module")
-def folded() -> ReachableSolid:
+def folded() -> ReachableSet:
     """A design whose image folds over itself."""
     return solid(trunk_at(75, 3))
 
 
-def several(found: ReachableSolid) -> float:
+def several(found: ReachableSet) -> float:
     """Volume reached by more than one activation."""
     return sum(volume for k, volume in found.multiplicity.items() if k > 1)
 
@@ -185,7 +182,7 @@ def test_a_tip_map_is_asked_as_its_arm_is(trunk):
 
 def test_a_solid_prints_its_numbers_to_their_errors_and_what_it_was_made_of(folded):
     text = repr(folded)
-    assert text.startswith("ReachableSolid: volume 0.4768 ± 0.0004 m³")
+    assert text.startswith("ReachableSet: volume 0.4768 ± 0.0004 m³")
     assert "33.7 ± 0.2 % are out of reach" in text
     assert "reached more than once 0.0131 ± 0.0004 m³" in text
     assert "L = 1 m, 3 free bundles; activation grid of 42³ cells" in text
@@ -202,7 +199,7 @@ def test_every_number_of_a_solid_is_in_its_dataset_with_an_error(folded):
 
 
 @pytest.fixture(scope="module")
-def redundant() -> ReachableSolid:
+def redundant() -> ReachableSet:
     return solid(designs.redundant_trunk(), accuracy=1e-2)
 
 
@@ -229,13 +226,13 @@ def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
 def test_two_free_bundles_sweep_an_area(trunk):
     arm = trunk.with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
     sheet = reachable_set(arm)
-    assert isinstance(sheet, ReachableSurface)
+    assert sheet.dimension == 2
     assert (sheet.dimension, sheet.volume, sheet.unreachability) == (2, 0.0, 1.0)
     assert sheet.surface().area == pytest.approx(sheet.area, rel=1e-3)
     finer = convex_hull(tip_positions(arm, fine_grid(arm, 200)))
     assert 0 < finer.volume - sheet.convex_volume < sheet.convex_volume_error < 1e-3
     assert "<img" in sheet._repr_html_()
-    assert repr(sheet).startswith(f"ReachableSurface: area {sheet.area:.3f}"[:-1])
+    assert repr(sheet).startswith(f"ReachableSet: area {sheet.area:.3f}"[:-1])
     assert float(sheet.to_dataset().area_error) == sheet.area_error < 1e-5
     gamma = np.column_stack([-np.random.default_rng(0).random((100, 2)), np.full(100, -0.5)])
     assert sheet.distance(tip_positions(arm, gamma)).max() < 1e-4
@@ -254,23 +251,24 @@ def test_one_free_bundle_draws_a_curve():
     fiber = FiberArchitecture(helical_angle=0.0, offset=0.0, extent=0.8)
     arm = arm_of(fiber, activation_bounds=(-5 / 3, 0.0))
     curve = reachable_set(arm)
-    assert isinstance(curve, ReachableCurve)
+    assert curve.dimension == 1
     path = tip_positions(arm, np.linspace(-5 / 3, 0, 4001)[:, None])
     chords = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
     assert (curve.dimension, curve.volume) == (1, 0.0)
     assert curve.curve_length == pytest.approx(chords, rel=1e-6)
     assert "<img" in curve._repr_html_()
-    assert repr(curve).startswith(f"ReachableCurve: length {curve.curve_length:.3f}"[:-1])
+    assert repr(curve).startswith(f"ReachableSet: length {curve.curve_length:.3f}"[:-1])
     assert curve.distance(path).max() < 1e-5
-    assert not hasattr(curve, "surface")
+    with pytest.raises(NotPossible, match="dimension 1 has no surface"):
+        curve.surface()
 
 
 def test_no_free_bundle_leaves_a_point(trunk):
     point = reachable_set(trunk.with_bounds((-0.5, -0.5)))
-    assert isinstance(point, ReachablePoint)
+    assert point.dimension == 0
     assert (point.dimension, point.volume, point.convex_volume) == (0, 0.0, 0.0)
     assert np.isnan([point.unreachability, point.unreachability_error]).all()
-    assert repr(point).startswith("ReachablePoint: (")
+    assert repr(point).startswith("ReachableSet: (")
     tip = tip_positions(trunk, np.full((1, 3), -0.5))
     assert point.distance(tip + [[0.0, 0.3, 0.4]]) == pytest.approx(0.5)
 

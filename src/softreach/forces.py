@@ -12,14 +12,14 @@ from softreach.arm.actuators import LengthTendon
 from softreach.arm.manipulator import Manipulator
 from softreach.force_growth import Grown, Growth, Stop
 from softreach.inverse import solve_inverse
-from softreach.inverse.request import as_activations, as_targets
+from softreach.inverse.request import as_activations
 from softreach.rod.loaded.pushing_tip import PushingTip
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.stiffness import yielding_rod
-from softreach.support.arrays import Array, as_directions, as_floats
+from softreach.support.arrays import Array, as_directions, as_floats, as_points
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress
 
@@ -107,13 +107,13 @@ def _starts(
     if start is None:
         if places is None:
             raise InvalidInput("places", None, "given, or `start`")
-        targets = as_targets("places", places)
+        targets = as_points("places", places)
         solutions = solve_inverse(rod, targets, from_rest=True)
         return targets, [solution.activations for solution in solutions]
     if places is None:
         gamma = rod.check_activations("start", np.atleast_2d(as_floats("start", start)))
         return rod.tips(gamma), list(gamma[:, None])
-    targets = as_targets("places", places)
+    targets = as_points("places", places)
     gamma = rod.box.with_fixed(as_activations("start", start, rod.box, len(targets)))
     return targets, list(gamma[:, None])
 

@@ -135,21 +135,13 @@ def test_blocks_and_threads_change_no_bit(monkeypatch):
     np.testing.assert_array_equal(mean_value_distance(points, values, 0.1)[0], whole)
 
 
-@pytest.mark.parametrize("radius", [-1.0, np.nan])
-def test_other_radii_are_refused(radius):
-    with pytest.raises(InvalidInput, match=r"radius = .*a radius >= 0 \[m\]"):
-        mean_value_distance(np.zeros((2, 3)), np.zeros((2, 1)), radius)
-
-
 def test_rows_that_are_not_finite_are_refused():
     points, values = uneven(50, 3)
     points[7, 1] = np.nan
     with pytest.raises(InvalidInput, match=r"points\[7\] = .*must be finite numbers"):
         mean_value_distance(points, values, 0.1)
-    with pytest.raises(InvalidInput, match=r"values = 1 rows .* first at index 7"):
+    with pytest.raises(InvalidInput, match=r"values\[7\] = .*must be finite numbers"):
         mean_value_distance(values, points, 0.1)
-    with pytest.raises(InvalidInput, match=r"of shape \(50, m\)"):
-        mean_value_distance(values, np.zeros((49, 3)), 0.1)
 
 
 # Surfaces that touch themselves along edges: parted, closed, and of the same volume

@@ -32,7 +32,6 @@ from softreach.kernels.points.predicates import (
     orient_filter,
 )
 from softreach.kernels.points.triangulation import FACES, FEW
-from softreach.support.errors import InvalidInput
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import exact_insphere, exact_orient, rational
 from tests.oracles import qhull
@@ -382,18 +381,3 @@ def test_a_cloud_far_larger_than_its_first_room_grows():
     mesh = delaunay(points)
     assert len(mesh.tetrahedra) == 59 * 59
     assert_adjacency(mesh)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_rows_that_are_not_finite_are_counted_and_the_first_is_named(bad):
-    points = random_points(20)
-    points[[4, 9], 1] = bad
-    with pytest.raises(
-        InvalidInput, match=r"points\[4\] = .*must be finite numbers; so are 2 rows in all"
-    ):
-        delaunay(points)
-
-
-def test_points_of_another_shape_are_refused():
-    with pytest.raises(InvalidInput, match=r"points.shape = \(5, 2\): must be of shape \(n, 3\)"):
-        delaunay(np.zeros((5, 2)))

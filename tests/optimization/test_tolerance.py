@@ -14,7 +14,7 @@ from softreach.optimization.deviations import Spread, deviations_of
 from softreach.requirements import Box, Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidInput, NotPossible
-from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace import reachable_set
 from softreach.workspace.gradient import MovingBoundary
 
 TRUNK = designs.minimal_trunk()
@@ -26,7 +26,7 @@ SIGMAS = {"length": 0.003, "taper": 0.001, "left.revolution": 0.02, "left.offset
 
 def boundary(arm: Manipulator, *names: str, accuracy: float = 1e-2) -> tuple[MovingBoundary, float]:
     solid = reachable_set(arm, accuracy=accuracy)
-    assert isinstance(solid, ReachableSolid)
+    assert solid.dimension == 3
     known = find_parameters(arm, names)
     return MovingBoundary.of(solid, [known[name] for name in names]), solid.volume
 

@@ -116,31 +116,22 @@ def _flat_area(which: int, tips: Array, alpha: float) -> float:
     return math.nan if areas is None else areas[which]
 
 
-def _set_area(name: str, reached: ReachableSet) -> float:
-    return getattr(reached, name, math.nan)
-
-
 def _spacing(shape: AlphaComplex, alpha: float, tips: Array) -> float:
     return math.cbrt(_alpha_volume(shape, alpha) / len(tips))
 
 
 def _fold_volume(reached: ReachableSet) -> float:
-    return getattr(reached, "fold_volume", 0.0)  # of sheets and curves
-
-
-def _multiplicity(reached: ReachableSet) -> Mapping[int, float]:
-    """Volume by number of activations; none where there is no volume."""
-    return getattr(reached, "multiplicity", {})
+    return reached.fold_volume if reached.dimension == 3 else 0.0
 
 
 def _mean_multiplicity(reached: ReachableSet) -> float:
-    volumes = _multiplicity(reached)
+    volumes = reached.multiplicity
     total = sum(volumes.values())
     return sum(k * volume for k, volume in volumes.items()) / total if total > 0 else math.nan
 
 
 def _multiple_volume(reached: ReachableSet) -> float:
-    volumes = _multiplicity(reached)
+    volumes = reached.multiplicity
     return sum(volume for k, volume in volumes.items() if k > 1) if volumes else math.nan
 
 
@@ -190,9 +181,9 @@ _ROWS: dict[str, list[tuple[Any, ...]]] = {
         ("exact_volume_error", "m3", "estimated error of exact_volume",
          attrgetter("volume_error"), _SET),
         ("exact_area", "m2", "area of the reachable set, in one plane or of two bundles",
-         partial(_set_area, "area"), _SET, "the reachable set has a volume"),
+         attrgetter("area"), _SET, "the reachable set has a volume"),
         ("exact_area_error", "m2", "estimated error of exact_area",
-         partial(_set_area, "area_error"), _SET, "the reachable set has a volume"),
+         attrgetter("area_error"), _SET, "the reachable set has a volume"),
         ("exact_convex_volume", "m3", "volume of the reachable set's convex hull",
          attrgetter("convex_volume"), _SET),
         ("exact_unreachability", "1", "UNR = 1 - exact_volume / exact_convex_volume",

@@ -93,14 +93,13 @@ def _write(
 ) -> None:
     from softreach.export import export_mesh
     from softreach.plot import plot_3d, plot_slices
-    from softreach.workspace import ReachableSolid, ReachableSurface
 
     unit = arm.length_unit
     if options.is_page(path):
         options.save_picture(plot_3d([reached, arm], unit=unit), path, overwrite)
-    elif _is_drawn(path) and isinstance(reached, ReachableSolid):
+    elif _is_drawn(path) and reached.dimension == 3:
         options.save_picture(plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
-    elif not _is_drawn(path) and isinstance(reached, ReachableSolid | ReachableSurface):
+    elif not _is_drawn(path) and reached.dimension >= 2:
         export_mesh(reached.surface(), path, unit=options.written_unit(arm), overwrite=overwrite)
         console.written(path, options.written_unit(arm))
     else:

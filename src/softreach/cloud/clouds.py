@@ -39,8 +39,6 @@ from softreach.support.progress import Progress, bar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
-
 _CHUNK = 1 << 19  # samples of a stored array that are held at once
 _LONG = 5_000_000  # samples from which a bar is worth showing
 
@@ -92,10 +90,9 @@ def compute_cloud(
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if tip_map.supports_unstable else 0, np.int8)
     show_bar = report is None and n > _LONG
+    cubes = cube_blocks(sampler, n, bundles, seed, BLOCK)
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
-        _fill(
-            tip_map, activation, tip, status, cube_blocks(sampler, n, bundles, seed, BLOCK), shown
-        )
+        _fill(tip_map, activation, tip, status, cubes, shown)
     drawn = {"seed": seed, "sampler": sampler}
     cloud = schema.cloud_dataset(
         tip_map.arm, activation, tip, **drawn, tol=tip_map.tol, frame=tip_map.frame

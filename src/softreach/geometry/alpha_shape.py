@@ -29,8 +29,6 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 from softreach.support.lazy import lazy
 
-__all__ = ["AlphaComplex", "alpha_hull"]
-
 BLOCK = 200_000  # cells measured by one thread at a time
 FEWEST = 10_000  # points of a box, on average: fewer are triangulated before threads pay
 SAMPLED = 4096  # points by which boxes are cut
@@ -181,14 +179,13 @@ def _pieces(points: Points, alpha: float, part: Mask | None, boxes: list[Array])
         tasks = (partial(_piece, points, alpha, part, box, lies_on_curve) for box in boxes)
         return list(parallel.in_order(tasks))
 
+    def give_up() -> bool:
+        raise _Crowded
+
     if len(boxes) > 1:
         with suppress(_Crowded):
-            return pieces(boxes, _give_up)
+            return pieces(boxes, give_up)
     return pieces([WHOLE], partial(lies_on_curve, points))
-
-
-def _give_up() -> bool:
-    raise _Crowded
 
 
 def _piece(

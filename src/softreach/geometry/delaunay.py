@@ -10,7 +10,7 @@ import numpy as np
 from softreach.geometry.surface import unit_scale
 from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.spatial_sort import insertion_order
-from softreach.support.arrays import Points, as_points
+from softreach.support.arrays import Points
 
 _SAMPLED = 512
 _NEIGHBORS = 16
@@ -22,12 +22,8 @@ def delaunay(points: np.ndarray) -> Delaunay:
     Coordinates smaller than 2^-200 of the largest count as zero.
 
     Args:
-        points: Positions [m], shape (n, 3).
-
-    Raises:
-        InvalidInput: Points of another shape, or not finite.
+        points: Finite positions [m], shape (n, 3).
     """
-    points = as_points("points", points, any_scale=True)
     scaled, _ = unit_scale(points)
     cells = neighbors = np.empty((0, 4), np.int32)
     order = same = np.arange(len(points))

@@ -8,8 +8,6 @@ import numpy as np
 
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 
-__all__ = ["Plane", "alpha_area", "are_inside", "convex_edges", "enclosed_area", "plane_of"]
-
 
 class Plane(NamedTuple):
     """A plane in space with axes of its own: x and y in it, z its normal."""

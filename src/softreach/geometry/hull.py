@@ -7,20 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.geometry.surface import (
-    compact_surface,
-    enclosed_volume,
-    surface_area,
-    unit_scale,
-)
-from softreach.support.arrays import Faces, Points, as_points
+from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area, unit_scale
+from softreach.support.arrays import Faces, Points
 from softreach.support.quantity import quantity
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["Hull", "convex_faces", "convex_hull"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -107,12 +100,8 @@ def convex_hull(points: np.ndarray) -> Hull:
     Points in one plane, on one line or fewer than four have volume 0 and no faces.
 
     Args:
-        points: Positions [m], shape (n, 3).
-
-    Raises:
-        InvalidInput: Points of another shape, or not finite.
+        points: Finite positions [m], shape (n, 3).
     """
-    points = as_points("points", points, any_scale=True)
     vertices, faces = compact_surface(points, convex_faces(points))
     volume = enclosed_volume(vertices, faces)
     return Hull(

@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import InvalidInput
 
-__all__ = ["CellGrid"]
-
-
 _MOST_CELLS = 1 << 26
 
 
@@ -75,12 +72,9 @@ class CellGrid:
         """Mean of the finite values of some points in each cube; NaN where there is none."""
         known = np.isfinite(values)
         cells = self.cells[points][known]
-        total, count = (
-            self._shaped(np.bincount(cells, values[known], self._size)),
-            self._shaped(np.bincount(cells, None, self._size)),
-        )
-        mean = np.full(self.shape, np.nan)
-        return np.divide(total, count, out=mean, where=count > 0)
+        total, count = (np.bincount(cells, of, self._size) for of in (values[known], None))
+        mean = np.full(len(total), np.nan)
+        return self._shaped(np.divide(total, count, out=mean, where=count > 0))
 
     def _shaped(self, of_cubes: NDArray[Any]) -> NDArray[Any]:
         """Values of the cubes in their shape, without that of the points in none."""

@@ -18,11 +18,7 @@ from softreach.kernels.points.neighbor_sums import (
     window_keys,
 )
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, as_points
-from softreach.support.errors import InvalidInput
-
-__all__ = ["mean_value_distance"]
-
+from softreach.support.arrays import Array, Index, as_points, check_finite
 
 BLOCK = 1 << 14  # queries that one thread takes at a time
 _CELLS = 2.0 ** (PLACE_BITS - 1)  # along an axis; the other half of the keys is room for windows
@@ -55,14 +51,9 @@ def mean_value_distance(
         neighbors, shape (q,).
 
     Raises:
-        InvalidInput: Arrays of another shape or not finite, or a radius below zero.
+        InvalidInput: Points or values that are not finite.
     """
-    points, values = (
-        as_points("points", points, any_scale=True),
-        _finite_values(values, len(points)),
-    )
-    if not radius >= 0:  # NaN too
-        raise InvalidInput("radius", radius, "a radius >= 0 [m]")
+    points, values = as_points("points", points, any_scale=True), check_finite("values", values)
     if len(points) == 0:
         return np.empty(0), np.empty(0, np.intp)
     columns = _Columns.around(points, float(radius))
@@ -186,14 +177,3 @@ def _taken(components: Array, order: Index) -> Array:
     for source, target in zip(components, taken, strict=True):
         np.take(source, order, out=target, mode="clip")  # "raise" would buffer the output
     return taken
-
-
-def _finite_values(values: object, n: int) -> Array:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.ndim != 2 or len(array) != n:
-        raise InvalidInput("values", f"array of shape {array.shape}", f"of shape ({n}, m)")
-    wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(wrong):
-        fault = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
-        raise InvalidInput("values", fault, "finite")
-    return array

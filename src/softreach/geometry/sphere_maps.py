@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.points.triangles import FLAT, OPEN, judge_images
-from softreach.support.arrays import Array, Index, Mask
-
-Indices = Index
+from softreach.support.arrays import Array, Index
 
 Map = Callable[[Array], Array]
 """Images of unit vectors (n, 3), unit vectors of the same shape."""
@@ -41,20 +40,15 @@ _BISECTIONS = 60
 _OFF_AXIS = 1e-6
 
 
-def icosphere(levels: int) -> tuple[Array, Indices]:
-    """An icosahedron whose triangles are quartered some times.
+@lru_cache(maxsize=8)
+def icosphere(levels: int) -> tuple[Array, Index]:
+    """An icosahedron whose triangles are quartered some times; not to be written.
 
     Returns:
         Points (n, 3), and triangles (20 · 4^levels, 3), counterclockwise from outside.
     """
-    points, triangles = _icosphere(levels)
-    return points.copy(), triangles.copy()
-
-
-@lru_cache(maxsize=8)
-def _icosphere(levels: int) -> tuple[Array, Indices]:
     if levels:
-        return quartered(*_icosphere(levels - 1))
+        return quartered(*icosphere(levels - 1))
     golden = 0.5 * (1.0 + np.sqrt(5.0))
     pairs = np.array([[-1, golden], [1, golden], [-1, -golden], [1, -golden]])
     points = np.zeros((12, 3))
@@ -62,21 +56,15 @@ def _icosphere(levels: int) -> tuple[Array, Indices]:
         points[4 * axis : 4 * axis + 4, axis] = pairs[:, 0]
         points[4 * axis : 4 * axis + 4, (axis + 1) % 3] = pairs[:, 1]
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    triangles = np.array(
-        [
-            [i, j, k]
-            for i in range(12)
-            for j in range(i + 1, 12)
-            for k in range(j + 1, 12)
-            if min(points[i] @ points[j], points[j] @ points[k], points[k] @ points[i]) > 0.4
-        ]
-    )
+    near = points @ points.T > 0.4
+    triples = combinations(range(12), 3)
+    triangles = np.array([t for t in triples if near[t, np.roll(t, 1)].all()])
     inward = np.linalg.det(points[triangles]) < 0
     triangles[inward] = triangles[inward][:, ::-1]
     return points, triangles
 
 
-def quartered(points: Array, triangles: Indices) -> tuple[Array, Indices]:
+def quartered(points: Array, triangles: Index) -> tuple[Array, Index]:
     """Every triangle cut in four at the middles of its sides, which are put onto the sphere.
 
     Returns:
@@ -170,8 +158,11 @@ def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
         working = working[(last[working] > 1e-14) & ~at_noise]
         if not len(working):
             break
-    good = (last < _SETTLED) | (missing < _RESIDUAL)
-    kept = _first_of_equals(points, good & (missing < 1e-6))
+    good = ((last < _SETTLED) | (missing < _RESIDUAL)) & (missing < 1e-6)
+    left, kept = np.flatnonzero(good), list[int]()
+    while len(left):
+        kept.append(int(left[0]))
+        left = left[np.linalg.norm(points[left] - points[left[0]], axis=1) > _SAME]
     return Roots(points[kept], np.linalg.det(slopes[kept]))
 
 
@@ -208,15 +199,6 @@ def tangents_at(points: Array) -> Array:
 
 def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def _first_of_equals(points: Array, good: Mask) -> Index:
-    kept: list[int] = []
-    left = np.flatnonzero(good)
-    while len(left):
-        kept.append(int(left[0]))
-        left = left[np.linalg.norm(points[left] - points[left[0]], axis=1) > _SAME]
-    return np.array(kept, np.intp)
 
 
 class Rings(NamedTuple):

@@ -12,8 +12,6 @@ from softreach.geometry.surface import Surface
 from softreach.support.arrays import Faces, Index
 from softreach.support.errors import InvalidInput
 
-__all__ = ["grid_faces", "joined", "ribbon_surface", "tube_surface"]
-
 
 def tube_surface(
     centerline: ArrayLike,
@@ -50,7 +48,14 @@ def tube_surface(
     reach = np.broadcast_to(np.asarray(radii, float), len(center))[:, None]
     rings = (center + reach * spokes).swapaxes(0, 1).reshape(-1, 3)
     vertices = np.concatenate([rings, center[[0, -1]]])
-    return Surface(vertices=vertices, faces=_tube_faces(len(center), sides))
+    ring, last = np.arange(sides), (len(center) - 1) * sides
+    after = np.roll(ring, -1)
+    quad = np.column_stack([ring, after, after + sides, ring + sides])
+    walls = (quad + sides * np.arange(len(center) - 1)[:, None, None]).reshape(-1, 4)
+    first_cap = np.column_stack([np.full(sides, last + sides), after, ring])
+    last_cap = np.column_stack([np.full(sides, last + sides + 1), ring + last, after + last])
+    faces = np.concatenate([_halves(walls), first_cap, last_cap])
+    return Surface(vertices=vertices, faces=faces)
 
 
 def ribbon_surface(lower: ArrayLike, upper: ArrayLike) -> Surface:
@@ -62,13 +67,8 @@ def ribbon_surface(lower: ArrayLike, upper: ArrayLike) -> Surface:
 
     Returns:
         2 * stations * across vertices, those of `lower` first; outward faces.
-
-    Raises:
-        InvalidInput: Patches of different shapes or fewer than two points along a side.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
-    if low.shape != high.shape or low.ndim != 3 or min(low.shape[:2]) < 2:
-        raise InvalidInput("lower, upper", (low.shape, high.shape), "two equal (n, k, 3) patches")
     index = np.arange(low.shape[0] * low.shape[1]).reshape(low.shape[:2])
     rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
     wall = np.column_stack([rim, np.roll(rim, -1)])
@@ -97,17 +97,6 @@ def joined(parts: Sequence[Any]) -> Surface:
         vertices=np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
         faces=np.concatenate([np.empty((0, 3), np.int64), *faces]),
     )
-
-
-def _tube_faces(stations: int, sides: int) -> Faces:
-    ring = np.arange(sides)
-    after = np.roll(ring, -1)
-    quad = np.column_stack([ring, after, after + sides, ring + sides])
-    walls = _halves((quad + sides * np.arange(stations - 1)[:, None, None]).reshape(-1, 4))
-    last = (stations - 1) * sides
-    first_cap = np.column_stack([np.full(sides, stations * sides), after, ring])
-    last_cap = np.column_stack([np.full(sides, stations * sides + 1), ring + last, after + last])
-    return np.concatenate([walls, first_cap, last_cap])
 
 
 def _grid(index: Index) -> Index:

@@ -26,7 +26,6 @@ they tear have no image; their other corners begin searches instead (`torn_cells
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -45,14 +44,10 @@ from softreach.inverse.roots import (
 )
 from softreach.kernels.branches import candidates, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
-from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined, joined_by, rows
 from softreach.workspace.search import CLOSELY, nearest_tips
-
-__all__ = ["distinct", "every_branch", "with_other_sheets"]
-
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
 _LARGEST, _SMALLEST = 8192, 1024  # targets solved together on a thread
@@ -84,7 +79,14 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     if not count:
         return no_roots(prepared.tip_map)
     prepared.prepare_branches(count)
-    sets = _sets(spatial_order(request.targets), _set_size(prepared, count))
+    size = _LARGEST_LOADED  # work enough to be shared out among threads
+    if not prepared.tip_map.supports_unstable:  # enough for kernels, and enough sets for threads
+        share = -(-count // (_SHARES * parallel.thread_count()))
+        size = min(_LARGEST, max(_SMALLEST, share))
+    # Groups of neighbors, alike in work, from everywhere.
+    order, number = spatial_order(request.targets), -(-count // size)
+    groups = [order[block] for block in parallel.blocks(count, _SMALLEST)]
+    sets = [np.concatenate(groups[k::number]) for k in range(number)]
     if prepared.tip_map.supports_unstable or len(sets) == 1:
         parts = [_branches_of(prepared, request, chosen) for chosen in sets]
     else:
@@ -113,20 +115,6 @@ def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> 
     return roots.joined(distinct(prepared, request, rows(others, ~same)))
 
 
-def _sets(order: Index, size: int) -> list[Index]:
-    """Sets of about this size, of groups of neighbors (alike in work) from everywhere."""
-    groups = [order[block] for block in parallel.blocks(len(order), _SMALLEST)]
-    number = -(-len(order) // size)
-    return [np.concatenate(groups[k::number]) for k in range(number)]
-
-
-def _set_size(prepared: PreparedMap, count: int) -> int:
-    """Number of targets to solve together: enough of them for kernels, enough sets for threads."""
-    if prepared.tip_map.supports_unstable:
-        return _LARGEST_LOADED  # work enough to be shared out among threads
-    return min(_LARGEST, max(_SMALLEST, -(-count // (_SHARES * parallel.thread_count()))))
-
-
 def _alone(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     with parallel.undivided():
         return _branches_of(prepared, request, chosen)
@@ -136,8 +124,10 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
     """The roots of some of the targets, sorted by their places in `chosen`."""
     some = request.of(chosen)
     starts = starts_from_cells(prepared, some, np.arange(len(chosen)))
-    if len(prepared.torn_cells.tip):
-        starts = with_torn_cells(prepared, some, starts)
+    if len(prepared.torn_cells.tip):  # more from corners of cells that have no image
+        target, gamma = prepared.torn_cells.starts(some.targets)
+        nowhere, unknown = np.full(len(target), -1), np.zeros((len(target), 3, 3))
+        starts = joined_by("target", [starts, Starts(target, nowhere, gamma, unknown)])
     roots = _newton(prepared, some, starts)
     # Where the quadratics say that nothing leads there, look once more without believing them.
     missing = roots.missing(len(chosen), some.residual)
@@ -145,7 +135,11 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
     roots = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
     roots = _with_partners(prepared, some, roots)
     missing = roots.missing(len(chosen), some.residual)
-    roots = roots.joined(_singular_roots(prepared, some, missing))
+    starts = starts_from_cells(prepared, some, missing)  # step 9
+    goal = some.targets[starts.target]
+    ends = nearest_tips(prepared.tip_map, starts.gamma, goal, some.residual, CLOSELY)
+    late = roots_at(prepared.tip_map, some.targets, starts.target, ends.gamma)
+    roots = roots.joined(distinct(prepared, some, rows(late, late.residual <= some.residual)))
     return roots._replace(target=chosen[roots.target])
 
 
@@ -153,7 +147,17 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     """Steps 5 and 8: damped Newton from every start; the roots that are within the bounds."""
     tip_map, goal = prepared.tip_map, request.targets[starts.target]
     low, high = tip_map.box.low.copy(), tip_map.box.high.copy()
-    search = _search(goal, _improved(tip_map, goal, starts))
+    start, n = _improved(tip_map, goal, starts), len(goal)
+    search = Search(
+        target=goal,
+        gamma=start.copy(),
+        slope=np.zeros((n, 3, 3)),
+        residual=np.full(n, 1e300),
+        step=np.zeros((n, 3)),
+        damping=np.ones(n),
+        trial=start.copy(),
+        state=np.full(n, RUNNING),
+    )
     for _ in range(_MOST_ITERATIONS):
         active = np.flatnonzero(search.state == RUNNING)
         if not len(active):
@@ -226,20 +230,6 @@ def _improved(tip_map: TipMap, goal: Array, starts: Starts) -> Array:
     return gamma
 
 
-def _search(goal: Array, start: Array) -> Search:
-    n = len(start)
-    return Search(
-        target=goal,
-        gamma=start.copy(),
-        slope=np.zeros((n, 3, 3)),
-        residual=np.full(n, 1e300),
-        step=np.zeros((n, 3)),
-        damping=np.ones(n),
-        trial=start.copy(),
-        state=np.full(n, RUNNING),
-    )
-
-
 def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     fresh = roots
     for _ in range(2):  # a partner may have a partner of its own where two folds meet
@@ -282,15 +272,6 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     return rows(roots, kept)
 
 
-def _singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
-    """Step 9: what descent finds for targets where Newton's method found nothing."""
-    starts = starts_from_cells(prepared, request, chosen)
-    targets = request.targets[starts.target]
-    gamma = nearest_tips(prepared.tip_map, starts.gamma, targets, request.residual, CLOSELY).gamma
-    roots = roots_at(prepared.tip_map, request.targets, starts.target, gamma)
-    return distinct(prepared, request, rows(roots, roots.residual <= request.residual))
-
-
 class Starts(NamedTuple):
     """Activations at which searches begin."""
 
@@ -326,7 +307,12 @@ def starts_from_cells(
         return parts[0]
     box, targets = prepared.tip_map.box, request.targets[chosen]
     low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
-    for block, tree in _trees(prepared, targets):
+    # Before many targets were asked for, a tree for each block of what may cover them.
+    few = parallel.blocks(len(targets), _AT_ONCE)
+    trees = ((block, prepared.leaves.around(targets[block])) for block in few)
+    if "tree" in vars(prepared):
+        trees = [(slice(len(targets)), prepared.tree)]
+    for block, tree in trees:
         first, last, _ = block.indices(len(targets))
         while first < last:
             done, count = candidates.find_starts(
@@ -336,22 +322,6 @@ def starts_from_cells(
             parts.append(part._replace(target=chosen[part.target + first]))
             first += done
     return joined(parts)
-
-
-def _trees(prepared: PreparedMap, targets: Array) -> Iterator[tuple[slice, SpaceTree]]:
-    """A tree for each block of targets: before many were asked for, of what may cover them."""
-    if "tree" in vars(prepared):
-        yield slice(len(targets)), prepared.tree
-        return
-    for block in parallel.blocks(len(targets), _AT_ONCE):
-        yield block, prepared.leaves.around(targets[block])
-
-
-def with_torn_cells(prepared: PreparedMap, request: Request, starts: Starts) -> Starts:
-    """The starts, and more from corners of cells that have no image."""
-    target, gamma = prepared.torn_cells.starts(request.targets)
-    nowhere, unknown = np.full(len(target), -1), np.zeros((len(target), 3, 3))
-    return joined_by("target", [starts, Starts(target, nowhere, gamma, unknown)])
 
 
 def spatial_order(points: Array) -> Index:

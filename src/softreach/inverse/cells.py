@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.box.simplices import corner_bits
 from softreach.kernels.branches.space_tree import SpaceTree, sort_into_children
 from softreach.kernels.image.activation_mesh import (
     ActivationMesh,
@@ -16,11 +15,11 @@ from softreach.kernels.image.activation_mesh import (
 )
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask, rows
+from softreach.workspace.grid import cell_corners, cube_grid
 
 _REACH = 1.5  # widths of a cell within which a root is looked for
 _MOST, _MOST_OF_SHEET = 16, 4  # searches for one target
 _AT_ONCE = 1 << 20  # pairs of a target and a vertex
-_CORNERS = corner_bits(3)
 _TORN = 0.05  # interpolation error in L beyond which corners are taken to be on different branches
 _LEAF = 24  # a node with no more tetrahedra is not divided
 _MOST_LEVELS = 10
@@ -35,11 +34,8 @@ def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornC
         tip_map: A tip map of three bundles, each free to move.
         cells: Cells along each axis of the box.
     """
-    place = np.stack(np.unravel_index(np.arange((cells + 1) ** 3), (cells + 1,) * 3), -1)
-    gamma = tip_map.box.from_cube(place / cells)
-    vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
-    low = place[(place < cells).all(axis=1), None]
-    corner = (low + _CORNERS) @ np.array([(cells + 1) ** 2, cells + 1, 1])
+    gamma = tip_map.box.from_cube(cube_grid(cells))
+    vertices, corner = _Vertices(gamma, *tip_map.tips_and_slopes(gamma)), cell_corners(cells, 3)
     mesh = _mesh(tip_map, vertices, corner)
     torn = np.zeros(len(corner), bool)
     if tip_map.supports_unstable:
@@ -136,19 +132,14 @@ class TornCells(NamedTuple):
         owners, starts = [np.empty(0, np.int64)], [np.empty((0, 3))]
         size = max(1, _AT_ONCE // max(len(self.tip), 1))
         for first in range(0, len(targets) if len(self.tip) else 0, size):
-            owner, vertex = self._nearest(targets[first : first + size])
-            owners.append(owner + first)
-            starts.append(self.gamma[vertex])
+            away = targets[first : first + size, None] - self.tip
+            step = np.abs(np.einsum("nij,tnj->tni", self.inverse, away)).max(axis=2)
+            count = min(self.most, step.shape[1])
+            vertex = np.argpartition(step, count - 1, axis=1)[:, :count]
+            near = np.take_along_axis(step, vertex, axis=1) <= _REACH
+            owners.append(np.nonzero(near)[0] + first)
+            starts.append(self.gamma[vertex[near]])
         return np.concatenate(owners), np.concatenate(starts)
-
-    def _nearest(self, targets: Array) -> tuple[Index, Index]:
-        """Pairs of a target and a vertex that sees it near, the nearest few of each target."""
-        away = targets[:, None] - self.tip
-        step = np.abs(np.einsum("nij,tnj->tni", self.inverse, away)).max(axis=2)
-        count = min(self.most, step.shape[1])
-        vertex = np.argpartition(step, count - 1, axis=1)[:, :count]
-        near = np.take_along_axis(step, vertex, axis=1) <= _REACH
-        return np.nonzero(near)[0], vertex[near]
 
 
 def _mesh(tip_map: TipMap, vertices: _Vertices, corner: Index) -> ActivationMesh:
@@ -197,7 +188,11 @@ class _Growing:
 
     def divide(self) -> bool:
         """Divide every node of the last depth that holds many items; return whether any did."""
-        many = self.count > self._largest_leaf()
+        # The fullest nodes, as many as leave room for the lists, which are four times as long.
+        counts = np.sort(self.count)[::-1]
+        affordable = self.listed + 3 * np.cumsum(counts) + counts.sum() <= _MOST_ITEMS
+        largest = 0 if affordable.all() else int(counts[np.argmin(affordable)])
+        many = self.count > max(_LEAF, largest)
         if not many.any():
             return False
         self._close(many)
@@ -215,13 +210,6 @@ class _Growing:
         self.corner = corner.reshape(-1, 3)
         self.first, self.count, self.item = starts.ravel(), counts.ravel(), item[:-1]
         return True
-
-    def _largest_leaf(self) -> int:
-        """Divide the fullest nodes, as many as leave room for the lists (four times as long)."""
-        counts = np.sort(self.count)[::-1]
-        affordable = self.listed + 3 * np.cumsum(counts) + counts.sum() <= _MOST_ITEMS
-        first_left = int(np.argmin(affordable)) if not affordable.all() else len(counts)
-        return max(_LEAF, int(counts[first_left]) if first_left < len(counts) else 0)
 
     def _close(self, open_nodes: Mask) -> None:
         """Number the children of open nodes; list the items of the others for good."""

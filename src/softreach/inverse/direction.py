@@ -204,14 +204,10 @@ def _expanded(
     hessian = np.full((n, m, m), np.nan)
     hessian[curved] = change / (_DIFFERENCE * scales)[:, None]
     torn = np.isfinite(value[:n]) & curved & np.isnan(hessian).any(axis=(1, 2))
-    hessian[torn] = _cautious(gradient[:n][torn], scales)
+    # Next to where a function ends, steps down of a tenth of the ranges.
+    size = np.abs(gradient[:n][torn] * scales).max(axis=1, initial=0.0)
+    hessian[torn] = (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(m)
     return _Expansion(value[:n], gradient[:n], hessian)
-
-
-def _cautious(gradient: Array, scales: Array) -> Array:
-    """In place of a Hessian, next to where a function ends: steps down of a tenth of the ranges."""
-    size = np.abs(gradient * scales).max(axis=1, initial=0.0)
-    return (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(len(scales))
 
 
 def _squares(rows: Array) -> Array:

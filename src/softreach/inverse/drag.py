@@ -5,18 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse import PathStatus, PreparedMap, prepared_map
-from softreach.inverse.path import BranchPoint, Continuation
+from softreach.inverse.path import BranchPoint, Continuation, PathStatus
+from softreach.inverse.prepared import prepared_map
 from softreach.rod.rods import all_inputs
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array
 from softreach.workspace.search import CLOSELY, nearest_tips
-
-__all__ = ["Drag", "Dragged"]
-
-Array = NDArray[np.float64]
 
 _RESIDUAL = 1e-8  # |tip - target| of an arm that follows, in L: far below a pixel
 _FLAT = 0.05  # smallest over largest singular value, below which a fold may be near
@@ -49,7 +45,7 @@ class Drag:
         Args:
             arm: The design, or the tip map of the posture that it is in, as of `Solution.posture`.
         """
-        self._prepared: PreparedMap = prepared_map(arm)
+        self._prepared = prepared_map(arm)
         self.arm = self._prepared.whole.arm
         self._rod = self._prepared.tip_map
         self._tracker = Continuation(self._rod, _RESIDUAL * self._rod.length)
@@ -65,7 +61,7 @@ class Drag:
         Returns:
             None where the arm has no stable equilibrium to begin with.
         """
-        box, measures = self._prepared.whole.box, self._prepared.measures
+        box, measures = self._prepared.whole.box, self._prepared.whole.measures
         if self._last is not None and self._last[0] == activation:
             point = self._last[1]
         else:
@@ -83,7 +79,12 @@ class Drag:
 
     def _nearest(self, point: BranchPoint, target: Array) -> BranchPoint:
         gamma, tip_map = point.gamma, point.tip_map
-        starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, point.slope)]))
+        scales, starts = self._rod.box.scales, [gamma]
+        _, sizes, axes = np.linalg.svd(point.slope * scales)
+        if len(sizes) == 3 and sizes[2] <= _FLAT * sizes[0]:
+            # On a fold no small change brings the tip nearer: begin on both sides of it.
+            starts += [gamma + _ASIDE * axes[2] * scales, gamma - _ASIDE * axes[2] * scales]
+        starts = self._rod.box.clip(np.array(starts))
         targets = np.tile(target, (len(starts), 1))
         ends = nearest_tips(tip_map, starts, targets, self._tracker.residual, CLOSELY).gamma
         tips, slopes = tip_map.tips_and_slopes(ends)
@@ -91,18 +92,9 @@ class Drag:
         gaps = np.where(np.isfinite(gaps), gaps, np.inf)
         best = gaps <= gaps.min() + self._tracker.residual
         other_side = [self._side * self._sign(slope) < 0 for slope in slopes]
-        away = np.linalg.norm((ends - gamma) / self._rod.box.scales, axis=1)
+        away = np.linalg.norm((ends - gamma) / scales, axis=1)
         best_end = np.lexsort((away, other_side, ~best))[0]
         return BranchPoint(ends[best_end], tips[best_end], slopes[best_end], tip_map).kept()
-
-    def _beside_fold(self, gamma: Array, slope: Array) -> list[Array]:
-        """Starts on both sides of a fold: on it, no small change brings the tip nearer."""
-        scales = self._rod.box.scales
-        _, sizes, axes = np.linalg.svd(slope * scales)
-        if len(sizes) < 3 or sizes[2] > _FLAT * sizes[0]:
-            return []
-        step = _ASIDE * axes[2] * scales
-        return [gamma + step, gamma - step]
 
     def _sign(self, slope: Array) -> float:
         """The sheet of three free bundles that the arm is on; 0 next to a fold and for others."""
@@ -113,8 +105,8 @@ class Drag:
         return float(np.sign(np.linalg.det(scaled))) if sizes[2] > 1e-6 * sizes[0] else 0.0
 
     def _dragged(self, point: BranchPoint, target: Array) -> Dragged:
-        tip_map = self._prepared.whole
-        activation = tip_map.box.with_fixed(point.gamma[None])[0] * self._prepared.measures
+        whole = self._prepared.whole
+        activation = whole.box.with_fixed(point.gamma[None])[0] * whole.measures
         gap = float(np.linalg.norm(point.tip - target))
         within = tuple(float(value) for value in activation)
         self._last, held = (within, point), all_inputs(point.tip_map)

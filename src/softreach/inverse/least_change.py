@@ -7,9 +7,9 @@ target otherwise. The least of them is the answer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +31,6 @@ from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows
-
-__all__ = ["least_changes", "sqp"]
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 _CANDIDATES = 300
@@ -76,7 +74,11 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     if request.direction is not None:
         first = _turned(prepared, asked, first)
     families = _Families(first, request.family, prepared.tip_map.box.scales)
-    for near in _random_activations(prepared.tip_map, request):
+    box, rng = prepared.tip_map.box, np.random.default_rng(request.seed)
+    # One sequence for all targets, so that a target's family does not depend on its neighbors.
+    size = request.family - 1, box.bundles
+    rounds = (rng.uniform(box.low, box.high, size) for _ in range(_ROUNDS))
+    for near in chain.from_iterable(rounds):
         rows = np.flatnonzero(families.counts < request.family)
         if not len(rows):
             break
@@ -84,18 +86,6 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
         other = _in_blocks(prepared, one, families.members[rows, 0]).gamma
         families.add(rows, other, None if request.direction is not None else asked.near[rows])
     return np.repeat(reached, families.counts), families.members[families.is_member], known
-
-
-def _random_activations(tip_map: TipMap, request: Request) -> Iterator[Array]:
-    """Activations that others of a family stay near to.
-
-    One sequence for all targets, so that a target's family does not depend on its neighbors.
-    """
-    rng = np.random.default_rng(request.seed)
-    for _ in range(_ROUNDS):
-        yield from rng.uniform(
-            tip_map.box.low, tip_map.box.high, (request.family - 1, tip_map.box.bundles)
-        )
 
 
 class _Families:
@@ -325,10 +315,8 @@ def sqp(
     share = max(_TOGETHER, -(-n // parallel.thread_count()))
     tip_map.prepare()
     search = partial(_searched, tip_map, request, penalty=penalty, limits=(settled, most))
-    parallel.run(
-        partial(search, owner[block], Minima(*(part[block] for part in minima)))
-        for block in parallel.blocks(n, share)
-    )
+    blocks = parallel.blocks(n, share)
+    parallel.run(partial(search, owner[block], rows(minima, block)) for block in blocks)
     return minima._replace(residual=minima.residual * tip_map.length)
 
 
@@ -344,7 +332,7 @@ def _searched(
     bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
     running = _room(min(total, _TOGETHER), box.bundles)
     tips, ahead = np.empty_like(running.miss), np.empty_like(running.slope)
-    begun = n = 0
+    asked, length, begun, n = (request.targets, request.near), tip_map.length, 0, 0
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
         new, rows = slice(n, n + more), slice(begun, begun + more)
@@ -357,11 +345,11 @@ def _searched(
         if tip_map.supports_unstable:
             lost = np.isnan(tips[:n, 0])
             tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
-        asked = request.targets, request.near
-        n = judge(running, n, tips, ahead, owner, *asked, bounds, tip_map.length, limits, ends)
-        steps = (part[:n] for part in (running.center, running.slope, running.wanted))
-        limited = (part[:n] for part in (running.softness, running.low, running.high))
-        project(*steps, *limited, running.trial[:n], running.multiplier[:n])
+        n = judge(running, n, tips, ahead, owner, *asked, bounds, length, limits, ends)
+        center, slope, wanted = running.center[:n], running.slope[:n], running.wanted[:n]
+        softness, low, high = running.softness[:n], running.low[:n], running.high[:n]
+        multiplier = running.multiplier[:n]
+        project(center, slope, wanted, softness, low, high, running.trial[:n], multiplier)
         next_trials(running, n, owner, request.near)
 
 

@@ -44,12 +44,6 @@ def starts(prepared: PreparedMap, targets: Array, known: Roots | None) -> tuple[
     return np.concatenate([target, known.target]), np.concatenate([start, known.gamma])
 
 
-def nearest_from(tip_map: TipMap, request: Request, gamma: Array) -> Nearest:
-    """The local minimum of distance from one activation for each target."""
-    ends = nearest_tips(tip_map, gamma, request.targets, request.residual, CLOSELY)
-    return nearest_at(tip_map, request.targets, ends.gamma)
-
-
 def descend(
     tip_map: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_STEPS
 ) -> Nearest:

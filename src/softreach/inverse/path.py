@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.nearest import descend
-from softreach.inverse.request import as_activations, as_residual, as_targets, reach_tol
+from softreach.inverse.request import as_activations, as_residual, reach_tol
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def track_path(
     Raises:
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
-    points = as_targets("path", path)
+    points = as_points("path", path)
     tip_map = measured_bundles(as_tip_map(arm, tol, point=point))
     if tip_map.box.dimension < 3:
         raise InvalidInput(
@@ -184,8 +184,12 @@ class Continuation:
                 if not over.any():
                     return _Substep(point=self._clipped(corrected))
                 blocked = over & self._at_bound(gamma)
-                if not blocked.any():
-                    return _Substep(shorten=self._part_within(gamma, corrected.gamma, over))
+                if not blocked.any():  # end just inside the bounds
+                    way = (corrected.gamma - gamma)[over]
+                    bound = np.where(way > 0.0, self.box.high[over], self.box.low[over])
+                    inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales[over] / np.abs(way)
+                    part = (bound - gamma[over]) / way * np.minimum(inside, 1 - 1e-6)
+                    return _Substep(shorten=float(np.clip(part.min(), 1e-6, 0.9999)))
                 ahead = corrected.gamma
             bundle = int(np.flatnonzero(blocked)[0])
             upper = bool(ahead[bundle] > self.box.high[bundle])
@@ -248,14 +252,6 @@ class Continuation:
 
     def _at_bound(self, gamma: Array) -> Mask:
         return self.box.excess(gamma) >= -2 * _AT_BOUND
-
-    def _part_within(self, gamma: Array, corrected: Array, over: Mask) -> float:
-        """The part of a substep that ends just inside the bounds."""
-        bound = np.where(corrected > self.box.high, self.box.high, self.box.low)
-        inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales / np.abs(corrected - gamma).clip(1e-300)
-        part = (bound - gamma)[over] / (corrected - gamma)[over]
-        part *= np.minimum(inside[over], 1 - 1e-6)
-        return float(np.clip(part.min(), 1e-6, 0.9999))
 
 
 class BranchPoint(NamedTuple):

@@ -17,13 +17,9 @@ from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.rods import as_tip_map, coarsened, free_bundles, measured_bundles
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support.arguments import as_integer, as_one_of
-from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 from softreach.workspace.postures import all_postures
-
-__all__ = ["PreparedMap", "forget_prepared", "prepared_map"]
-
 
 _CELLS = 32
 _FEW = 500  # targets; to divide space for more takes less time than not to
@@ -50,14 +46,9 @@ class PreparedMap:
     """
 
     whole: TipMap
-    """The tip map of all bundles, whose activations are in `measures`."""
+    """The tip map of all bundles, whose activations are in its `measures`."""
     cells: int = _CELLS
     """With three free bundles: cells along each axis of the activation box."""
-
-    @lazy
-    def measures(self) -> Array:
-        """Size of one unit of each activation in the unit of its bundle, shape (bundles,)."""
-        return self.whole.measures
 
     @lazy
     def tip_map(self) -> TipMap:

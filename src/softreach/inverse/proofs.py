@@ -106,20 +106,14 @@ def _exclusion_of_block(
         hopeless = left & (spent + halves > most)[owner]
         np.minimum.at(least, owner[hopeless], bounds[hopeless])
         left &= ~hopeless
-        half, center = _halved(tip_map, half, center[left])
+        # Both halves of each cell along the axis of least error.
+        thinner = np.where(np.eye(len(half), dtype=bool), 0.5 * half, half)
+        axis = int(np.argmin([tip_map.linearization_error(widths) for widths in thinner]))
+        half, center = thinner[axis], np.repeat(center[left], 2, axis=0)
+        center[0::2, axis] -= half[axis]
+        center[1::2, axis] += half[axis]
         owner = np.repeat(owner[left], 2)
     return np.maximum(least, 0.0)
-
-
-def _halved(tip_map: TipMap, half: Array, center: Array) -> tuple[Array, Array]:
-    """Half widths, and centers of both halves of each cell along the axis of least error."""
-    thinner = np.where(np.eye(len(half), dtype=bool), 0.5 * half, half)
-    axis = int(np.argmin([tip_map.linearization_error(widths) for widths in thinner]))
-    half = thinner[axis]
-    center = np.repeat(center, 2, axis=0)
-    center[0::2, axis] -= half[axis]
-    center[1::2, axis] += half[axis]
-    return half, center
 
 
 def _distances(tip_map: TipMap, half: Array, center: Array, targets: Array) -> Array:

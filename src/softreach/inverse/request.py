@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
-from softreach.support.arrays import Array, Index, as_floats, as_points, check_finite
+from softreach.support.arrays import Array, Index, as_floats, check_finite
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import unit_names
 from softreach.support.units import TYPED, lengths_in
@@ -50,15 +50,6 @@ class Request:
         """The request for some of the targets."""
         direction = None if self.direction is None else self.direction[rows]
         return replace(self, targets=self.targets[rows], near=self.near[rows], direction=direction)
-
-
-def as_targets(name: str, targets: ArrayLike) -> Array:
-    """The targets as a (t, 3) float array.
-
-    Raises:
-        InvalidInput: Another shape, or values that are not finite.
-    """
-    return as_points(name, targets)
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
@@ -108,8 +99,11 @@ def positions_in(text: str, source: str, length: float | None = None) -> list[li
         InvalidInput: A line that is not three lengths, an unknown unit in the header, or no line.
     """
     lines = [line for line in text.splitlines() if line.strip()]
-    units = _header_units(lines[0], source) if lines and _is_header(lines[0]) else None
-    rows = lines if units is None else [_with_units(line, units) for line in lines[1:]]
+    words = [word.strip() for word in lines[0].split(",")] if lines else []
+    rows = lines
+    if words and not any(word.startswith(tuple("+-.0123456789")) for word in words):
+        units = [_header_unit(word, lines[0], source) for word in words]
+        rows = [_with_units(line, units) for line in lines[1:]]
     if not rows:
         raise InvalidInput("targets", source, "a CSV file with a row x,y,z for each position")
     return [position_in(f"{source}, point {k + 1}", row, length) for k, row in enumerate(rows)]
@@ -151,16 +145,14 @@ def length_in(name: str, text: str, length: float) -> float:
     return values[0]
 
 
-def _header_units(line: str, source: str) -> list[str]:
-    """The unit of each column of a header such as x_mm,y_mm,z_mm or x [mm],y [mm],z [mm]."""
-    units: list[str] = []
-    for name in line.split(","):
-        match = _HEADER.fullmatch(name.strip().strip('"'))
-        unit = "" if match is None else match[1] or match[2] or ""
-        if match is not None and match[2] and unit not in (*unit_names("m"), "L"):
-            raise InvalidInput(f"{source}, header", line, f"in {TYPED} or L")
-        units.append({"over_length": "L"}.get(unit, unit))
-    return units
+def _header_unit(word: str, line: str, source: str) -> str:
+    """The unit of a column of a header such as x_mm,y_mm,z_mm or x [mm],y [mm],z [mm]."""
+    match = _HEADER.fullmatch(word.strip('"'))
+    if match is None:
+        return ""
+    if match[2] and match[2] not in (*unit_names("m"), "L"):
+        raise InvalidInput(f"{source}, header", line, f"in {TYPED} or L")
+    return {"over_length": "L"}.get(match[1], match[1] or match[2] or "")
 
 
 def _with_units(line: str, units: list[str]) -> str:
@@ -168,7 +160,3 @@ def _with_units(line: str, units: list[str]) -> str:
     if len(parts) != len(units):
         return line
     return ",".join(f"{part.strip()}{unit}" for part, unit in zip(parts, units, strict=True))
-
-
-def _is_header(line: str) -> bool:
-    return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))

@@ -146,7 +146,11 @@ def affine_invariant_newton(
     for _ in range(_MOST_ITERATIONS):
         if not len(active):
             break
-        inverse = _inverses(slope[active] * scales)
+        jacobians = slope[active] * scales  # next to singular ones instead of these
+        sizes = np.linalg.norm(jacobians, axis=(1, 2))
+        flat = np.abs(np.linalg.det(jacobians)) <= 1e-30 * sizes**3
+        shift = np.where(flat, 1e-12 * sizes, 0.0)[:, None, None] * np.eye(3)
+        inverse = np.linalg.inv(jacobians + shift)
         step = np.einsum("nij,nj->ni", inverse, miss[active])
         size = np.linalg.norm(step, axis=1)
         factor = np.minimum(damping[active], _LONGEST_STEP / np.maximum(size, 1e-300))
@@ -194,14 +198,3 @@ class _Valley(NamedTuple):
         step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]
         ahead = np.clip(gamma + scales * step[:, None] * right[:, 0], self.low, self.high)
         return np.where(lost[:, None], gamma, ahead)
-
-
-def _inverses(matrices: Array) -> Array:
-    """Inverses of 3x3 matrices, of those that are singular next to them."""
-    det = np.linalg.det(matrices)
-    size = np.linalg.norm(matrices, axis=(1, 2))
-    flat = np.abs(det) <= 1e-30 * size**3
-    shift = np.where(flat, 1e-12 * size, 0.0)[:, None, None] * np.eye(3)
-    inverses = np.empty_like(matrices)
-    inverses[:] = np.linalg.inv(matrices + shift)
-    return inverses

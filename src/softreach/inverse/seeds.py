@@ -17,9 +17,6 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-__all__ = ["Seeds", "face_seeds", "seeds"]
-
-
 _MOST = 150_000  # seeds on a grid of the box
 _DIMENSIONS = 6  # from which on a grid is too coarse to be worth more than a low-discrepancy set
 _SOBOL = 1 << 17

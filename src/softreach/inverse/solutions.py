@@ -19,8 +19,6 @@ from softreach.support.errors import counted
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Solution", "Solutions", "Status"]
-
 
 class Status(IntEnum):
     """Outcome of the search for a target."""

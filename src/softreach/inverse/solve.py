@@ -9,10 +9,10 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch, with_other_sheets
 from softreach.inverse.direction import compromises
 from softreach.inverse.least_change import least_changes
-from softreach.inverse.nearest import nearest, nearest_from
+from softreach.inverse.nearest import nearest, nearest_at
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import Request, as_activations, as_residual, as_targets, reach_tol
+from softreach.inverse.request import Request, as_activations, as_residual, reach_tol
 from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.loaded.rod import LoadedRod
@@ -20,12 +20,9 @@ from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
-from softreach.support.arrays import Array, Mask, as_directions, joined, rows
+from softreach.support.arrays import Array, as_directions, as_points, joined, rows
 from softreach.support.errors import Range
-from softreach.workspace.search import Nearest
-
-__all__ = ["solve_inverse"]
-
+from softreach.workspace.search import CLOSELY, Nearest, nearest_tips
 
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
@@ -100,8 +97,9 @@ def solve_inverse(
         InvalidInput: Arguments of another shape, not finite, or out of range.
     """
     prepared = prepared_map(arm, tol, frame=frame, point=point)
-    points, box = as_targets("targets", targets), prepared.whole.box
+    points, box = as_points("targets", targets), prepared.whole.box
     preferred = np.zeros(box.bundles) if near is None else near
+    measures = prepared.whole.measures
     unit = None if direction is None else as_directions("direction", direction, len(points))
     residual = as_residual(residual_over_length) * prepared.whole.length
     within = as_number("within", within, Range(0.0, unit="m"))
@@ -109,7 +107,7 @@ def solve_inverse(
         targets=points,
         residual=residual,
         reach_tol=max(reach_tol(prepared.whole, residual), within),
-        near=as_activations("near", preferred, box, len(points)) / prepared.measures[box.free],
+        near=as_activations("near", preferred, box, len(points)) / measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
         family=as_integer("family", family, 1, 10_000),
@@ -123,7 +121,7 @@ def solve_inverse(
         solve, size = _by_branches, _BRANCH_BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
-    return solutions.in_units_of(prepared.measures)
+    return solutions.in_units_of(measures)
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
@@ -156,7 +154,9 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     target, gamma, best = least_changes(prepared, request)
     roots = roots_at(prepared.tip_map, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
-    closest = nearest_from(prepared.tip_map, request.of(missing), best.gamma[missing])
+    left, start = request.targets[missing], best.gamma[missing]
+    ends = nearest_tips(prepared.tip_map, start, left, request.residual, CLOSELY)
+    closest = nearest_at(prepared.tip_map, left, ends.gamma)
     return _solutions(prepared, request, roots, closest)
 
 
@@ -200,7 +200,10 @@ def _solutions(
     points[reached[off]] = roots.tip[first[off]]
     points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
     proved_gaps[missing] = bounds
-    activations = prepared.whole.box.with_fixed(roots.gamma)
+    activations, known = prepared.whole.box.with_fixed(roots.gamma), as_tip_map(prepared.whole)
+    leans = np.zeros(len(activations), bool)
+    if isinstance(known.rod, LoadedRod):
+        leans = known.rod.leans(known.inputs.activations(activations))
     maps = [prepared, *prepared.sheets] if roots.sheet.any() else [prepared]
     return Solutions(
         arm=prepared.whole.arm,
@@ -213,7 +216,7 @@ def _solutions(
         residuals=roots.residual,
         conditions=conditions(roots.slope),
         margins=tip_map.box.margin(roots.gamma),
-        leans=_leans(prepared.whole, activations),
+        leans=leans,
         sheets=roots.sheet,
         statuses=statuses,
         nearest=points,
@@ -221,10 +224,3 @@ def _solutions(
         gaps=gaps,
         gap_bounds=proved_gaps,
     )
-
-
-def _leans(tip_map: TipMap, activations: Array) -> Mask:
-    known = as_tip_map(tip_map)
-    if isinstance(known.rod, LoadedRod):
-        return known.rod.leans(known.inputs.activations(activations))
-    return np.zeros(len(activations), bool)

@@ -20,7 +20,7 @@ from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.quantity import quantity
 from softreach.workspace.gradient import MovingBoundary, volume_gradient
 from softreach.workspace.reach import reachable_set
-from softreach.workspace.reachable import ReachableSolid
+from softreach.workspace.reachable import ReachableSet
 
 _QUANTILE = 0.05  # share of arms that are worse than the number given for them
 _NORMAL = 1.6448536269514722  # the 95 % quantile of the normal distribution
@@ -186,7 +186,7 @@ class FirstOrder:
         self.boundary = MovingBoundary.of(self.solid, deviations.parameters)
         self.loaded = [self._under(payload) for payload in needs.payloads or (None,)]
 
-    def _under(self, payload: float | None) -> tuple[ReachableSolid | None, MovingBoundary | None]:
+    def _under(self, payload: float | None) -> tuple[ReachableSet | None, MovingBoundary | None]:
         """Set under a payload, and its boundary; none of either where nothing is stable."""
         arm = with_payload(self.deviations.arm, payload)
         if arm is self.deviations.arm or not self.needs.targets:
@@ -197,7 +197,7 @@ class FirstOrder:
             if error.name != "loads":
                 raise
             return None, None
-        if not isinstance(solid, ReachableSolid):
+        if solid.dimension < 3:
             raise NotPossible(f"with {payload:g} kg at its tip the arm reaches no volume")
         known = find_parameters(arm, self.deviations.names)
         return solid, MovingBoundary.of(solid, tuple(known.values()))

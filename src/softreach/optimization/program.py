@@ -19,7 +19,6 @@ from softreach.rod.rods import as_tip_map, effective, in_steps, refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-from softreach.workspace import ReachableSolid
 from softreach.workspace.boundary import boundary_samples
 from softreach.workspace.gradient import VolumeGradient, gradient_of
 from softreach.workspace.tip_derivatives import TipDerivatives
@@ -111,14 +110,14 @@ class DesignPoint:
     def share(self, number: int, region: Region) -> float:
         """Share of a region that the tip reaches under a payload."""
         solid = self.case.set_of(self.arms[number])
-        if not isinstance(solid, ReachableSolid):
+        if solid.dimension < 3:
             return 0.0
         return float(solid.contains(region.places(_PLACES)).mean())
 
     def share_slope(self, number: int, region: Region) -> Array:
         """Its derivatives: what the part of the boundary in the region sweeps, theory (98)."""
         solid = self.case.set_of(self.arms[number])
-        if not isinstance(solid, ReachableSolid):
+        if solid.dimension < 3:
             return np.zeros(self.chain.shape[1])
         nodes = boundary_samples(solid.image)
         inside = (region.distance(nodes.places) <= 0.0).astype(float)

@@ -23,7 +23,7 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, counted, no_warnings
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES, reachable_set
-from softreach.workspace.reachable import ReachableSolid
+from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.search import nearest_tips
 
 if TYPE_CHECKING:
@@ -287,7 +287,7 @@ class _Followed(NamedTuple):
         parts = pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED]
         return cls(parts, (float(near.mean()), float((~near).mean())))
 
-    def kept(self, solid: ReachableSolid) -> float:
+    def kept(self, solid: ReachableSet) -> float:
         """Share of the volume that another set contains."""
         return sum(
             share * float(solid.contains(part).mean())
@@ -302,7 +302,7 @@ class _Followed(NamedTuple):
         return share * math.sqrt(lost * (1.0 - lost) / count)
 
 
-_Asked = Callable[[Manipulator, ReachableSolid], float]
+_Asked = Callable[[Manipulator, ReachableSet], float]
 """A number of an arm that is made, and of its reachable set."""
 
 
@@ -314,7 +314,7 @@ def _made(
         try:
             arm = first.deviations.made(change)
             solid = reachable_set(arm, accuracy=first.accuracy)
-            if not isinstance(solid, ReachableSolid):
+            if solid.dimension < 3:
                 return None
             pairs = zip(first.targets, starts, strict=True)
             return [ask(arm, solid) for ask in asked], [_reached(arm, first, *x) for x in pairs]
@@ -367,12 +367,12 @@ def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[A
     return held
 
 
-def _share(first: FirstOrder, target: Target, arm: Manipulator, solid: ReachableSolid) -> float:
+def _share(first: FirstOrder, target: Target, arm: Manipulator, solid: ReachableSet) -> float:
     places, share = region_places(target), 1.0
     for payload in first.needs.payloads or (None,):
         loaded = with_payload(arm, payload)
         own = solid if loaded is arm else reachable_set(loaded, accuracy=first.accuracy)
-        if not isinstance(own, ReachableSolid):
+        if own.dimension < 3:
             return 0.0
         inside = own.distance(places) <= target.within if target.within else own.contains(places)
         share = min(share, float(inside.mean()))

@@ -159,11 +159,9 @@ class Scene:
             size = self.unit.text(value, reached.dimension, error)
             self.captions.append(f"Reachable set: {word.removeprefix('curve_')} {size}")
         if reached.dimension > 1:
-            surface = reached.sheets() if reached.dimension == 3 else reached.surface()
-            self.add_surface(surface, "reachable set")
+            self.add_surface(reached.sheets(), "reachable set")
             return
-        points = self.unit.of(reached.path if reached.dimension else reached.tip[None])
-        points = points[np.isfinite(points).all(axis=1)]
+        points = self.unit.of(reached.mesh.vertices)
         size = 0.01 * float(self.unit.of(reached.arm.length))
         self.parts.append(PagePart(self._name("reachable set"), Dots(points), size=size))
 

@@ -43,7 +43,7 @@ from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit
-from softreach.workspace import ReachableSet, ReachableSolid, reachable_set
+from softreach.workspace import ReachableSet, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -335,12 +335,11 @@ def _coverage(
         inside = np.zeros(count, bool)
         try:
             reached = sets(rules.arm)
-            if isinstance(reached, ReachableSolid) and not target.within:
+            if reached.dimension == 3 and not target.within:
                 inside = reached.contains(places)
             else:
                 rod = reached.tip_map
-                flat = not isinstance(reached, ReachableSolid)
-                least = rod.tol * rod.length if flat else 0.0
+                least = rod.tol * rod.length if reached.dimension < 3 else 0.0
                 inside = reached.distance(places) <= max(target.within, least)
         except InvalidInput as error:
             if error.name != "loads":

@@ -22,7 +22,6 @@ from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.work import Budget, OverBudget, all_cores, check_wanted
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.palette import bundle_color
-from softreach.workspace import ReachableSolid, ReachableSurface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,7 +80,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
     Raises:
         InvalidInput: There is no exact set with a surface.
     """
-    if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
+    if reach.exact is None or reach.exact.dimension < 2:
         raise InvalidInput("section", reach.refusal or "no volume", "a set with a surface to cut")
     plane, length = _plane(cut, reach.arm), reach.arm.length
     surface = reach.exact.surface()
@@ -105,7 +104,8 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
     view, at, unit = _VIEWS[plane.axis], plane.center * arm.length, arm.length_unit
     with all_cores:
         curves = section_curves(reach, cut)
-        grid = reach.exact.grid if isinstance(reach.exact, ReachableSolid) and curves else None
+        solid = reach.exact if curves else None
+        grid = solid.grid if solid is not None and solid.dimension == 3 else None
     ax = _axes(4.6)
     if grid is not None:
         plot_slice(grid, ax=ax, view=view, at=at, unit=unit.name)

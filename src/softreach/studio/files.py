@@ -24,7 +24,7 @@ from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import Appearance, StudioState, design_of_text
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import text_of
-from softreach.workspace import ReachableSolid, ReachableSurface, Surface
+from softreach.workspace import Surface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +103,7 @@ def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.D
 def _surface(reach: Reach) -> Surface:
     if reach.refusal:
         raise InvalidInput("surface", "unknown", "that of an exact set", reach.refusal)
-    if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
+    if reach.exact is None or reach.exact.dimension < 2:
         raise InvalidInput("design", "too few free bundles", "one whose tip reaches a surface")
     return reach.exact.surface()
 

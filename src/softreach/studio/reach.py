@@ -27,7 +27,7 @@ from softreach.studio.work import (
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput, no_warnings
 from softreach.support.progress import Progress, silent
-from softreach.workspace import ReachableSet, ReachableSolid, ReachableSurface, reachable_set
+from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.sheets import Sheets
 
 if TYPE_CHECKING:
@@ -110,7 +110,9 @@ class Reach:
     @property
     def unreachability(self) -> float:
         """UNR [-]; NaN without a volume."""
-        return self.exact.unreachability if isinstance(self.exact, ReachableSolid) else math.nan
+        if self.exact is None or self.exact.dimension < 3:
+            return math.nan
+        return self.exact.unreachability
 
     @cached_property
     def status(self) -> NDArray[np.int8]:
@@ -132,20 +134,18 @@ class Reach:
     @property
     def lost_share(self) -> float:
         """Share of the activation box that the exact set leaves out [-]."""
-        return float(getattr(self.exact, "lost_share", 0.0))  # only sets of loaded arms lose any
+        return 0.0 if self.exact is None else self.exact.lost_share
 
     @property
     def has_surface(self) -> bool:
         """True if there is a boundary to be drawn."""
-        return isinstance(self.exact, ReachableSolid | ReachableSurface)
+        return self.exact is not None and self.exact.dimension >= 2
 
     @cached_property
     def sheets(self) -> Sheets:
         """Boundary of a solid as it is drawn, or a surface; slow the first time."""
-        if isinstance(self.exact, ReachableSolid):
-            return self.exact.sheets()
-        assert isinstance(self.exact, ReachableSurface)
-        return Sheets.of(self.exact.surface())
+        assert self.exact is not None
+        return self.exact.sheets()
 
     @cached_property
     def boundary(self) -> Reach:
@@ -333,7 +333,7 @@ def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> 
 
 def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """Those of the samples whose number of activations is not known yet."""
-    if isinstance(reach.exact, ReachableSolid) and reach.exact.route == "flux":
+    if reach.exact is not None and reach.exact.route == "flux":
         reach.counts[:] = 1.0  # proved one to one
     return rows[np.isnan(reach.counts[rows])]
 

@@ -16,7 +16,6 @@ from softreach.studio.work import Budget, OverBudget, StaleCheck
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.parallel import undivided
 from softreach.support.quantity import quantity
-from softreach.workspace import ReachableSolid
 from softreach.workspace.gradient import gradient_of
 
 PART = 0.01
@@ -56,7 +55,8 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
     arm, solid, known = reach.arm, reach.exact, parameters(reach.arm)
     found = VolumeSlopes(arm, reach.volume, {})
     if (
-        not isinstance(solid, ReachableSolid)
+        solid is None
+        or solid.dimension < 3
         or solid.lost_share
         or solid.is_torn
         or not solid.volume > 0

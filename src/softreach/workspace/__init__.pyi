@@ -5,10 +5,5 @@ from .image import Image as Image
 from .image import Lattice as Lattice
 from .reach import reachable_set as reachable_set
 from .reachable import ReachableSet as ReachableSet
-from .reachable import ReachableSolid as ReachableSolid
 from .reachable import Surface as Surface
 from .sheets import Sheets as Sheets
-from .thin import ReachableCurve as ReachableCurve
-from .thin import ReachablePoint as ReachablePoint
-from .thin import ReachableRegion as ReachableRegion
-from .thin import ReachableSurface as ReachableSurface

@@ -25,7 +25,7 @@ from softreach.support.lazy import lazy
 from softreach.support.memory import free_memory
 from softreach.support.progress import Progress
 from softreach.workspace.crossings import Crossings, line_volume, swept_crossings
-from softreach.workspace.image import Lattice, covered_cubes
+from softreach.workspace.image import Image, Lattice, covered_cubes
 from softreach.workspace.measure import ConvexHull, Estimate, climbed_hull
 from softreach.workspace.postures import AllPostures
 from softreach.workspace.search import (
@@ -177,6 +177,10 @@ class ReachedCells:
         from scipy.spatial import KDTree
 
         return KDTree(np.concatenate([self.wrap.vertices, self.cloud[1]]))
+
+
+Covering = Image | ReachedCells
+"""What a solid covers of space."""
 
 
 def smallest_memory(tip_map: TipMap) -> float:

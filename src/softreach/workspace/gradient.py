@@ -26,7 +26,7 @@ from softreach.workspace.flux import Flux, face_image, flux_tol, grid_faces, sig
 from softreach.workspace.image import Image
 from softreach.workspace.measure import FLUX_PART, Estimate, HullCorners, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
-from softreach.workspace.reachable import ReachableSet, ReachableSolid
+from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.tip_derivatives import Shifts, TipDerivatives, shifts_along
 from softreach.workspace.wrap import Wrap
 
@@ -112,7 +112,7 @@ def gradient_of(
         accuracy: That to which the set was computed.
         progress: Called with the number of parameters done since its last call, often with 0.
     """
-    if not isinstance(solid, ReachableSolid):
+    if solid.dimension < 3:
         raise InvalidInput("arm", "a set without a volume", "one of three free bundles or more")
     parameter_of = find_parameters(solid.arm, names)
     wanted = [parameter_of[name] for name in names]
@@ -136,7 +136,7 @@ def gradient_of(
 class VolumeGradient:
     """Derivatives of volume, convex volume and unreachability by parameters of a design."""
 
-    solid: ReachableSolid
+    solid: ReachableSet
     """Reachable set of the design itself."""
     parameters: tuple[str, ...]
     """Names of the parameters."""
@@ -153,7 +153,7 @@ class VolumeGradient:
 
     @property
     def route(self) -> str:
-        """Source of the volume and its derivatives, as `ReachableSolid.route`."""
+        """Source of the volume and its derivatives, as `ReachableSet.route`."""
         return self.solid.route
 
     @property
@@ -195,7 +195,7 @@ _Swept = tuple[Array, Array]
 
 
 def _swept(
-    solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float, progress: Progress
+    solid: ReachableSet, parameters: Sequence[Parameter], accuracy: float, progress: Progress
 ) -> tuple[_Swept, _Swept]:
     tip_map = solid.tip_map
     if solid.route == "flux" or tip_map.supports_unstable:
@@ -205,7 +205,7 @@ def _swept(
     return volume, _dragged(solid, tips)
 
 
-def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
+def _searched(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
     assert isinstance(solid.image, ReachedCells)
     if not solid.image.is_thick:
         wrap, coarse = (_sum(each, tips) for each in (solid.image.wrap, solid.image.coarse))
@@ -216,7 +216,7 @@ def _searched(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
     return swept.value, swept.error + missing
 
 
-def _flowing(solid: ReachableSolid, tips: TipDerivatives, accuracy: float) -> _Swept:
+def _flowing(solid: ReachableSet, tips: TipDerivatives, accuracy: float) -> _Swept:
     """Derivatives of the volume of three: of the flux, and of what lines of sight add to it."""
     enough = 0.0 if solid.route == "flux" else FLUX_PART * accuracy
     flux = signed_volume(solid.tip_map, enough=enough)
@@ -226,14 +226,13 @@ def _flowing(solid: ReachableSolid, tips: TipDerivatives, accuracy: float) -> _S
     if solid.route == "flux":
         return value, error
     assert isinstance(solid.image, Image)
-    assert solid.coarse_image is not None
     fine = _sum(boundary_samples(solid.image.with_more_lines(_LINES), sense), tips)
-    coarse = _sum(boundary_samples(solid.coarse_image, sense), tips)
+    coarse = _sum(boundary_samples(solid.image.coarse, sense), tips)
     removed = (fine.value - coarse.value) / 3.0
     return value + fine.value + removed, error + fine.error + np.abs(removed)
 
 
-def _dragged(solid: ReachableSolid, tips: TipDerivatives) -> _Swept:
+def _dragged(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
     """Derivatives of the convex volume, by what the corners drag along, for infinitely fine grids.
 
     Errors fall as 1/n² or a little slower, and corners jump from vertex to vertex: the largest part
@@ -271,19 +270,17 @@ def _sum(nodes: BoundarySamples | HullCorners | Flux | Wrap, tips: TipDerivative
 
 
 def _by_differences(
-    solid: ReachableSolid, parameters: Sequence[Parameter], accuracy: float, progress: Progress
+    solid: ReachableSet, parameters: Sequence[Parameter], accuracy: float, progress: Progress
 ) -> tuple[_Swept, _Swept]:
     """Derivatives of volume and convex volume of a torn set, from neighbors as finely computed."""
     cell, estimates = solid.image.lattice.cell, list[tuple[Estimate, Estimate]]()
 
-    def like_this(arm: Manipulator) -> ReachableSolid:
+    def like_this(arm: Manipulator) -> ReachableSet:
         if arm is solid.arm:
             return solid
         if solid.route != "search":
             return rasterized_set(effective(as_tip_map(arm)), solid.cells, cell, accuracy)
-        neighbor = reachable_set(arm, accuracy=accuracy, cell=cell)
-        assert isinstance(neighbor, ReachableSolid)
-        return neighbor
+        return reachable_set(arm, accuracy=accuracy, cell=cell)
 
     for parameter in parameters:
         shifts = shifts_along(solid.arm, parameter, 2, _RASTER_STEP)
@@ -303,7 +300,7 @@ def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
     return Estimate(value, float(error))
 
 
-def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
+def hull_corners(solid: ReachableSet) -> tuple[HullCorners, HullCorners]:
     """Corners of the hull of a solid, and of that of half as fine a grid, or before a climb."""
     tip_map = solid.tip_map
     if solid.route == "flux":
@@ -313,10 +310,9 @@ def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
         even = (np.rint(cells * cube) % 2 == 0).all(axis=1)
         return HullCorners.of(tips, cube), HullCorners.of(tips[even], cube[even])
     if isinstance(solid.image, Image):
-        assert solid.coarse_image is not None
         corners = _corners_of(solid.image)
         if solid.cells >= _HULL_CELLS:
-            return corners, _corners_of(solid.coarse_image)
+            return corners, _corners_of(solid.image.coarse)
         return _finer(corners, tip_map, solid.cells), corners
     hull = solid.image.hull
     assert hull is not None
@@ -354,7 +350,7 @@ class MovingBoundary:
     """v · A [m³ per unit], shape (n, parameters)."""
 
     @classmethod
-    def of(cls, solid: ReachableSolid, parameters: Sequence[Parameter]) -> MovingBoundary:
+    def of(cls, solid: ReachableSet, parameters: Sequence[Parameter]) -> MovingBoundary:
         """The boundary of a set, and its velocity by some parameters.
 
         Where the map is one to one, its triangles are images of triangles on the faces of the box;

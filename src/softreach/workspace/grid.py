@@ -21,6 +21,7 @@ from softreach.kernels.image.contour import stretches
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import Held, TipMap, no_equilibrium
 from softreach.support.arrays import Array, Index, Mask
+from softreach.support.lazy import lazy
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
 
@@ -76,45 +77,9 @@ def grid_tips(
     return tips
 
 
-def grid_jacobian_dets(tip_map: TipMap, tips: Array, cells: int, is_lifted: Mask) -> Array:
-    """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
-
-    From differences of the tips, and by J itself where these might have the wrong sign, and
-    everywhere if the map has kinks.
-
-    Args:
-        tip_map: The tip map.
-        tips: Of the vertices [m].
-        cells: Number of cells along each axis.
-        is_lifted: Cells that are not mapped by their vertices, shape (cells, cells, cells).
-
-    Returns:
-        Shape ((cells + 1)³,); 0 at vertices of no other cells.
-    """
-    used = corners_of(~is_lifted).ravel()
-    determinants = np.where(used, stretches(tips, np.array([cells] * 3)), 0.0)
-    determinants *= cells**3 / (8.0 * tip_map.box.volume)
-    share = _NEARLY_ALL if tip_map.supports_unstable else 1.0  # |det J| grows toward instability
-    largest = float(np.quantile(np.abs(determinants[used]), share)) if used.any() else 0.0
-    unsure = np.abs(determinants) <= _DIFFERENCES / cells**2 * largest
-    small = np.flatnonzero((unsure | (not tip_map.is_smooth)) & used)
-    places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
-    determinants[small] = _jacobian_size(tip_map, tip_map.box.from_free_cube(places))
-    determinants[~np.isfinite(determinants)] = 0.0
-    return determinants
-
-
 def cube_grid(cells: int, m: int = 3) -> Array:
     """Vertices of a grid of cells^m boxes over the unit cube, in C order, shape (n, m)."""
     return np.indices((cells + 1,) * m).reshape(m, -1).T / cells
-
-
-def corners_of(cells: Mask) -> Mask:
-    """Vertices of a grid that are corners of some of its cells."""
-    for axis in range(cells.ndim):
-        none = np.zeros_like(np.take(cells, [0], axis))
-        cells = np.concatenate([cells, none], axis) | np.concatenate([none, cells], axis)
-    return cells
 
 
 def image_measure(tip_map: TipMap, nodes: int) -> float:
@@ -158,6 +123,7 @@ def _product(ticks: list[Array]) -> Array:
 class LiftedGrid:
     """The mapped vertices of a grid, and the cells over it."""
 
+    tip_map: TipMap
     tips: Array
     """[m]: of its nodes in C order, NaN where no posture is held, then others, shape (v, 3)."""
     is_lifted: Mask
@@ -168,26 +134,24 @@ class LiftedGrid:
     """Share of activations at which no posture is held [-]."""
     hysteresis_share: float = 0.0
     """Share of activations at which two are held on one side [-]."""
+    finer: LiftedGrid | None = None
+    """A grid without sheets of which this has every so many nodes."""
 
     @classmethod
     def of(
         cls, tip_map: TipMap, n: int, progress: Progress = silent, ticks: list[Array] | None = None
     ) -> LiftedGrid:
         """The grid of n cells along each free bundle; see `grid_tips`."""
-        m = tip_map.box.dimension
-        nodes = tip_map.box.from_free_cube(cube_grid(n, m))
-        held = tip_map.held(nodes, (n + 1,) * m) if tip_map.supports_unstable else None
+        m, held = tip_map.box.dimension, None
+        if tip_map.supports_unstable:
+            held = tip_map.held(tip_map.box.from_free_cube(cube_grid(n, m)), (n + 1,) * m)
         if held is None:
-            return cls.of_one_sheet(grid_tips(tip_map, n, progress, ticks), n, m)
+            tips = grid_tips(tip_map, n, progress, ticks)
+            return cls(tip_map, tips, np.zeros((n,) * m, bool), np.empty((0, 1 << m), np.int64))
         progress(0)
         if not len(held.node):
-            raise no_equilibrium(len(nodes))
-        return _lifted(held, n, m)
-
-    @classmethod
-    def of_one_sheet(cls, tips: Array, n: int, m: int) -> LiftedGrid:
-        """The grid of n cells along each of m axes whose nodes go to tips [m]."""
-        return cls(tips, np.zeros((n,) * m, bool), np.empty((0, 1 << m), np.int64))
+            raise no_equilibrium((n + 1) ** m)
+        return _lifted(tip_map, held, n, m)
 
     @property
     def is_torn(self) -> bool:
@@ -195,21 +159,55 @@ class LiftedGrid:
         return bool(self.is_lifted.any())
 
     @property
+    def n(self) -> int:
+        """Number of cells along each axis."""
+        return len(self.is_lifted)
+
+    @property
     def cells(self) -> Index:
         """Vertices at the corners of all cells, in the order of their bits, shape (k, 2^m)."""
-        n, m = len(self.is_lifted), self.is_lifted.ndim
-        return np.concatenate([_corners(n, m)[~self.is_lifted.ravel()], self.lifted])
+        corners = cell_corners(self.n, self.is_lifted.ndim)
+        return np.concatenate([corners[~self.is_lifted.ravel()], self.lifted])
 
-    def coarser(self, tip_map: TipMap, times: int = 2) -> LiftedGrid:
-        """The grid of fewer cells along each axis, for tips of a map."""
-        n, m = len(self.is_lifted), self.is_lifted.ndim
+    @lazy
+    def jacobian_dets(self) -> Array:
+        """det J of three free bundles at its nodes [m³ per unit of each activation], (nodes,).
+
+        From differences of the tips, and by J itself where these might have the wrong sign, and
+        everywhere if the map has kinks. 0 at nodes of no cells but lifted ones.
+        """
+        n, tip_map, shape = self.n, self.tip_map, (self.n + 1,) * 3
+        if self.finer is not None:
+            return every_node(self.finer.jacobian_dets, self.finer.n // n, self.finer.n)
+        used = np.zeros((n + 1) ** 3, bool)
+        used[cell_corners(n, 3)[~self.is_lifted.ravel()]] = True
+        dets = np.where(used, stretches(self.tips[: len(used)], np.array([n] * 3)), 0.0)
+        dets *= n**3 / (8.0 * tip_map.box.volume)
+        share = _NEARLY_ALL if tip_map.supports_unstable else 1.0  # |det J| grows toward snaps
+        largest = float(np.quantile(np.abs(dets[used]), share)) if used.any() else 0.0
+        unsure = np.abs(dets) <= _DIFFERENCES / n**2 * largest
+        small = np.flatnonzero((unsure | (not tip_map.is_smooth)) & used)
+        places = np.stack(np.unravel_index(small, shape), axis=1) / n
+        dets[small] = _jacobian_size(tip_map, tip_map.box.from_free_cube(places))
+        dets[~np.isfinite(dets)] = 0.0
+        return dets
+
+    def coarser(self, times: int = 2) -> LiftedGrid:
+        """The grid of fewer cells along each axis."""
+        n, m = self.n // times, self.is_lifted.ndim
         if self.is_torn:
-            return LiftedGrid.of(tip_map, n // times)
-        tips = self.tips.reshape(*(n + 1,) * m, 3)[(slice(None, None, times),) * m]
-        return LiftedGrid.of_one_sheet(np.ascontiguousarray(tips).reshape(-1, 3), n // times, m)
+            return LiftedGrid.of(self.tip_map, n)
+        tips, one = every_node(self.tips, times, self.n, m), np.zeros((n,) * m, bool)
+        return LiftedGrid(self.tip_map, tips, one, self.lifted, finer=self)
 
 
-def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
+def every_node(values: Array, times: int, n: int, m: int = 3) -> Array:
+    """Those of the nodes of a grid of n cells that one of so many times larger cells has."""
+    of_nodes = values.reshape(*(n + 1,) * m, *values.shape[1:])[(slice(None, None, times),) * m]
+    return np.ascontiguousarray(of_nodes).reshape(-1, *values.shape[1:])
+
+
+def _lifted(tip_map: TipMap, held: Held, n: int, m: int) -> LiftedGrid:
     count = np.bincount(held.node, minlength=(n + 1) ** m)
     order = np.argsort(held.node, kind="stable")
     rank = np.empty_like(order)  # of each posture among those of its node
@@ -221,10 +219,11 @@ def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
     tips[vertex] = held.tips
     torn = ~_is_plain(held, count == 1, n, m)
     is_lifted = np.asarray(binary_dilation(torn, np.ones((3,) * m)), bool)
-    corners = _corners(n, m)[is_lifted.ravel()]
+    corners = cell_corners(n, m)[is_lifted.ravel()]
     cell, states = _sheets(held, at_node[corners])
     beyond, end_tips = _edges(held, states, corners[cell])
     return LiftedGrid(
+        tip_map,
         np.concatenate([tips, end_tips]),
         is_lifted,
         np.where(states < 0, len(tips) + beyond, vertex[states]),
@@ -233,7 +232,8 @@ def _lifted(held: Held, n: int, m: int) -> LiftedGrid:
     )
 
 
-def _corners(n: int, m: int) -> Index:
+def cell_corners(n: int, m: int) -> Index:
+    """Nodes at the corners of all cells of a grid, in the order of their bits, (n^m, 2^m)."""
     first = np.arange((n + 1) ** m).reshape((n + 1,) * m)[(slice(-1),) * m]
     return first.reshape(-1, 1) + corner_steps((n,) * m)
 
@@ -244,7 +244,7 @@ def _edges_of_cell(m: int) -> list[tuple[int, int]]:
 
 def _is_plain(held: Held, is_single: Mask, n: int, m: int) -> Mask:
     """Cells with one posture at each corner, linked along all edges."""
-    corners, steps = _corners(n, m), corner_steps((n,) * m)
+    corners, steps = cell_corners(n, m), corner_steps((n,) * m)
     plain: Mask = np.asarray(is_single[corners].all(axis=1))
     low, high = np.sort(held.node[held.links], axis=1).T
     linked = {step: np.zeros(len(is_single), bool) for step in steps[1 << np.arange(m)]}

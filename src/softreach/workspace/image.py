@@ -18,6 +18,7 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
+from softreach.workspace.grid import LiftedGrid
 
 DIAGONAL = math.sqrt(3.0)
 """Of a cell, in edges."""
@@ -85,10 +86,12 @@ class Spans(NamedTuple):
     """Number of the critical triangle where it begins."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Image:
     """The image of a triangulated box under the map that is linear on its tetrahedra."""
 
+    grid: LiftedGrid
+    """Tips at the vertices of the box."""
     lattice: Lattice
     unit: float
     """Whole units to a cell: vertices are rounded to cell / unit."""
@@ -96,6 +99,28 @@ class Image:
     """Mapped vertices in these units from the lattice's origin, shape (n, 3)."""
     triangles: Index
     """Critical triangles, as `kernels.image.contour.critical_triangles` lists them."""
+    half: LiftedGrid | None = None
+    """The grid of half as many cells, if it is known."""
+
+    @lazy
+    def coarse(self) -> Image:
+        """The image of half as fine a grid on the same lattice."""
+        known = self.half if self.grid.is_torn else None
+        return image_of(known or self.grid.coarser(), self.lattice)
+
+    @property
+    def is_one_to_one(self) -> bool:
+        """True if no place is found to be reached twice.
+
+        det J keeps its sign at the vertices, and no line of sight meets a second layer, or one that
+        both orientations cover. Pieces that none covers may have a degree: walls thinner than the
+        triangles are flat cross each other.
+        """
+        dets = self.grid.jacobian_dets
+        return bool(dets.min() * dets.max() > 0.0) and all(
+            (spans.cover <= np.minimum(1, np.abs(spans.degree)))[spans.length > 0.0].all()
+            for spans in self.spans
+        )
 
     @lazy
     def spans(self) -> tuple[Spans, Spans, Spans]:
@@ -140,7 +165,7 @@ class Image:
 
     def cube_vertices(self, which: Index) -> Array:
         """Vertices of the grid of n³ boxes in the unit cube by number, shape (*which.shape, 3)."""
-        n = round(len(self.vertices) ** (1 / 3)) - 1
+        n = self.grid.n
         return np.stack(np.unravel_index(which, (n + 1,) * 3), axis=-1) / n
 
     @lazy
@@ -275,42 +300,32 @@ def _twice_area(a: Array, b: Array) -> Array:
 
 
 def image_of(
-    points: Array,
-    jacobian_dets: Array,
-    cells: tuple[int, int, int],
+    grid: LiftedGrid,
     lattice: Lattice,
     progress: Progress = silent,
-    *,
-    is_lifted: Mask,
-    lifted: Index,
+    half: LiftedGrid | None = None,
 ) -> Image:
-    """The image of a grid of boxes whose vertices go to `points`.
+    """The image of a grid of three free bundles.
 
     Args:
-        points: Mapped vertices [m] in the C order of the grid, then others, shape (v, 3).
-        jacobian_dets: det J at the vertices up to a positive factor, shape (prod(cells + 1),).
-        cells: Number of boxes along each of the three axes.
+        grid: The grid.
         lattice: Cells to rasterize on.
-        progress: Called with the number of vertices done since its last call.
-        is_lifted: Boxes in whose place others are, shape `cells`; points that are corners of no box
-            may be NaN.
-        lifted: Vertices at the corners of the others, in the order of their bits, shape (k, 8).
+        progress: Called with the number of nodes done since its last call.
+        half: Of half as many cells, where it is known already and takes time.
     """
-    scaled = lattice.coordinates(points)
-    grid = scaled[: len(jacobian_dets)].reshape(*(n + 1 for n in cells), 3)
-    steps = [np.nanmax(np.abs(np.diff(grid, axis=axis))) for axis in range(3)]
+    scaled, nodes = lattice.coordinates(grid.tips), (grid.n + 1) ** 3
+    places = scaled[:nodes].reshape(*(grid.n + 1,) * 3, 3)
+    steps = [np.nanmax(np.abs(np.diff(places, axis=axis))) for axis in range(3)]
     longest = max(float(np.sum(steps)), 1.0)
-    longest = max(longest, float(np.ptp(scaled[lifted], axis=1).sum(axis=1).max(initial=0.0)))
+    longest = max(longest, float(np.ptp(scaled[grid.lifted], axis=1).sum(axis=1).max(initial=0.0)))
     # Determinants of the kernels are then exact, as rounding adds no more than 1 unit.
     unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
     vertices = np.rint(scaled * unit)
     vertices[np.isnan(vertices)] = 0.0
-    triangles = _critical_triangles(
-        vertices[: len(jacobian_dets)], jacobian_dets, is_lifted, progress
-    )
-    if len(lifted):
-        triangles = np.concatenate([triangles, _lifted_triangles(vertices, lifted)])
-    return Image(lattice=lattice, unit=unit, vertices=vertices, triangles=triangles)
+    triangles = _critical_triangles(vertices[:nodes], grid.jacobian_dets, grid.is_lifted, progress)
+    if len(grid.lifted):
+        triangles = np.concatenate([triangles, _lifted_triangles(vertices, grid.lifted)])
+    return Image(grid, lattice, unit, vertices, triangles, half)
 
 
 def _lifted_triangles(vertices: Array, cells: Index) -> Index:

@@ -13,9 +13,10 @@ from softreach.geometry.surface import compact_surface, corner_areas, enclosed_v
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Faces, Index
 from softreach.workspace.flux import signed_volume
-from softreach.workspace.image import Image, Spans, covered_cubes
+from softreach.workspace.grid import LiftedGrid
+from softreach.workspace.image import Image, Spans, covered_cubes, image_of
 
-_LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
+_LEFT = 0.35  # of what is removed of hulls; for four bundles 0.28 to 0.34 of it were found wrong
 SURE_ACCURACY = 3e-3  # down from which integrals are as exact as a raster can ever use
 FLUX_PART = 0.01  # of a larger accuracy: relative error of what flows through the faces
 _NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
@@ -37,9 +38,17 @@ class Estimate(NamedTuple):
     error: float
 
 
-def solid_volume(
-    tip_map: TipMap, fine: Image, coarse: Image, accuracy: float = SURE_ACCURACY
-) -> Estimate:
+def extrapolated(fine: float, coarse: float, share: float = 1.0) -> Estimate:
+    """The limit of numbers that err by O(1/n²), from grids of n and n/2 cells.
+
+    A share of what both together remove is stated as the error: all of it, unless dense sets have
+    shown that less will do.
+    """
+    removed = (fine - coarse) / 3.0
+    return Estimate(fine + removed, share * abs(removed))
+
+
+def solid_volume(image: Image, accuracy: float = SURE_ACCURACY) -> Estimate:
     """Volume of the image of a box [m³] from grids of n and n/2 cells along each of three axes.
 
     With the degree d(x), the sum of the orientations of the activations that reach x,
@@ -50,9 +59,7 @@ def solid_volume(
     that they remove is the error stated: folds that a coarse grid makes up vanish faster than that.
 
     Args:
-        tip_map: The tip map.
-        fine: Image of the grid of n cells.
-        coarse: Image of that of n/2.
+        image: Of the grid of n cells.
         accuracy: Relative error that is asked for: above 0.003, the integral may err by a hundredth
             of it.
 
@@ -60,42 +67,36 @@ def solid_volume(
         NaN if a node of the integral has no stable equilibrium.
     """
     rough = accuracy > SURE_ACCURACY
-    signed = signed_volume(tip_map, None if rough else _NODES, enough=FLUX_PART * accuracy * rough)
+    nodes, enough = None if rough else _NODES, FLUX_PART * accuracy * rough
+    signed = signed_volume(image.grid.tip_map, nodes, enough=enough)
     sense = 1 if signed.value >= 0 else -1
-    at_fine, at_coarse = _correction(fine, sense), _correction(coarse, sense)
-    removed = (at_fine.value - at_coarse.value) / 3.0
-    value = abs(signed.value) + (at_fine.value + removed)
-    return Estimate(value, signed.error + abs(removed) + at_fine.error)
+    at_fine, at_coarse = _correction(image, sense), _correction(image.coarse, sense)
+    again = extrapolated(at_fine.value, at_coarse.value)
+    value = abs(signed.value) + again.value
+    return Estimate(value, signed.error + again.error + at_fine.error)
 
 
-def torn_volume(fine: Image, half: Image, third: Image) -> Estimate:
-    """Volume of the images of several sheets [m³], where no integral over the box is known.
+def torn_volume(image: Image) -> Estimate:
+    """Volume of the image of several sheets [m³], where no integral over the box is known.
 
     As `solid_volume`, with the signed volume of the mapped tetrahedra for the integral of det J.
     Inside of sheets these err by O(1/n²), and at their edges by O(1/n), more or less by how the
     edges meet the grid. Half of what the finer grid changes is added, and all of it is the error.
-
-    Args:
-        fine: Image of the grid of n cells.
-        half: Of half as many cells.
-        third: Of a third of them, whose change counts by half.
+    What it changes against a third of the cells counts by half.
     """
-    sense = 1 if _signed_volume(fine) >= 0 else -1
-    value, *rough = (_covered(image, sense) for image in (fine, half, third))
+    sense = 1 if _signed_volume(image) >= 0 else -1
+    third = image_of(LiftedGrid.of(image.grid.tip_map, image.grid.n // 3), image.lattice)
+    value, *rough = (_covered(each, sense) for each in (image, image.coarse, third))
     changes = [(value.value - each.value) / k for k, each in enumerate(rough, 1)]
     change = max(changes, key=abs)
     return Estimate(value.value + 0.5 * change, abs(change) + value.error)
 
 
-def multiply_covered(fine: Image, coarse: Image) -> tuple[dict[int, float], float]:
+def multiply_covered(image: Image) -> tuple[dict[int, float], float]:
     """Volume of the places that a given number of activations, 2 or more, reach [m³].
 
     A number whose volume is below the error, or changes by more than itself on half as fine a
     grid, is not a finding but the roughness of a fold: such places count with the next smaller.
-
-    Args:
-        fine: Of n cells along each axis.
-        coarse: Of half as many.
 
     Returns:
         The volumes, and by how much their sum changes on half as fine a grid.
@@ -104,7 +105,7 @@ def multiply_covered(fine: Image, coarse: Image) -> tuple[dict[int, float], floa
     def by_cover(spans: Spans) -> ArrayLike:
         return np.bincount(spans.cover, spans.length)
 
-    covers = [_mean(image, by_cover) for image in (fine, coarse)]
+    covers = [_mean(each, by_cover) for each in (image, image.coarse)]
     size = max(*(len(cover) for cover in covers), 3)
     volumes, rough = (np.pad(v, (0, size - len(v)))[2:] for v in covers)
     error = float(abs(volumes.sum() - rough.sum()))
@@ -123,9 +124,10 @@ def fold_volume(image: Image) -> float:
     return float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
 
 
-def convex_volume(fine: Image, coarse: Image) -> Estimate:
+def convex_volume(image: Image) -> Estimate:
     """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
-    return extrapolated_hull(*(image.places[outer_vertices(image)] for image in (fine, coarse)))
+    both = image, image.coarse
+    return extrapolated_hull(*(each.places[outer_vertices(each)] for each in both))
 
 
 def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
@@ -133,9 +135,7 @@ def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    fine, coarse = convex_hull(points).volume, convex_hull(fewer).volume
-    removed = (fine - coarse) / 3.0
-    return Estimate(fine + removed, _LEFT * abs(removed))
+    return extrapolated(convex_hull(points).volume, convex_hull(fewer).volume, _LEFT)
 
 
 def outer_vertices(image: Image) -> Index:

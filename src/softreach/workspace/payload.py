@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["LargestPayload", "PayloadCurve", "payload_curve"]
-
 
 _USUAL = (0.0, 0.5, 1.0, 2.0, 4.0)  # payloads over the one that bends the arm by about a third
 _DOUBLINGS = 6  # of the largest payload, in search of one that is too heavy
@@ -62,12 +61,12 @@ def payload_curve(
     if not (np.isfinite(masses) & (masses >= 0)).all():
         raise InvalidInput("payloads", masses, "finite masses of 0 or more [kg]")
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
-    masses, volumes = np.unique(np.append(masses, 0.0)), []
-    for mass in masses:
-        volumes.append(_volume(arm, float(mass), accuracy))
+    masses, volumes = np.unique(np.append(masses, 0.0)), dict[float, _Volume]()
+    for mass in masses.tolist():
+        volumes[mass] = _volume(arm, mass, accuracy)
         progress(1)
-    value, error, lost = np.array(volumes).T
-    return PayloadCurve(arm, masses, value, error, lost, accuracy)
+    value, error, lost = np.array(list(volumes.values())).T
+    return PayloadCurve(arm, masses, value, error, lost, accuracy, volumes)
 
 
 class LargestPayload(NamedTuple):
@@ -107,7 +106,7 @@ class PayloadCurve:
     """Share of the activation box that is left out for want of stability [-], shape (n,)."""
     accuracy: float
     """Relative error allowed in each volume."""
-    _known: dict[float, _Volume] = field(default_factory=dict)
+    _known: dict[float, _Volume]
 
     @property
     def shares(self) -> Array:
@@ -137,8 +136,8 @@ class PayloadCurve:
         """
         share = as_number("share", share, Range(0.0, 1.0, open_low=True, open_high=True))
         accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.5))
-        low, high = self._bracket(share)
-        low, high = _narrowed(lambda mass: self._share(mass) - share, low, high, accuracy)
+        bracket = self._bracket(share)
+        low, high = _narrowed(lambda mass: self._share(mass) - share, *bracket, accuracy)
         below, above = self._at(low), self._at(high)
         drop = (below.value - above.value) / (high - low)
         # where the curve crosses the share between the two, and how far the volumes let it move
@@ -178,10 +177,6 @@ class PayloadCurve:
         return "\n".join([f"PayloadCurve: {first} without payload", *rows])
 
     def _at(self, mass: float) -> _Volume:
-        rows = zip(self.payloads, self.volumes, self.volume_errors, self.lost_shares, strict=True)
-        for payload, *volume in rows:
-            if payload == mass:
-                return _Volume(*volume)
         if mass not in self._known:
             self._known[mass] = _volume(self.arm, mass, self.accuracy)
         return self._known[mass]
@@ -233,7 +228,7 @@ def _volume(arm: Manipulator, mass: float, accuracy: float) -> _Volume:
     assert arm.loads is not None
     carrying = arm.replace(loads=arm.loads.replace(payload=mass))
     reached = reachable_set(carrying, accuracy=accuracy)
-    return _Volume(reached.volume, reached.volume_error, float(getattr(reached, "lost_share", 0.0)))
+    return _Volume(reached.volume, reached.volume_error, reached.lost_share)
 
 
 def _check(arm: Manipulator) -> None:

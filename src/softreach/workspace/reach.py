@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import as_tip_map, effective
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support.arguments import POSITIVE, as_number
-from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.cells import lost_share, searched_set
 from softreach.workspace.flux import grid_faces, signed_volume
-from softreach.workspace.grid import LiftedGrid, grid_jacobian_dets
+from softreach.workspace.grid import LiftedGrid
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.reachable import ReachableSet, ReachableSolid
+from softreach.workspace.measure import Estimate
+from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.thin import planar_set, plane_of_tips, thin_set
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
@@ -84,9 +82,8 @@ def reachable_set(
         progress: Called with the number of grid vertices or cells done since its last call.
 
     Returns:
-        `ReachableSolid`, `ReachableSurface`, `ReachableCurve` or `ReachablePoint`, for three free
-        bundles or more, two, one or none; `ReachableRegion` for two or more that move the tip in
-        one plane.
+        A solid, a surface, a curve or a point (its `dimension` is 3, 2, 1, 0) for three free
+        bundles or more, two, one or none; a region for two or more that move the tip in one plane.
 
     Raises:
         InvalidInput: An argument out of range, or loads under which no activation is stable.
@@ -112,7 +109,7 @@ def reachable_set(
         cells = searched_set(tip_map, accuracy, cell, memory, progress)
         hull = cells.hull
         assert hull is not None
-        result = ReachableSolid(
+        result = ReachableSet(
             tip_map=tip_map,
             volume=cells.volume.value,
             volume_error=cells.volume.error,
@@ -120,7 +117,7 @@ def reachable_set(
             convex_volume_error=hull.volume.error,
             lost_share=lost_share(tip_map),
             route="search",
-            image=cells,
+            covering=cells,
         )
         allowed = accuracy
         finer = "a smaller cell" if cell is not None else "more memory"
@@ -134,7 +131,7 @@ def reachable_set(
 
 def rasterized_set(
     tip_map: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress = silent
-) -> ReachableSolid:
+) -> ReachableSet:
     """Reach of three free bundles by one raster, whether the map is one to one or not.
 
     Args:
@@ -147,11 +144,11 @@ def rasterized_set(
     Raises:
         InvalidInput: No activation has a stable equilibrium, or memory does not hold the cells.
     """
-    grid = _Grid.of(tip_map, cells, progress)
-    return _by_raster(tip_map, grid, grid.image(grid.lattice(cell, accuracy), progress), accuracy)
+    grid = LiftedGrid.of(tip_map, cells, progress)
+    return _by_raster(image_of(grid, lattice_around(grid, cell, accuracy), progress), accuracy)
 
 
-def allowed_error(solid: ReachableSolid, accuracy: float) -> float:
+def allowed_error(solid: ReachableSet, accuracy: float) -> float:
     """The error of the volume that has to do, relative.
 
     Of several sheets it falls as 1/n and no faster: twice what is asked has to do for them, but on
@@ -161,7 +158,7 @@ def allowed_error(solid: ReachableSolid, accuracy: float) -> float:
     return (_TORN if has_sheets else 1.0) * accuracy
 
 
-def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
+def is_worthwhile(solid: ReachableSet, accuracy: float) -> bool:
     """True if the volume errs too much, and grids that memory holds may be fine enough."""
     most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)
     errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
@@ -170,30 +167,30 @@ def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
 
 def _of_three(
     tip_map: TipMap, accuracy: float, cell: float | None, progress: Progress
-) -> ReachableSolid:
+) -> ReachableSet:
     most = np.cbrt(_MOST_VERTICES) - 1.0
     cells = max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
-    before: _Grid | None = None
+    before: LiftedGrid | None = None
     while True:
-        grid = _Grid.of(tip_map, cells, progress)
-        fine = grid.image(grid.lattice(cell, accuracy), progress)
-        if tip_map.is_smooth and not tip_map.supports_unstable and grid.is_one_to_one(fine):
-            return _by_faces(tip_map, grid, fine)
-        solid = _by_raster(tip_map, grid, fine, accuracy, before)
+        grid = LiftedGrid.of(tip_map, cells, progress)
+        image = image_of(grid, lattice_around(grid, cell, accuracy), progress, before)
+        if tip_map.is_smooth and not tip_map.supports_unstable and image.is_one_to_one:
+            return _by_faces(image)
+        solid = _by_raster(image, accuracy)
         if not is_worthwhile(solid, accuracy):
             return solid
         cells, before = 2 * cells, grid
 
 
-def _by_faces(tip_map: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
+def _by_faces(image: Image) -> ReachableSet:
     """The solid of an image that is one to one, by what flows through the faces of the box."""
-    cells, flux = grid.cells, signed_volume(tip_map)
-    faces = np.rint(grid_faces(cells) * cells).astype(int)
-    tips = grid.lifted.tips[np.ravel_multi_index(tuple(faces.T), (cells + 1,) * 3)]
+    grid, flux = image.grid, signed_volume(image.grid.tip_map)
+    faces = np.rint(grid_faces(grid.n) * grid.n).astype(int)
+    tips = grid.tips[np.ravel_multi_index(tuple(faces.T), (grid.n + 1,) * 3)]
     convex = measure.extrapolated_hull(tips, tips[(faces % 2 == 0).all(axis=1)])
-    return ReachableSolid(
-        tip_map=tip_map,
-        cells=cells,
+    return ReachableSet(
+        tip_map=grid.tip_map,
+        cells=grid.n,
         volume=abs(flux.value),
         volume_error=flux.error,
         multiplicity={1: abs(flux.value)},
@@ -202,102 +199,52 @@ def _by_faces(tip_map: TipMap, grid: _Grid, fine: Image) -> ReachableSolid:
         route="flux",
         convex_volume=convex.value,
         convex_volume_error=convex.error,
-        image=fine,
+        covering=image,
     )
 
 
-def _by_raster(
-    tip_map: TipMap, grid: _Grid, fine: Image, accuracy: float, before: _Grid | None = None
-) -> ReachableSolid:
-    """The solid of any image; `before` is the grid of half as many cells, if it is known."""
-    if before is None or not grid.lifted.is_torn:
-        before = grid.coarser(tip_map)
-    coarse = before.image(fine.lattice)
-    volume, convex = measure.Estimate(np.nan, np.nan), measure.convex_volume(fine, coarse)
-    if not grid.lifted.is_torn:
-        volume = measure.solid_volume(tip_map, fine, coarse, accuracy)
-    several, change = measure.multiply_covered(fine, coarse)
+def _by_raster(image: Image, accuracy: float) -> ReachableSet:
+    """The solid of any image."""
+    grid, volume, convex = image.grid, Estimate(np.nan, np.nan), measure.convex_volume(image)
+    if not grid.is_torn:
+        volume = measure.solid_volume(image, accuracy)
+    several, change = measure.multiply_covered(image)
     if np.isnan(volume.value):
-        third = _Grid.of(tip_map, grid.cells // 3).image(fine.lattice)
-        volume = measure.torn_volume(fine, coarse, third)
+        volume = measure.torn_volume(image)
     else:  # a fold out of place errs by as much in both
         volume = volume._replace(error=volume.error + change)
-    return ReachableSolid(
-        tip_map=tip_map,
-        cells=grid.cells,
+    return ReachableSet(
+        tip_map=grid.tip_map,
+        cells=grid.n,
         volume=volume.value,
         volume_error=volume.error,
         multiplicity={1: volume.value - sum(several.values()), **several},
         multiplicity_error=max(volume.error, change),
-        fold_volume=measure.fold_volume(fine),
-        lost_share=grid.lifted.lost_share,
-        hysteresis_share=grid.lifted.hysteresis_share,
-        is_torn=grid.lifted.is_torn,
+        fold_volume=measure.fold_volume(image),
+        lost_share=grid.lost_share,
+        hysteresis_share=grid.hysteresis_share,
+        is_torn=grid.is_torn,
         route="raster",
         convex_volume=convex.value,
         convex_volume_error=convex.error,
-        image=fine,
-        coarse_image=coarse,
+        covering=image,
     )
 
 
-class _Grid(NamedTuple):
-    lifted: LiftedGrid
-    jacobian_dets: Array
-    """det J, shape ((n + 1)³,)."""
+def lattice_around(grid: LiftedGrid, cell: float | None, accuracy: float) -> Lattice:
+    """Cells in space around the image of a grid, of an edge by the rule for h if `cell` is None.
 
-    @classmethod
-    def of(cls, tip_map: TipMap, cells: int, progress: Progress = silent) -> _Grid:
-        """The grid of cells³ boxes over the activation box."""
-        lifted = LiftedGrid.of(tip_map, cells, progress)
-        tips = lifted.tips[: (cells + 1) ** 3]
-        return cls(lifted, grid_jacobian_dets(tip_map, tips, cells, lifted.is_lifted))
-
-    @property
-    def cells(self) -> int:
-        """Along each axis."""
-        return len(self.lifted.is_lifted)
-
-    def lattice(self, cell: float | None, accuracy: float) -> Lattice:
-        """Cells in space around the image, of an edge by the rule for h if `cell` is None [m].
-
-        Raises:
-            InvalidInput: Memory does not hold the cells in space.
-        """
-        tips = self.lifted.tips[np.isfinite(self.lifted.tips[:, 0])]
-        sides = np.ptp(tips, axis=0)
-        if cell is None:
-            edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
-            # An image that is almost flat would need countless cells along it.
-            return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
-        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
-        if not smallest <= cell < np.inf:  # NaN too
-            allowed = f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
-            raise InvalidInput("cell", cell, allowed)
-        return Lattice.around(tips, float(cell))
-
-    def is_one_to_one(self, image: Image) -> bool:
-        """True if no place of the image is found to be reached twice.
-
-        det J keeps its sign at the vertices, and no line of sight meets a second layer, or one that
-        both orientations cover. Pieces that none covers may have a degree: walls thinner than the
-        triangles are flat cross each other.
-        """
-        return bool(self.jacobian_dets.min() * self.jacobian_dets.max() > 0.0) and all(
-            (spans.cover <= np.minimum(1, np.abs(spans.degree)))[spans.length > 0.0].all()
-            for spans in image.spans
-        )
-
-    def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
-        """Image of all cells."""
-        n, (grid, jacobian_dets) = self.cells, self
-        lifted = {"is_lifted": grid.is_lifted, "lifted": grid.lifted}
-        return image_of(grid.tips, jacobian_dets, (n, n, n), lattice, progress, **lifted)
-
-    def coarser(self, tip_map: TipMap) -> _Grid:
-        """The grid of half as many cells."""
-        n = self.cells
-        if self.lifted.is_torn:
-            return _Grid.of(tip_map, n // 2)
-        every_second = self.jacobian_dets.reshape((n + 1,) * 3)[::2, ::2, ::2]
-        return _Grid(self.lifted.coarser(tip_map), every_second.ravel())
+    Raises:
+        InvalidInput: Memory does not hold the cells in space.
+    """
+    tips = grid.tips[np.isfinite(grid.tips[:, 0])]
+    sides = np.ptp(tips, axis=0)
+    if cell is None:
+        edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
+        # An image that is almost flat would need countless cells along it.
+        return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
+    smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
+    if not smallest <= cell < np.inf:  # NaN too
+        allowed = f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
+        raise InvalidInput("cell", cell, allowed)
+    return Lattice.around(tips, float(cell))

@@ -19,7 +19,7 @@ from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap, no_equilibrium
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, rows
 from softreach.support.progress import Progress, silent
 from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.postures import AllPostures
@@ -71,12 +71,8 @@ class ReachedGrid:
         *,
         is_flat: bool = False,
     ) -> None:
-        self.tip_map, self.lattice, self.progress, self.is_flat = (
-            tip_map,
-            lattice,
-            progress,
-            is_flat,
-        )
+        self.tip_map, self.lattice = tip_map, lattice
+        self.progress, self.is_flat = progress, is_flat
         size = int(np.prod(lattice.shape))
         self.gap = np.full(size, np.inf)
         """Distance from a center to the nearest tip found, in cells; 0 where reached; -1 at the
@@ -178,14 +174,14 @@ def nearest_tips(
     gamma = np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
 
-    def task(block: slice) -> None:
-        parts = (nearest.gamma[block], nearest.tips[block], nearest.distance[block])
-        _descend(tip_map, targets[block], enough, stop, Nearest(*parts))
-
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
+    blocks = parallel.blocks(len(targets), share)
     tip_map.prepare()
-    parallel.run(partial(task, block) for block in parallel.blocks(len(targets), share))
+    parallel.run(
+        partial(_descend, tip_map, targets[block], enough, stop, rows(nearest, block))
+        for block in blocks
+    )
     return nearest
 
 
@@ -215,9 +211,9 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
     torn, begun, n = tip_map.supports_unstable, 0, 0
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
-        new, rows = slice(n, n + more), slice(begun, begun + more)
+        new, old = slice(n, n + more), slice(begun, begun + more)
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
-        running.trial[new], running.damping[new] = nearest.gamma[rows], FIRST_DAMPING
+        running.trial[new], running.damping[new] = nearest.gamma[old], FIRST_DAMPING
         n, begun = n + more, begun + more
         tip_map.fill(running.trial[:n], tips[:n], ahead[:n])
         if torn:

@@ -188,8 +188,8 @@ def _zero(at_low: Array, at_high: Array) -> Array:
 
 def _fold(tip_map: TipMap) -> tuple[Array, Faces]:
     """The places where det J = 0, with triangles whose images look away from what is folded."""
-    n = _FOLD_CELLS
-    dets = _dets(tip_map, cube_grid(n))
+    n, grid = _FOLD_CELLS, cube_grid(_FOLD_CELLS)
+    dets = _dets(tip_map, grid)
     if dets.min() >= 0 or dets.max() <= 0:
         return np.empty((0, 3)), np.empty((0, 3), np.int32)
     field = dets.reshape((n + 1,) * 3)
@@ -198,7 +198,6 @@ def _fold(tip_map: TipMap) -> tuple[Array, Faces]:
     numbers = np.stack(
         [np.ravel_multi_index(tuple(end.T), field.shape) for end in ends.swapaxes(0, 1)], axis=1
     ).astype(np.int32)
-    grid = cube_grid(n)
     moved = numbers[:, 0] != numbers[:, 1]
     cube = places / n
     cube[moved] = _between(grid[numbers[moved]], _zeros(tip_map, grid, dets, numbers[moved]))
@@ -225,7 +224,7 @@ def _away(tip_map: TipMap, cube: Array) -> Array:
 class _Beside:
     def __init__(self, tip_map: TipMap, image: Image) -> None:
         self._rod, self._image = tip_map, image
-        self._n = round(len(image.vertices) ** (1 / 3)) - 1
+        self._n = image.grid.n
         self._grid = image.places.reshape(*(self._n + 1,) * 3, 3)
         bend = sum(
             np.pad(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.base import Base
 from softreach.geometry.flat import Plane, are_inside, convex_edges, enclosed_area, plane_of
@@ -16,7 +14,7 @@ from softreach.kernels.box.simplices import chains
 from softreach.rod.rods import ArmMap
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
-from softreach.support.arrays import Array, Index, as_points
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import MissingExtra
 from softreach.support.progress import Progress
 from softreach.workspace.cells import CLIMBERS, lost_share, shifted_lattice
@@ -25,7 +23,7 @@ from softreach.workspace.grid import LiftedGrid, cube_grid, grid_ticks, grid_tip
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, HullCorners, climbed_hull
 from softreach.workspace.postures import all_postures
-from softreach.workspace.reachable import ReachableSet, Stored
+from softreach.workspace.reachable import SIZES, ReachableSet
 from softreach.workspace.search import DISTANCE, ENOUGH, ReachedGrid, all_reached, cloud_on_faces
 from softreach.workspace.wrap import drawn_tight
 
@@ -42,122 +40,31 @@ _FINER = 1.5
 _SIGNS = 16  # cells of the grid that tells whether two bundles fold
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ReachableSurface(ReachableSet):
-    """A surface that two free bundles sweep, which has an area and no volume."""
-
-    dimension: ClassVar[int] = 2
-    _stored: ClassVar[tuple[str, ...]] = "area", "convex_volume", "unreachability"
-
-    area: float
-    """Area [m²]; places count as often as they are reached."""
-    area_error: float
-    """Error of `area`, estimated from two numbers of Gauss nodes [m²]."""
-    mapped_grid: Surface = field(repr=False)
-    """The mapped activation grid, without cells that are left out."""
-
-    def surface(self) -> Surface:
-        """The surface as triangles."""
-        return self.mapped_grid
-
-    def distance(self, points: ArrayLike) -> Array:
-        """Distance of points to the triangles of the mapped grid [m], never negative."""
-        return self.mapped_grid.distance(as_points("points", points))
-
-    def _repr_html_(self) -> str:
-        from softreach.picture import Skin, html_card
-
-        return html_card(repr(self), Skin(self.mapped_grid.vertices, self.mapped_grid.faces))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ReachableCurve(ReachableSet):
-    """A curve that one free bundle draws, which has a length and no volume."""
-
-    dimension: ClassVar[int] = 1
-    _stored: ClassVar[tuple[str, ...]] = "curve_length", "convex_volume", "unreachability"
-
-    curve_length: float
-    """Length [m]; places count as often as they are reached."""
-    curve_length_error: float
-    """Error of `curve_length`, estimated from two numbers of Gauss nodes [m]."""
-    path: Array = field(repr=False)
-    """Points along the curve [m], from the lower bound to the upper one, shape (cells + 1, 3); NaN
-    where no posture is held, and one of several where it is torn."""
-    chords: Surface = field(repr=False)
-    """Lines along all of its pieces [m], as triangles that repeat a corner."""
-
-    def distance(self, points: ArrayLike) -> Array:
-        """Distance of points to the `chords` [m], never negative."""
-        return self.chords.distance(as_points("points", points))
-
-    def _repr_html_(self) -> str:
-        from softreach.picture import Dots, html_card
-
-        return html_card(repr(self), Dots(_found(self.path)))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ReachablePoint(ReachableSet):
-    """Position of the tip if no bundle is free."""
-
-    dimension: ClassVar[int] = 0
-
-    tip: Array
-    """Position [m], shape (3,)."""
-
-    def distance(self, points: ArrayLike) -> Array:
-        """Distance of points to the tip [m]."""
-        return np.linalg.norm(as_points("points", points) - self.tip, axis=1)
-
-    def _lines(self) -> list[str]:
-        x, y, z = self.tip
-        return [f"({x:.6g}, {y:.6g}, {z:.6g}) m"]
-
-    def _numbers(self) -> Stored:
-        return {
-            name: ((), float(value), {"units": "m", "long_name": f"{name} of the tip"})
-            for name, value in zip("xyz", self.tip, strict=True)
-        }
-
-
 def thin_set(tip_map: TipMap) -> ReachableSet:
     """The reachable set of a tip map with fewer than three free bundles."""
     m = tip_map.box.dimension
     if m == 0:
-        return ReachablePoint(tip_map=tip_map, cells=1, tip=grid_tips(tip_map, 1)[0])
+        point = Surface(vertices=grid_tips(tip_map, 1), faces=np.zeros((1, 3), np.int32))
+        return ReachableSet(tip_map=tip_map, cells=1, mesh=point)
     n = _CELLS[m]
-    ticks = (
-        None if tip_map.supports_unstable else grid_ticks(tip_map, n)
-    )  # on whose lines kinks are
+    # kinks are on lines of the grid
+    ticks = None if tip_map.supports_unstable else grid_ticks(tip_map, n)
     grid = LiftedGrid.of(tip_map, n, ticks=ticks)
-    size, convex = _measure(tip_map, grid), _convex_volume(tip_map, grid)
-    common: dict[str, Any] = {
-        "tip_map": tip_map,
-        "cells": n,
-        "convex_volume": convex.value,
-        "convex_volume_error": convex.error,
-        "lost_share": grid.lost_share,
-        "hysteresis_share": grid.hysteresis_share,
-    }
-    if m == 1:
-        length = {"curve_length": size.value, "curve_length_error": size.error}
-        chords = threads(np.nan_to_num(grid.tips), grid.cells)
-        return ReachableCurve(path=grid.tips[: n + 1], chords=chords, **length, **common)
-    faces = grid.cells[:, chains(2, 2)].reshape(-1, 3)
-    vertices, faces = compact_surface(grid.tips, faces) if grid.is_torn else (grid.tips, faces)
-    mesh = Surface(vertices=vertices, faces=faces)
-    return ReachableSurface(area=size.value, area_error=size.error, mapped_grid=mesh, **common)
-
-
-def threads(points: Array, edges: Index) -> Surface:
-    """Lines between pairs of points, as triangles that repeat a corner.
-
-    Args:
-        points: [m], shape (n, 3).
-        edges: Numbers of their ends, shape (m, 2).
-    """
-    return Surface(vertices=points, faces=edges[:, [0, 1, 1]])
+    size, convex, name = _measure(tip_map, grid), _convex_volume(grid), SIZES[m]
+    corners = grid.cells[:, chains(m, m)].reshape(-1, m + 1)
+    faces = np.pad(corners, [(0, 0), (0, 2 - m)], mode="edge")
+    vertices, faces = compact_surface(grid.tips, faces)
+    sizes: dict[str, Any] = {name: size.value, f"{name}_error": size.error}
+    return ReachableSet(
+        tip_map=tip_map,
+        cells=n,
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
+        lost_share=grid.lost_share,
+        hysteresis_share=grid.hysteresis_share,
+        mesh=Surface(vertices=vertices, faces=faces),
+        **sizes,
+    )
 
 
 def by_nodes(tip_map: TipMap) -> Estimate:
@@ -175,7 +82,7 @@ def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
     if tip_map.is_smooth and not grid.is_torn and np.isfinite(smooth := by_nodes(tip_map)).all():
         return smooth
     fine, times = _size(grid), (2, 3) if grid.is_torn else (2,)
-    changes = [fine - _size(grid.coarser(tip_map, k)) for k in times]
+    changes = [fine - _size(grid.coarser(k)) for k in times]
     removed = max((c / (k - 1) for k, c in zip(times, changes, strict=True)), key=abs) / 3.0
     return Estimate(fine + removed, max(map(abs, changes)))
 
@@ -193,43 +100,15 @@ def _found(tips: Array) -> Array:
     return tips[np.isfinite(tips[:, 0])]
 
 
-def _convex_volume(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
+def _convex_volume(grid: LiftedGrid) -> Estimate:
     """Volume of the convex hull of mapped vertices [m³].
 
     It is too small by O(1/n²): a grid with a quarter of the cells along each axis differs by 15
     times the error. A tenth of the difference is stated.
     """
-    grids = grid, grid.coarser(tip_map, 4)
+    grids = grid, grid.coarser(4)
     fine, coarse = (convex_hull(_found(each.tips)).volume for each in grids)
     return Estimate(fine, abs(fine - coarse) / 10.0)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ReachableRegion(ReachableSurface):
-    """A region of a plane, which has an area, each place counted once, and no volume."""
-
-    _stored: ClassVar[tuple[str, ...]] = "area", "convex_area", "convex_volume", "unreachability"
-
-    convex_area: float
-    """Area of the convex hull [m²]."""
-    convex_area_error: float
-    """Half of what is between two bounds [m²]."""
-    outline: Surface = field(repr=False)
-    """Closed curves of tips around the region and its holes [m]: lines from tip to tip, as
-    triangles that repeat a corner. Parts of them may enclose nothing."""
-
-    def distance(self, points: ArrayLike) -> Array:
-        """Distance of points to the region [m], never negative."""
-        return np.minimum(
-            super().distance(points), self.outline.distance(as_points("points", points))
-        )
-
-    def _sizes(self) -> tuple[float, float, float, float]:
-        return self.area, self.area_error, self.convex_area, self.convex_area_error
-
-    def _lines(self) -> list[str]:
-        size, hull = super()._lines()
-        return [f"{size} in one {'plane' if self.convex_area else 'line'}", hull]
 
 
 class _FlatCorners(HullCorners):
@@ -257,9 +136,7 @@ def plane_of_tips(tip_map: TipMap) -> Plane | None:
     return plane_of(tips, _FLAT * tip_map.tol * tip_map.length) if len(tips) > 2 else None
 
 
-def planar_set(
-    tip_map: TipMap, plane: Plane, accuracy: float, progress: Progress
-) -> ReachableRegion:
+def planar_set(tip_map: TipMap, plane: Plane, accuracy: float, progress: Progress) -> ReachableSet:
     """The region that a tip map reaches in a plane, as `searched_set` finds volumes in space.
 
     Args:
@@ -298,7 +175,7 @@ def planar_set(
     area = _smooth(tip_map, flat, area)
     cube = flat.box.to_cube(np.concatenate([gamma[:CLIMBERS], found.gamma]))[:, flat.box.free]
     convex = climbed_hull(flat, cube, accuracy, _FlatCorners).volume
-    return ReachableRegion(
+    return ReachableSet(
         tip_map=tip_map,
         area=area.value,
         area_error=area.error,
@@ -306,8 +183,8 @@ def planar_set(
         convex_area_error=convex.error,
         lost_share=lost_share(flat),
         hysteresis_share=0.0 if every is None else every.hysteresis_share,
-        outline=threads(plane.places(found.tips), found.edges),
-        mapped_grid=_mesh(found, plane),
+        mesh=_mesh(found, plane),
+        outline=Surface(vertices=plane.places(found.tips), faces=found.edges[:, [0, 1, 1]]),
     )
 
 

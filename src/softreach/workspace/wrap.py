@@ -12,7 +12,6 @@ import numpy as np
 
 from softreach.geometry.surface import Surface, corner_areas, level_set
 from softreach.kernels.box.box_projection import project
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
@@ -81,14 +80,19 @@ class Wrap(Surface):
 
 def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
     """How far tips go along a way that is too far, with little to the side [m], shape (n,)."""
-    size = np.linalg.norm(way, axis=1)
+    size, box = np.linalg.norm(way, axis=1), tip_map.box
     unit, target = way / size[:, None], tips + way
     scale = np.eye(3) + (_STRETCH - 1.0) * unit[:, :, None] * unit[:, None, :]
+    center, multiplier, step = np.zeros_like(gamma), np.empty_like(tips), np.empty_like(gamma)
     for _ in range(_PUSHES):
+        # Least |miss - J d|² + μ |d|² inside the bounds, with d measured in ranges (Levenberg).
         at, slopes = tip_map.tips_and_slopes(gamma)
-        miss, stretched = scale @ (at - target)[:, :, None], scale @ slopes
-        square = ((stretched * tip_map.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
-        gamma, _ = damped_steps(tip_map.box, gamma, miss[:, :, 0], stretched, _DAMPING * square)
+        miss, stretched = scale @ (target - at)[:, :, None], scale @ slopes * box.scales
+        damping = _DAMPING * ((stretched**2).sum(axis=(1, 2)) / 3.0)
+        low, high = (box.low - gamma) / box.scales, (box.high - gamma) / box.scales
+        multiplier[:] = 0.0
+        project(center, stretched, miss[:, :, 0], damping, low, high, step, multiplier)
+        gamma = box.clip(gamma + step * box.scales)
     return ((tip_map.tips(gamma) - tips) * unit).sum(axis=1)
 
 
@@ -129,25 +133,3 @@ def wrapped(grid: ReachedGrid) -> Wrap:
         gamma=gamma,
         tight_volume=Surface(vertices=tips, faces=faces).volume,
     )
-
-
-def damped_steps(
-    box: ActivationBox, gamma: Array, miss: Array, slopes: Array, damping: Array
-) -> tuple[Array, Array]:
-    """Minimize |miss + J d|² + μ |d|² inside the bounds, with d measured in ranges (Levenberg).
-
-    Args:
-        box: The bounds.
-        gamma: Beginnings of the steps, inside the bounds [-], shape (n, m).
-        miss: Tips minus targets, in any unit, shape (n, 3).
-        slopes: ∂r/∂γ in that unit, shape (n, 3, m).
-        damping: μ > 0, the square of that unit, shape (n,).
-
-    Returns:
-        Ends of the steps, never outside the bounds, and the |miss + J d| that is left, shape (n,).
-    """
-    step, multiplier = np.empty_like(gamma), np.zeros((len(gamma), 3))
-    low, high = (box.low - gamma) / box.scales, (box.high - gamma) / box.scales
-    project(np.zeros_like(gamma), slopes * box.scales, -miss, damping, low, high, step, multiplier)
-    # Where the step is the least, miss + J d is μ times the multiplier.
-    return box.clip(gamma + step * box.scales), damping * np.linalg.norm(multiplier, axis=1)

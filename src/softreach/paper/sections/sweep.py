@@ -16,7 +16,7 @@ from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, judge
 from softreach.plot import atlas_figures
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace import ReachableSet, reachable_set
 
 _ASIDE = 0.3  # L; from there on a place lies far from the plane of symmetry
 _ACCURACY = 1e-2  # finer is not needed for what is shown
@@ -284,8 +284,6 @@ def _shape(revolution: float, taper: float, accuracy: float) -> tuple[list[float
     """
     arm = minimal_trunk(revolution, taper)
     reached, coarse = (reachable_set(arm, accuracy=scale * accuracy) for scale in (1.0, 2.0))
-    assert isinstance(reached, ReachableSolid)
-    assert isinstance(coarse, ReachableSolid)
     sheets, volumes = coarse.sheets(), _beyond(reached)
     thickness = 2 * reached.volume / sheets.area / arm.length
     errors = [3 * abs(a - b) for a, b in zip(volumes, _beyond(coarse), strict=True)]
@@ -293,7 +291,7 @@ def _shape(revolution: float, taper: float, accuracy: float) -> tuple[list[float
     return [*volumes, thickness], [*errors, off]
 
 
-def _beyond(reached: ReachableSolid) -> list[float]:
+def _beyond(reached: ReachableSet) -> list[float]:
     """Volumes aside and behind [L³]."""
     surface, length = reached.surface(), reached.arm.length
     aside = (volume_beyond(surface, 0, side * _ASIDE * length, side) for side in (-1, 1))

@@ -15,7 +15,7 @@ from softreach.paper.sections.sweep import swept_atlas
 from softreach.plot import plot_arm, plot_metric_map
 from softreach.rod.kinematics import configuration
 from softreach.support.arrays import Array
-from softreach.workspace import ReachableCurve, ReachableSolid, ReachableSurface, reachable_set
+from softreach.workspace import ReachableSet, reachable_set
 
 _TARGETS = 2_000
 _LABEL = "reached more than once / %"
@@ -29,16 +29,12 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
     turn, taper = float(worst["revolution"]), float(worst["taper"])
     arms = minimal_trunk(), minimal_trunk(turn, taper)
     paper, clearest = (reachable_set(arm, accuracy=settings.accuracy) for arm in arms)
-    assert isinstance(paper, ReachableSolid)
-    assert isinstance(clearest, ReachableSolid)
     tip, activations = _clearest_pair(clearest)
     mapped = atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")})
     _draw(mapped, arms[1], activations, notes)
     # two fibers, and one: areas and lengths for L = 1 m
     fewer = [arms[0].replace(actuators=arms[0].actuators[:count]) for count in (2, 1)]
     surface, curve = (reachable_set(arm) for arm in fewer)
-    assert isinstance(surface, ReachableSurface)
-    assert isinstance(curve, ReachableCurve)
     return {
         "share": share.transpose("revolution", "taper").values.tolist(),
         "worst": float(worst),
@@ -79,7 +75,7 @@ def _example(n: Numbers) -> str:
     return f"In the latter design γ = ({'); ('.join(rows)}) all reach ({tip}) m"
 
 
-def _clearest_pair(reached: ReachableSolid) -> tuple[Array, Array]:
+def _clearest_pair(reached: ReachableSet) -> tuple[Array, Array]:
     """Tip and activations, of places that several activations reach, where these differ most."""
     places = np.argwhere(reached.grid["count"].values > 1)
     places = places[:: max(1, len(places) // _TARGETS)]

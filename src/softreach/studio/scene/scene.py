@@ -22,7 +22,6 @@ from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support import palette
 from softreach.support.palette import bundle_color, eight_bit
-from softreach.workspace import ReachableSolid
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -239,7 +238,7 @@ class Scene:
             return
         lines = vertices[reach.sheets.lines]
         drawn = in_slice(lines.reshape(-1, 3), cut).reshape(-1, 2).all(axis=1) & (ink is not None)
-        opened = cut.axis != "none" or not isinstance(reach.exact, ReachableSolid)
+        opened = cut.axis != "none" or reach.exact is None or reach.exact.dimension < 3
         data = glb(skin, opacity, lines[drawn], ink or _DARK, both_sides=opened)
         self.api.add_glb(path, data, cast_shadow=False, receive_shadow=False)
 
