@@ -329,7 +329,7 @@ MISSING = {
     f"show {TRUNK}": ("matplotlib", lacks("matplotlib", "plot")),
     "atlas figures a.zarr": ("matplotlib", lacks("matplotlib", "plot")),
     f"volume {TRUNK} --out a.glb": ("trimesh", lacks("trimesh", "export")),
-    "export cloud.zarr a.csv": ("pyarrow", lacks("pyarrow", "export")),
+    "export cloud.zarr a.parquet": ("pyarrow", lacks("pyarrow", "export")),
     f"reach {TRUNK} --out a.stl --out a.png": (
         "trimesh matplotlib skimage",
         "trimesh and matplotlib and scikit-image; install them with: "

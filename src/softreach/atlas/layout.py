@@ -58,8 +58,8 @@ def array_plans(command: Command) -> Iterator[Plan]:
     shape = (command.n, command.space.bundles)
     plan = _shared(CUBE, np.broadcast_to(0.0, shape), ("sample", "bundle"), _CUBE)
     yield replace(plan, data=None)
-    yield _per_design(command, "status", np.uint8, 0, _STATUS)
-    yield _per_design(command, "message", str, "", {"long_name": "why a design has no numbers"})
+    yield _per_design(command, "status", np.uint8, 0, STATUS)
+    yield _per_design(command, "message", str, "", MESSAGE)
     if command.profiles:
         yield from _profiles(command)
     if command.keep_clouds:
@@ -77,11 +77,12 @@ _CUBE = {
     "units": "1",
     "long_name": "place in the activation box of each design: 0 is its lower bound, 1 its upper",
 }
-_STATUS = {
+STATUS = {
     "long_name": "status of the design",
     "flag_values": [0, 1, 2, 3, 4, 5],
     "flag_meanings": "to_do done failed gap unstable damaged",
 }
+MESSAGE = {"long_name": "why a design has no numbers"}
 
 
 def _parameters(command: Command) -> Iterator[Plan]:

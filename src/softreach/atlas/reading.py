@@ -16,7 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
-from softreach.atlas.layout import PER_DESIGN, array_plans
+from softreach.atlas.layout import MESSAGE, PER_DESIGN, STATUS
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
@@ -440,7 +440,7 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
     with storage_errors(f"{store.location} cannot be read"):
         raw = xr.open_zarr(store.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates: dict[str, Any] = {
-            "length": ((), space.base.length, {"units": "m"}),
+            "length": ((), space.length_range[0], {"units": "m"}),
             **{name: raw[name] for name in space.names},
         }
     for variable in (raw, *raw.variables.values()):
@@ -460,10 +460,9 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     texts = np.full(command.space.size, "", dtype=object)
     for index, message in content.messages.items():
         texts[index] = message
-    plans = {plan.name: plan.attrs for plan in array_plans(command)}
     variables: dict[str, Any] = {
-        "status": (dims, content.status.reshape(shape), plans["status"]),
-        "message": (dims, texts.reshape(shape), plans["message"]),
+        "status": (dims, content.status.reshape(shape), STATUS),
+        "message": (dims, texts.reshape(shape), MESSAGE),
     }
     done = np.isin(content.status, KNOWN).reshape(shape)
     if (table := content.tables.get("metrics")) is not None:

@@ -224,12 +224,24 @@ class DesignSpace:
 
     @classmethod
     def from_dict(cls, space: Mapping[str, Any]) -> Self:
-        """The space that `to_dict` described."""
-        base = Manipulator.from_toml(space["design"], source="the base design")
-        bundles, *lengths = space["extent"]
-        known = _Survey({}, bundles, (lengths[0], lengths[1])) if bundles else None
-        parameters = _plain(space["parameters"])
-        return cls(base=base, parameters=parameters, layout=space["layout"], known=known)
+        """The space that `to_dict` described; its base design is read when it is asked for."""
+        bundles, shortest, longest = space["extent"]
+        made = object.__new__(cls)
+        vars(made).update(
+            parameters=_plain(space["parameters"]),
+            layout=space["layout"],
+            known=_Survey({}, bundles, (shortest, longest)) if bundles else None,
+            written=space["design"],
+        )
+        return made
+
+    def __getattr__(self, name: str) -> Any:
+        """The base design of a store, whose actuators may need a module that nobody imported."""
+        if name != "base" or "written" not in vars(self):
+            raise AttributeError(name)
+        base = Manipulator.from_toml(vars(self)["written"], source="the base design")
+        object.__setattr__(self, "base", base)
+        return base
 
 
 def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...]], ...]:
