@@ -32,7 +32,6 @@ Free = Annotated[
         "the base. May be repeated.",
     ),
 ]
-_POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 
 
 def calibrate(
@@ -263,12 +262,13 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
         InvalidInput: Text that is anything else, or no such number.
     """
     from softreach.arm.written import Written
+    from softreach.calibration.free_numbers import POSE
 
     names, result = Written.of(arm), {}
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
     for name, text in pairs_in("prior", texts, allowed).items():
         first = name.split("=")[0].strip()
-        unit = None if first not in _POSE else "m" if _POSE.index(first) < 3 else "rad"
+        unit = None if first not in POSE else "m" if POSE.index(first) < 3 else "rad"
         if unit is None and first not in names.by_key:
             raise InvalidInput("prior", name, "of a number that is free, by its full name")
         try:
