@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import zipfile
 from xml.etree import ElementTree
 
@@ -64,6 +65,16 @@ class TestCloud:
         assert table.column_names == COLUMNS
         for name, values in expected.items():
             np.testing.assert_array_equal(table[name].to_numpy(), values)
+
+    def test_csv_needs_no_pyarrow(self, cloud, tmp_path, monkeypatch):
+        sizes = np.logspace(-12, 20, 300)[:, None] * [1, -1, 0]
+        sizes[:2] = [[np.nan, 1e10, -0.0], [1e-4, 1e-6, 12.0]]
+        some = cloud.assign(tip=(("sample", "axis"), sizes), status=("sample", np.arange(300) % 5))
+        export_cloud(some, tmp_path / "with.csv", unit="mm")
+        for name in ("pyarrow", "pyarrow.csv"):
+            monkeypatch.setitem(sys.modules, name, None)
+        export_cloud(some, tmp_path / "without.csv", unit="mm")
+        assert (tmp_path / "with.csv").read_bytes() == (tmp_path / "without.csv").read_bytes()
 
     def test_parquet_reads_back_equal_with_its_description(self, cloud, expected, tmp_path):
         export_cloud(cloud, tmp_path / "cloud.parquet")

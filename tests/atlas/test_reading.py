@@ -110,6 +110,25 @@ def test_a_cloud_of_somebodys_own_actuator_opens_without_its_module(tmp_path, tr
         sr.cloud.design_of(found)
 
 
+def test_so_does_an_atlas(tmp_path, monkeypatch):
+    """Its points and metrics; whoever asks for the design is told what is missing."""
+    place = tmp_path / "a.zarr"
+    built = build_atlas(small_space(), place, **SMALL).load()
+    known = sr.Manipulator.from_toml
+
+    def unknown(text, source):
+        return known(text.replace('kind = "fiber"', 'kind = "Magnets"'), source)
+
+    monkeypatch.setattr(sr.Manipulator, "from_toml", unknown)
+    found = open_atlas(place)
+    assert_same(found.load(), built)
+    assert best_designs(found, "volume").volume == built.volume.max()
+    assert atlas_status(place).done == 4
+    for ask in (atlas_design, atlas_cloud):
+        with pytest.raises(sr.InvalidDesign, match=r"Magnets.*--import"):
+            ask(found, revolution=0.5, taper=0.0)
+
+
 def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
     atlas = build_atlas(small_space(), tmp_path / "a.zarr", keep_clouds=False, **SMALL)
     assert "tip" not in atlas

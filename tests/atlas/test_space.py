@@ -147,9 +147,11 @@ def test_sampled_spaces_can_be_written_too():
 
 
 def test_a_space_prints_its_parameters_with_their_ends():
-    space = DesignSpace.listed(sr.designs.minimal_trunk(), taper=[0.0, 0.02], length=[1.0, 0.5])
+    values = {"length": [1.0, 0.5], "taper": [0.0, 0.02], "left.bundles": [1, 2]}
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), **values)
     assert str(space).splitlines() == [
         "list of 2 designs",
-        "  taper: 2 values from 0 to 0.02 rad",
         "  length: 2 values from 0.5 to 1 m",
+        "  taper: 2 values from 0 to 0.02 rad",
+        "  left.bundles: 2 values from 1 to 2",
     ]

@@ -58,6 +58,15 @@ def test_poses_keep_apart_and_inside_of_the_box():
     assert cube.max() <= 1.0
 
 
+def test_a_plan_is_a_dataset_of_its_poses_and_of_the_errors_to_expect():
+    plan = plan_poses(ARM, FREE, 9, candidates=64)
+    found = plan.to_dataset(2e-4)
+    assert found.sizes == {"pose": 9, "input": 3, "number": 8, "other": 8}
+    np.testing.assert_array_equal(found.activation, plan.activations)
+    assert dict(zip(found.number.values, found.sigma.values, strict=True)) == plan.sigma(2e-4)
+    assert found.unit.sel(number="pose.rx") == "rad"
+
+
 def test_a_plan_replaces_no_measurements(tmp_path):
     path = tmp_path / "poses.csv"
     plan = plan_poses(ARM, [MODULUS], 3, candidates=16)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.atlas.command import Command
-from softreach.atlas.executor import ExecutorLike, an_executor, run_designs
+from softreach.atlas.executor import ExecutorLike, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.reading import a_store, contents, open_atlas, over_length
@@ -111,7 +112,12 @@ def build_atlas(
     """
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)
-    durable, executor = as_flag("durable", durable), an_executor("executor", executor)
+    durable = as_flag("durable", durable)
+    if not (
+        executor is None or isinstance(executor, Executor) or hasattr(executor, "get_executor")
+    ):
+        allowed = "a concurrent.futures executor, or a Dask client"
+        raise InvalidInput("executor", as_given(executor), allowed)
     progress = None if progress is None else as_function("progress", progress)
     check_sampler(sampler, n, 0, seed)
     check_memory("n", n, _SAMPLE_MEMORY * n)

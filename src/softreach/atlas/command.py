@@ -17,10 +17,7 @@ from softreach.cloud.curvature import QUANTILES
 from softreach.sampling import check_sampler
 from softreach.support.errors import InvalidInput, counted
 
-__all__ = ["ATLAS_VERSION", "Command"]
-
-ATLAS_VERSION = 5
-"""Version of the layout of a store."""
+ATLAS_VERSION = 5  # Version of the layout of a store
 STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
 
 _RESERVED = frozenset(
@@ -59,9 +56,21 @@ class Command:
     atlas_version: int = ATLAS_VERSION
 
     def __post_init__(self) -> None:
-        for fault in _faults(self):
-            raise fault
-        check_sampler(self.sampler, self.n, self.space.bundles, self.seed)
+        space = self.space
+        for metric in self.metrics:
+            if metric.name in _RESERVED or metric.name in space.names:
+                allowed = "a name that the atlas does not use itself"
+                raise InvalidInput("name of a metric", metric.name, allowed)
+        if not space.bundles:
+            why = next(iter(space.gaps.values()))
+            designs = counted(space.size, "design")
+            raise InvalidInput("space", designs, "valid for at least one design", why)
+        shortest, longest = space.length_range
+        if self.keep_clouds and longest > _LONGEST * shortest:
+            allowed = f"within a factor of {_LONGEST:g} of each other if clouds are kept"
+            hint = "stored tips share one step; pass keep_clouds=False, or build two atlases"
+            raise InvalidInput("length", f"{shortest:g} to {longest:g} m", allowed, hint)
+        check_sampler(self.sampler, self.n, space.bundles, self.seed)
 
     @property
     def numbers(self) -> tuple[Metric, ...]:
@@ -96,9 +105,12 @@ class Command:
             hint = "build the atlas again in a new folder"
             raise InvalidInput("version of the atlas", version, str(ATLAS_VERSION), hint)
         values |= {name: tuple(values[name]) for name in ("stations", "quantiles")}
-        values["metrics"] = tuple(_recorded(metric) for metric in values["metrics"])
-        values["space"] = DesignSpace.from_dict(values["space"])
-        return cls(**values)
+        space, metrics = DesignSpace.from_dict(values["space"]), list[Metric]()
+        for metric in values["metrics"]:
+            own = known_metric(metric["name"])
+            same = own is not None and own.to_dict() == metric
+            metrics.append(own if own and same else Metric.from_dict(metric))
+        return cls(**{**values, "space": space, "metrics": tuple(metrics)})
 
     def continuing(self, begun: Command) -> Self:
         """This command for a store that another version began: without metrics added since."""
@@ -110,47 +122,19 @@ class Command:
         """Differences between this command and another, one line each."""
         own, its = ({m.name: m.to_dict() for m in each.metrics} for each in (self, other))
         lines = [*_differences(_flat(self), _flat(other))]
-        for here, there, place in (
-            (its, own, "there and not here"),
-            (own, its, "here and not there"),
-        ):
-            if only := [name for name in here if name not in there]:
-                lines.append(f"metrics: {', '.join(only)} {place}")
+        if only := [name for name in its if name not in own]:
+            lines.append(f"metrics: {', '.join(only)} there and not here")
+        if only := [name for name in own if name not in its]:
+            lines.append(f"metrics: {', '.join(only)} here and not there")
         for name in own.keys() & its.keys():
             lines += (f"metric {name}, {line}" for line in _differences(own[name], its[name]))
         return lines
 
 
-def _faults(command: Command) -> Iterator[InvalidInput]:
-    space = command.space
-    for metric in command.metrics:
-        if metric.name in _RESERVED or metric.name in space.names:
-            allowed = "a name that the atlas does not use itself"
-            yield InvalidInput("name of a metric", metric.name, allowed)
-    for name in space.names:
-        if {"/", "\\"} & {*name}:
-            allowed = "without / and \\, which would name folders of the store"
-            yield InvalidInput("parameter", name, allowed, "rename the part")
-    if not space.bundles:
-        why = next(iter(space.gaps.values()))
-        designs = counted(space.size, "design")
-        yield InvalidInput("space", designs, "valid for at least one design", why)
-    shortest, longest = space.length_range
-    if command.keep_clouds and longest > _LONGEST * shortest:
-        allowed = f"within a factor of {_LONGEST:g} of each other if clouds are kept"
-        hint = "stored tips share one step; pass keep_clouds=False, or build two atlases"
-        yield InvalidInput("length", f"{shortest:g} to {longest:g} m", allowed, hint)
-
-
-def _recorded(values: Mapping[str, Any]) -> Metric:
-    """The metric of a store: softreach's own where it is the same, with its function."""
-    known = known_metric(values["name"])
-    return known if known and known.to_dict() == values else Metric.from_dict(values)
-
-
 def _flat(command: Command) -> dict[str, Any]:
-    values = {f.name: getattr(command, f.name) for f in fields(command)}
-    space, _ = values.pop("space"), values.pop("metrics")
+    """All settings but the metrics by name, those of the space too."""
+    values = {f.name: getattr(command, f.name) for f in fields(command) if f.name != "metrics"}
+    space = values.pop("space")
     design = {"layout": space.layout, "design": space.base.to_toml()}
     return values | design | dict(space.parameters)
 

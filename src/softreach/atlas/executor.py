@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import pickle
 import secrets
-import socket
 from collections.abc import Callable, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -19,10 +18,9 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain, islice
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,37 +30,22 @@ from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import UNSTABLE, AtlasStore, Result
 from softreach.rod.tip_map import no_equilibrium_message
 from softreach.support import parallel
-from softreach.support.arguments import as_given
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, NotPossible, SoftreachError, no_warnings
 from softreach.support.files.stores import StoreFailed
 from softreach.support.interruption import check_stopped
 
-__all__ = ["ExecutorLike", "an_executor", "begin_design", "run_designs"]
-
 _AHEAD = 512  # tasks that an executor has at a time
 
 Values = dict[str, Array]
-Outcome = tuple[int, str]
-"""Number of a design, and why it failed; empty if it did not."""
+Outcome = tuple[int, str]  # Number of a design, and why it failed; empty if it did not
 OnOutcome = Callable[[Outcome], None]
 
 
 ExecutorLike = Any
 """None, an `Executor`, or a `dask.distributed.Client`, which has a method `get_executor`."""
 
-_opened: dict[str, AtlasStore] = {}
-
-
-def an_executor(name: str, value: Any) -> Any:
-    """An executor of designs.
-
-    Raises:
-        InvalidInput: None of those.
-    """
-    if value is None or isinstance(value, Executor) or hasattr(value, "get_executor"):
-        return value
-    raise InvalidInput(name, as_given(value), "a concurrent.futures executor, or a Dask client")
+_opened: dict[tuple[str, int], AtlasStore] = {}  # Stores by the token of a call and the process
 
 
 def run_designs(
@@ -75,22 +58,15 @@ def run_designs(
         StoreFailed: The store cannot be written.
         NotPossible: A worker died, and with it the executor.
     """
+    metrics = store.command.metrics
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
-        metrics = store.command.metrics
         begun = (begin_design(store, metrics, index) for index in indices)
         tasks = (partial(lambda task: on_outcome(task()), task) for task in begun)
         # Threads start with the second task: with one before all they get the first design at once.
         parallel.run(chain([lambda: None], tasks))
         return
-    if isinstance(executor, ProcessPoolExecutor):
-        _check_pickled(store.command.metrics)
-    pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
-    _run_in_pool(pool, store, indices, on_outcome)
-
-
-def _check_pickled(metrics: Sequence[Metric]) -> None:
-    for metric in metrics:
+    for metric in metrics if isinstance(executor, ProcessPoolExecutor) else ():
         try:
             pickle.dumps(metric.compute)
         except Exception:
@@ -98,12 +74,16 @@ def _check_pickled(metrics: Sequence[Metric]) -> None:
             hint = "lambdas and functions inside of functions cannot be sent to them"
             name = f"compute of metric {metric.name}"
             raise InvalidInput(name, metric.compute, allowed, hint) from None
+    pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
+    _run_in_pool(pool, store, indices, on_outcome)
 
 
 def _run_in_pool(
     pool: Executor, store: AtlasStore, indices: Sequence[int], on_outcome: OnOutcome
 ) -> None:
-    remote = _Remote(store.command, store.location, store.opened.durable, store)
+    key = token, origin = secrets.token_hex(8), os.getpid()
+    remote = _Remote(store.command, store.location, store.opened.durable, token, origin)
+    _opened[key] = store  # for workers that are threads of this process
     waiting = iter(indices)
     pending: dict[Future[Outcome], int] = {}
     try:
@@ -114,7 +94,15 @@ def _run_in_pool(
             if not pending:
                 return
             for future in wait(pending, return_when=FIRST_COMPLETED).done:
-                on_outcome(_outcome(future, store, pending.pop(future)))
+                index = pending.pop(future)
+                try:
+                    outcome = future.result()
+                except Exception as error:
+                    if type(error).__name__ != "KilledWorker":
+                        raise
+                    outcome = index, "its worker died repeatedly"  # Dask has tried it again by then
+                    store.write_status(*outcome)
+                on_outcome(outcome)
     except BrokenExecutor as error:
         raise NotPossible(
             "a worker died and broke its executor; what is done is safe, and the same call with "
@@ -123,21 +111,10 @@ def _run_in_pool(
     finally:
         for future in pending:
             future.cancel()
+        _opened.pop(key, None)
 
 
-def _outcome(future: Future[Outcome], store: AtlasStore, index: int) -> Outcome:
-    try:
-        return future.result()
-    except Exception as error:
-        if type(error).__name__ != "KilledWorker":
-            raise
-        message = "its worker died repeatedly"  # Dask has tried it again by then
-        store.write_status(index, message)
-        return index, message
-
-
-@dataclass(frozen=True)
-class _Remote:
+class _Remote(NamedTuple):
     """A store as it travels to a worker elsewhere, where designs are read and written.
 
     The command travels along, as the functions of metrics are in no store; unpickling it imports
@@ -147,38 +124,32 @@ class _Remote:
     command: Command
     location: Any
     durable: bool
-    here: AtlasStore | None
-    """The store itself, in the process that opened it."""
-    token: str = field(default_factory=lambda: secrets.token_hex(8))
-    origin: tuple[str, int] = field(default_factory=lambda: (socket.gethostname(), os.getpid()))
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"here": None}
-
-    def store(self) -> AtlasStore:
-        """The store, opened once per process, which uses one thread by default."""
-        from zarr.storage import MemoryStore
-
-        if self.here is not None:
-            return self.here
-        if (socket.gethostname(), os.getpid()) != self.origin:
-            os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
-            if isinstance(self.location, dict | MemoryStore):
-                raise NotPossible(
-                    "the store is in the memory of another process; use a path or a URL"
-                )
-        if self.token not in _opened:
-            _opened.clear()
-            _opened[self.token] = AtlasStore.open(self.location, durable=self.durable)
-        return _opened[self.token]
+    token: str
+    origin: int  # Process that began the store
 
 
 def _run_remotely(remote: _Remote, index: int) -> Outcome:
     """Compute and store a design in a worker; a repeated call gives the same result."""
     try:
-        return begin_design(remote.store(), remote.command.metrics, index)()
+        return begin_design(_store_of(remote), remote.command.metrics, index)()
     except SoftreachError as error:
         raise StoreFailed(str(error)) from None  # this one can be sent back
+
+
+def _store_of(remote: _Remote) -> AtlasStore:
+    """The store, opened once by each worker process, which uses one thread by default."""
+    from zarr.storage import MemoryStore
+
+    key = remote.token, os.getpid()  # a forked process has what its parent opened
+    if key not in _opened:
+        if key[1] != remote.origin:
+            os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
+            if isinstance(remote.location, dict | MemoryStore):
+                where = "in the memory of another process"
+                raise NotPossible(f"the store is {where}; use a path or a URL")
+        _opened.clear()
+        _opened[key] = AtlasStore.open(remote.location, durable=remote.durable)
+    return _opened[key]
 
 
 @no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
@@ -198,25 +169,24 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
         raise
     except Exception as error:
         return partial(_fail, store, index, error)
-    return partial(_finish, store, metrics, index, found, values)
 
+    @no_warnings()
+    def finish() -> Outcome:
+        try:
+            rest = [metric for metric in metrics if metric.name not in values]
+            result = Result(
+                values | _values(store, rest, found),
+                found.tips if store.command.keep_clouds else None,
+            )
+        except Exception as error:
+            return _fail(store, index, error)
+        if found.stable.any():
+            store.write(index, result)
+        else:
+            store.write(index, result, UNSTABLE, no_equilibrium_message(len(found.stable)))
+        return index, ""
 
-@no_warnings()
-def _finish(
-    store: AtlasStore, metrics: Sequence[Metric], index: int, found: Intermediates, values: Values
-) -> Outcome:
-    try:
-        rest = [metric for metric in metrics if metric.name not in values]
-        values |= _values(store, rest, found)
-        tips = found.tips if store.command.keep_clouds else None
-    except Exception as error:
-        return _fail(store, index, error)
-    if found.stable.any():
-        store.write(index, Result(values, tips))
-    else:
-        message = no_equilibrium_message(len(found.stable))
-        store.write(index, Result(values, tips), UNSTABLE, message)
-    return index, ""
+    return finish
 
 
 def _values(store: AtlasStore, metrics: Sequence[Metric], found: Intermediates) -> Values:

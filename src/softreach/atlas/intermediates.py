@@ -21,8 +21,6 @@ from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 
-__all__ = ["Intermediates", "Settings", "activations_of"]
-
 _BLOCK = 65_536  # samples at a time, where not all of them are needed at once
 _TOL = 1e-6  # of tips, in L
 _SPACINGS = 1.6  # of samples that fill the box evenly, over L: radius of the alpha shape

@@ -12,19 +12,15 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
 
-__all__ = ["CUBE", "MISSING", "PER_DESIGN", "RESOLUTION", "Plan", "array_plans"]
-
 RESOLUTION = 1e-5
 """Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
 
-CUBE = "unit_activation"
-"""The array of activations that all designs share."""
+CUBE = "unit_activation"  # The array of activations that all designs share
 
 PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")
 """The arrays whose chunks are designs."""
 
-MISSING = int(np.iinfo(np.int32).min)
-"""Number in place of a tip that is NaN, or not stored."""
+MISSING = int(np.iinfo(np.int32).min)  # Number in place of a tip that is NaN, or not stored
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,75 +48,51 @@ class Plan:
 
 def array_plans(command: Command) -> Iterator[Plan]:
     """Every array of an atlas."""
-    yield from _parameters(command)
+    space, sizes = command.space, command.profile_sizes
+    varied = space.varied()
+    for name, values in space.parameters:
+        parameter = varied[name]
+        about: dict[str, Any] = {"units": parameter.unit, "long_name": parameter.meaning}
+        about |= {"symbol": parameter.symbol, "part": parameter.owner}
+        dims = (name,) if space.layout == "grid" else ("design",)
+        yield _shared(name, np.array(values), dims, about)
     yield _labels("metric", [metric.name for metric in command.numbers])
     yield _labels("axis", list(AXES))
-    shape = (command.n, command.space.bundles)
-    plan = _shared(CUBE, np.broadcast_to(0.0, shape), ("sample", "bundle"), _CUBE)
-    yield replace(plan, data=None)
-    yield _per_design(command, "status", np.uint8, 0, _STATUS)
-    yield _per_design(command, "message", str, "", {"long_name": "why a design has no numbers"})
-    if command.profiles:
-        yield from _profiles(command)
-    if command.keep_clouds:
-        yield _tips(command)
-    attrs = {
-        "long_name": "metrics of the designs",
-        "metrics": _meanings(command.numbers),
-        "alpha_over_length": command.alpha_over_length,
-    }
-    count = len(command.numbers)
-    yield _per_design(command, "metrics", np.float64, np.nan, attrs, metric=count)
+    shape = (command.n, space.bundles)
+    cube = _shared(CUBE, np.broadcast_to(0.0, shape), ("sample", "bundle"), _CUBE)
+    yield replace(cube, data=None)
+    yield _per_design(command, "status", np.uint8, 0, STATUS)
+    yield _per_design(command, "message", str, "", MESSAGE)
+    if profiles := command.profiles:
+        yield _labels("quantity", [metric.name for metric in profiles])
+        yield _shared("station", np.array(command.stations), ("station",), _STATION)
+        yield _shared("quantile", np.array(command.quantiles), ("quantile",), {"units": "1"})
+        about = {"long_name": "metrics over stations and quantiles", "metrics": _meanings(profiles)}
+        sizes = {"quantity": len(profiles), **sizes}
+        yield _per_design(command, "curvature", np.float64, np.nan, about, **sizes)
+    if command.keep_clouds:  # as fixed-point numbers: half the size, and the same error everywhere
+        step = RESOLUTION * space.length_range[0]
+        about = {"units": "m", "long_name": "tip position", "scale_factor": step}
+        about["_FillValue"] = MISSING
+        sizes = {"axis": len(AXES), "sample": command.n}
+        yield _per_design(command, "tip", np.int32, MISSING, about, **sizes)
+    about = {"long_name": "metrics of the designs", "metrics": _meanings(command.numbers)}
+    about["alpha_over_length"] = command.alpha_over_length
+    sizes = {"metric": len(command.numbers)}
+    yield _per_design(command, "metrics", np.float64, np.nan, about, **sizes)
 
 
 _CUBE = {
     "units": "1",
     "long_name": "place in the activation box of each design: 0 is its lower bound, 1 its upper",
 }
-_STATUS = {
+_STATION = {"units": "1", "long_name": "station Z before activation, over the design's length"}
+STATUS = {
     "long_name": "status of the design",
     "flag_values": [0, 1, 2, 3, 4, 5],
     "flag_meanings": "to_do done failed gap unstable damaged",
 }
-
-
-def _parameters(command: Command) -> Iterator[Plan]:
-    space = command.space
-    varied = space.varied()
-    for name, values in space.parameters:
-        dims = (name,) if space.layout == "grid" else ("design",)
-        attrs = {
-            "units": varied[name].unit,
-            "long_name": varied[name].meaning,
-            "symbol": varied[name].symbol,
-            "part": varied[name].owner,
-        }
-        yield _shared(name, np.array(values), dims, attrs)
-
-
-def _profiles(command: Command) -> Iterator[Plan]:
-    yield _labels("quantity", [metric.name for metric in command.profiles])
-    place = {"units": "1", "long_name": "station Z before activation, over the design's length"}
-    yield _shared("station", np.array(command.stations), ("station",), place)
-    yield _shared("quantile", np.array(command.quantiles), ("quantile",), {"units": "1"})
-    sizes = {"quantity": len(command.profiles), **command.profile_sizes}
-    attrs: dict[str, Any] = {
-        "long_name": "metrics over stations and quantiles",
-        "metrics": _meanings(command.profiles),
-    }
-    yield _per_design(command, "curvature", np.float64, np.nan, attrs, **sizes)
-
-
-def _tips(command: Command) -> Plan:
-    """Fixed-point tips: half the size of floats, with an error that is the same everywhere."""
-    attrs = {
-        "units": "m",
-        "long_name": "tip position",
-        "scale_factor": RESOLUTION * command.space.length_range[0],
-        "_FillValue": MISSING,
-    }
-    sizes = {"axis": len(AXES), "sample": command.n}
-    return _per_design(command, "tip", np.int32, MISSING, attrs, **sizes)
+MESSAGE = {"long_name": "why a design has no numbers"}
 
 
 def _meanings(metrics: Sequence[Metric]) -> str:

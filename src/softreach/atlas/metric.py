@@ -13,8 +13,6 @@ from softreach.support.arguments import as_instance, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError
 
-__all__ = ["Metric", "MetricFailed", "Need"]
-
 PROFILE = ("station", "quantile")
 
 

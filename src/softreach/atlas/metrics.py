@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.workspace import ReachableSet
-
-__all__ = ["METRIC_GROUPS", "chosen_metrics", "known_metric", "own_metrics"]
 
 
 def known_metric(name: str) -> Metric | None:
@@ -46,7 +45,7 @@ def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
     if not several or not metrics:
         raise InvalidInput("metrics", "none" if several else as_given(metrics), _ALLOWED)
     chosen: dict[str, Metric] = {}
-    for metric in (metric for choice in metrics for metric in _metrics_of(choice)):
+    for metric in chain.from_iterable(map(_metrics_of, metrics)):
         same = chosen.setdefault(metric.name, metric) == metric
         if not same or _KNOWN.get(metric.name, metric) != metric:
             raise InvalidInput("name of a metric", metric.name, "of one metric only")

@@ -16,7 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
-from softreach.atlas.layout import PER_DESIGN, array_plans
+from softreach.atlas.layout import MESSAGE, PER_DESIGN, STATUS
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
@@ -24,7 +24,6 @@ from softreach.schema import cloud_dataset, stored_names, with_status
 from softreach.support.arguments import (
     as_dataset,
     as_flag,
-    as_given,
     as_instance,
     as_integer,
     as_names,
@@ -43,10 +42,8 @@ if TYPE_CHECKING:
     AtlasLike = StoreLike | xr.Dataset
 
 
-EXPLAINED = (FAILED, GAP, UNSTABLE)
-"""The status of designs that have a message."""
+EXPLAINED = (FAILED, GAP, UNSTABLE)  # The status of designs that have a message
 
-_A_STORE = "a path, a URL or a Zarr store"
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 _QUICK = 3e8  # bytes of tips
@@ -307,7 +304,14 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     place_of, command = store.command.space.place, store.command
     status = read("status").ravel()
     known, explained = np.isin(status, KNOWN), np.isin(status, EXPLAINED)
-    store.watch.required = lambda chunk: _is_required(store, chunk, known, explained)
+
+    def required(chunk: Chunk) -> bool:
+        if chunk.array not in PER_DESIGN:
+            return True
+        of_designs = explained if chunk.array == "message" else known
+        return chunk.array != "status" and bool(of_designs[store.number(chunk)])
+
+    store.watch.required = required
     names = ("metrics", "curvature") if command.profiles else ("metrics",)
     tables = {
         name: read(name) if known.any() else np.full(store.array(name).shape, np.nan)
@@ -323,16 +327,7 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     return Contents(status=status, messages=dict(sorted((texts | damaged).items())), tables=tables)
 
 
-def _is_required(
-    store: AtlasStore, chunk: Chunk, known: NDArray[np.bool_], explained: NDArray[np.bool_]
-) -> bool:
-    if chunk.array not in PER_DESIGN:
-        return True
-    of_designs = explained if chunk.array == "message" else known
-    return chunk.array != "status" and bool(of_designs[store.number(chunk)])
-
-
-def a_store(name: str, value: Any) -> Any:
+def a_store(name: str, value: Any, allowed: str = "a path, a URL or a Zarr store") -> Any:
     """A place where an atlas may be.
 
     Raises:
@@ -345,7 +340,7 @@ def a_store(name: str, value: Any) -> Any:
         return as_path(name, value)
     if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):
         return value  # a store in memory
-    return as_instance(name, value, (Store, StorePath), _A_STORE)
+    return as_instance(name, value, (Store, StorePath), allowed)
 
 
 def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
@@ -360,15 +355,12 @@ def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
     """
     import xarray as xr
 
-    if isinstance(atlas, xr.Dataset) and "command" in atlas.attrs and "status" in atlas:
-        return atlas
-    try:
-        return _opened(a_store("atlas", atlas), metrics=metrics)
-    except InvalidInput as error:
-        if error.allowed != _A_STORE:
-            raise
-        given = "another Dataset" if isinstance(atlas, xr.Dataset) else as_given(atlas)
-        raise InvalidInput("atlas", given, "a store, or a dataset from open_atlas") from None
+    allowed = "a store, or a dataset from open_atlas"
+    if not isinstance(atlas, xr.Dataset):
+        return _opened(a_store("atlas", atlas, allowed), metrics=metrics)
+    if "command" not in atlas.attrs or "status" not in atlas:
+        raise InvalidInput("atlas", "another Dataset", allowed)
+    return atlas
 
 
 def command_of(atlas: xr.Dataset) -> Command:
@@ -383,18 +375,13 @@ def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, floa
         for name, values in atlas.variables.items()
         if (unit := values.attrs.get("units", "1"))
     }
-    for text, low, high in map(_constraint, where):
-        name, unit = written.get(text, (text, "1"))
-        yield name, from_written(low, unit), from_written(high, unit)
-
-
-def _constraint(text: str) -> tuple[str, float, float]:
-    """`taper_deg<=1` -> its name, and the numbers between which it is."""
-    name, sign, number = (*re.split("([<>]=?)", text, maxsplit=1), "", "")[:3]
-    if (values := numbers_in(number, 1)) is None:
-        raise InvalidInput("where", text or "''", "a name, <= or >=, and a finite number")
-    low, high = (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)
-    return name.strip(), low, high
+    for text in where:
+        given, sign, number = (*re.split("([<>]=?)", text, maxsplit=1), "", "")[:3]
+        if (values := numbers_in(number, 1)) is None:
+            raise InvalidInput("where", text or "''", "a name, <= or >=, and a finite number")
+        name, unit = written.get(given.strip(), (given.strip(), "1"))
+        limit = from_written(values[0], unit)
+        yield (name, -math.inf, limit) if "<" in sign else (name, limit, math.inf)
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
@@ -440,7 +427,7 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
     with storage_errors(f"{store.location} cannot be read"):
         raw = xr.open_zarr(store.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates: dict[str, Any] = {
-            "length": ((), space.base.length, {"units": "m"}),
+            "length": ((), space.length_range[0], {"units": "m"}),
             **{name: raw[name] for name in space.names},
         }
     for variable in (raw, *raw.variables.values()):
@@ -460,10 +447,9 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     texts = np.full(command.space.size, "", dtype=object)
     for index, message in content.messages.items():
         texts[index] = message
-    plans = {plan.name: plan.attrs for plan in array_plans(command)}
     variables: dict[str, Any] = {
-        "status": (dims, content.status.reshape(shape), plans["status"]),
-        "message": (dims, texts.reshape(shape), plans["message"]),
+        "status": (dims, content.status.reshape(shape), STATUS),
+        "message": (dims, texts.reshape(shape), MESSAGE),
     }
     done = np.isin(content.status, KNOWN).reshape(shape)
     if (table := content.tables.get("metrics")) is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, Self
@@ -19,8 +19,6 @@ from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite
 from softreach.support.errors import InvalidDesign, InvalidInput, counted
 from softreach.support.progress import bar
-
-__all__ = ["DesignSpace", "column"]
 
 Layout = Literal["grid", "list"]
 
@@ -69,9 +67,27 @@ class DesignSpace:
     """What a store says of the designs but its gaps, so that reading it makes none."""
 
     def __post_init__(self) -> None:
-        a_manipulator("base", self.base)
-        for fault in _faults(self):
-            raise fault
+        base = a_manipulator("base", self.base)
+        if not self.parameters:
+            known = (name for name, parameter in parameters(base).items() if not parameter.owner)
+            allowed = f"at least one of {', '.join(known)}, or of a part, such as left.offset"
+            raise InvalidInput("parameters", "none", allowed)
+        find_parameters(base, self.names)
+        for name, values in self.parameters:
+            if {"/", "\\"} & {*name}:
+                allowed = "without / and \\, which would name folders of the store"
+                raise InvalidInput("parameter", name, allowed, "rename the part")
+            if not values or not np.isfinite(values).all():
+                raise InvalidInput(name, values, "one finite value or more")
+            if self.layout == "grid" and len(set(values)) < len(values):
+                raise InvalidInput(name, values, "values that differ")
+        if self.layout == "list" and len({len(values) for _, values in self.parameters}) > 1:
+            counts = ", ".join(f"{name}: {len(values)}" for name, values in self.parameters)
+            allowed = "the same number for each parameter in a list of designs"
+            raise InvalidInput("parameters", counts, allowed)
+        if self.size > _MOST:
+            allowed, hint = f"{_MOST:,} at most", "take fewer values, or build several atlases"
+            raise InvalidInput("designs", f"{self.size:,}", allowed, hint)
 
     @classmethod
     def grid(cls, base: Manipulator, **values: ArrayLike) -> Self:
@@ -128,9 +144,9 @@ class DesignSpace:
         return cls(base=base, parameters=_plain(dict(columns)), layout="list")
 
     def __str__(self) -> str:
-        lines = [f"{self.layout} of {counted(self.size, 'design')}"]
-        for (name, values), parameter in zip(self.parameters, self.varied().values(), strict=True):
-            ends = f"{min(values):.6g} to {max(values):.6g} {parameter.unit}".removesuffix(" 1")
+        lines, varied = [f"{self.layout} of {counted(self.size, 'design')}"], self.varied()
+        for name, values in self.parameters:
+            ends = f"{min(values):.6g} to {max(values):.6g} {varied[name].unit}".removesuffix(" 1")
             lines.append(f"  {name}: {counted(len(values), 'value')} from {ends}")
         return "\n".join(lines)
 
@@ -224,12 +240,24 @@ class DesignSpace:
 
     @classmethod
     def from_dict(cls, space: Mapping[str, Any]) -> Self:
-        """The space that `to_dict` described."""
-        base = Manipulator.from_toml(space["design"], source="the base design")
-        bundles, *lengths = space["extent"]
-        known = _Survey({}, bundles, (lengths[0], lengths[1])) if bundles else None
-        parameters = _plain(space["parameters"])
-        return cls(base=base, parameters=parameters, layout=space["layout"], known=known)
+        """The space that `to_dict` described; its base design is read when it is asked for."""
+        bundles, shortest, longest = space["extent"]
+        made = object.__new__(cls)
+        vars(made).update(
+            parameters=_plain(space["parameters"]),
+            layout=space["layout"],
+            known=_Survey({}, bundles, (shortest, longest)) if bundles else None,
+            written=space["design"],
+        )
+        return made
+
+    def __getattr__(self, name: str) -> Any:
+        """The base design of a store, whose actuators may need a module that nobody imported."""
+        if name != "base" or "written" not in vars(self):
+            raise AttributeError(name)
+        base = Manipulator.from_toml(vars(self)["written"], source="the base design")
+        object.__setattr__(self, "base", base)
+        return base
 
 
 def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...]], ...]:
@@ -242,25 +270,3 @@ def _ends(name: str, ends: ArrayLike) -> np.ndarray:
     if floats.shape != (2,) or not floats[0] < floats[1]:
         raise InvalidInput(name, ends, allowed)
     return floats
-
-
-def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
-    if not space.parameters:
-        known = (name for name, parameter in parameters(space.base).items() if not parameter.owner)
-        allowed = f"at least one of {', '.join(known)}, or of a part, such as left.offset"
-        yield InvalidInput("parameters", "none", allowed)
-    find_parameters(space.base, space.names)
-    for name, values in space.parameters:
-        if "/" in name:
-            yield InvalidInput("parameter", name, 'a name without "/"', "rename the actuator")
-        if not values or not np.isfinite(values).all():
-            yield InvalidInput(name, values, "one finite value or more")
-        if space.layout == "grid" and len(set(values)) < len(values):
-            yield InvalidInput(name, values, "values that differ")
-    if space.layout == "list" and len({len(values) for _, values in space.parameters}) > 1:
-        counts = ", ".join(f"{name}: {len(values)}" for name, values in space.parameters)
-        allowed = "the same number for each parameter in a list of designs"
-        yield InvalidInput("parameters", counts, allowed)
-    if space.size > _MOST:
-        allowed, hint = f"{_MOST:,} at most", "take fewer values, or build several atlases"
-        yield InvalidInput("designs", f"{space.size:,}", allowed, hint)

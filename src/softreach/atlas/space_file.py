@@ -17,8 +17,6 @@ from softreach.atlas.space import DesignSpace, column
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.quantity import read_number, read_whole_number
 
-__all__ = ["flat_keys", "parse_parameter", "parse_space"]
-
 _KEYS = ("design", "layout", "designs", "seed", "parameters")
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 _MOST = 100_000  # values of one parameter

@@ -54,21 +54,17 @@ if TYPE_CHECKING:
 
 
 TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
-KNOWN = (DONE, UNSTABLE)
-"""The status of designs of which metrics are stored."""
+KNOWN = (DONE, UNSTABLE)  # The status of designs of which metrics are stored
 
-CUBE_DIGEST = "unit_activation_sha256"
-"""Attribute of the root: digest of the activations."""
+CUBE_DIGEST = "unit_activation_sha256"  # Attribute of the root: digest of the activations
 
-OF = "command_sha256"
-"""Attribute of each array: digest of the command."""
+OF = "command_sha256"  # Attribute of each array: digest of the command
 
 
 class Result(NamedTuple):
     """Stored result of one design."""
 
-    metrics: Mapping[str, ArrayLike]
-    """Every metric of the command by name."""
+    metrics: Mapping[str, ArrayLike]  # Every metric of the command by name
     tips: Array | None
     """Tips [m], shape (n, 3), NaN without equilibrium; None if clouds are not kept."""
 

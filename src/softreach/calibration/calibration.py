@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import tables
-from softreach.calibration.errors import PlacementErrors, misses
+from softreach.calibration.errors import PlacementErrors, misses, with_products
 from softreach.calibration.fit import Fit, exchanged_columns, fitted, started
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
@@ -200,10 +200,10 @@ def _warn_of_numbers(result: Calibration) -> None:
                 warn(f"the calibrated arm: {text}")
 
 
-def ridge(features: Array, target: Array) -> Callable[[Array], Array]:
-    """Linear law of features (n, feature) with the penalty of least generalized cross-validation.
+def _ridge(features: Array, target: Array, asked: Array) -> Array:
+    """Targets at the features that are asked, (n, number), by a linear law of the known ones.
 
-    It predicts targets (n, number) of other rows of features.
+    Its penalty is that of the least generalized cross-validation.
     """
     middle, size = features.mean(axis=0), features.std(axis=0)
     size = np.where(size > 0, size, 1.0)
@@ -219,7 +219,7 @@ def ridge(features: Array, target: Array) -> Callable[[Array], Array]:
 
     best = min(_PENALTIES, key=cross_validation)
     weights = axes.T @ ((values / (values**2 + n * best))[:, None] * along)
-    return lambda rows: mean + ((rows - middle) / size) @ weights
+    return mean + ((asked - middle) / size) @ weights
 
 
 def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
@@ -229,22 +229,15 @@ def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
         Places, (n, marker, 3), NaN for a marker that is missing in training; and how many numbers
         it has.
     """
-    middle = train.inputs.mean(axis=0)
-    size = np.where(np.ptp(train.inputs, axis=0) > 0, np.ptp(train.inputs, axis=0), 1.0)
-
-    def features(inputs: Array) -> Array:
-        x = (inputs - middle) / size
-        j, k = np.triu_indices(x.shape[1])
-        return np.concatenate([x, x[:, j] * x[:, k]], axis=1)
-
+    middle, span = train.inputs.mean(axis=0), np.ptp(train.inputs, axis=0)
+    size = np.where(span > 0, span, 1.0)
+    seen, asked = (with_products((each.inputs - middle) / size) for each in (train, test))
     places = np.full((len(test), test.markers, 3), np.nan)
     for marker in range(test.markers):
         known = np.isfinite(train.places[:, marker]).all(axis=1)
         if known.sum() > 1:
-            law = ridge(features(train.inputs[known]), train.places[known, marker])
-            places[:, marker] = law(features(test.inputs))
-    count = 1 + features(train.inputs[:1]).shape[1]
-    return places, 3 * train.markers * count
+            places[:, marker] = _ridge(seen[known], train.places[known, marker], asked)
+    return places, 3 * train.markers * (1 + seen.shape[1])
 
 
 def constant_curvature(

@@ -10,8 +10,6 @@ import numpy as np
 from softreach.calibration.measurements import Measurements
 from softreach.support.arrays import Array, Mask
 
-__all__ = ["PlacementErrors", "Repeatability", "Verdict", "judged", "misses", "repeatability"]
-
 _NEAR = (0.05, 0.1)  # distances of inputs, over their ranges, within which two samples are near
 _FEW = 8
 _NOISE = 1.5  # held-out error over what the data repeats, up to which noise is all
@@ -193,8 +191,7 @@ def _explained(data: Measurements, residuals: Array) -> tuple[float, float]:
     change = -np.diff(x, axis=0, prepend=x[:1])
     before = np.concatenate([change, np.tanh(change / 0.1)], axis=1)[known]
     x, target = x[known], flat[known]
-    j, k = np.triu_indices(x.shape[1])
-    plain = np.concatenate([x, x[:, j] * x[:, k]], axis=1)
+    plain = with_products(x)
     some = np.random.default_rng(0).permutation(len(x))[:_BELLS]
     square = ((x[:, None] - x[some]) ** 2).mean(axis=2)
     laws = [plain, *(np.concatenate([plain, np.exp(-0.5 * square / w**2)], 1) for w in _WIDTHS)]
@@ -208,6 +205,12 @@ def _explained(data: Measurements, residuals: Array) -> tuple[float, float]:
         return min(1.0, float(gain.sum()) / total) if sure and total > 0 else 0.0
 
     return share(alone, _left(np.zeros((len(x), 1)), target)), share(wide, alone)
+
+
+def with_products(x: Array) -> Array:
+    """Columns, their squares and products, shape (n, column)."""
+    j, k = np.triu_indices(x.shape[1])
+    return np.concatenate([x, x[:, j] * x[:, k]], axis=1)
 
 
 def _left(features: Array, target: Array) -> Array:

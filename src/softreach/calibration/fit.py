@@ -106,8 +106,7 @@ def _miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
 class _Order(NamedTuple):
     """Columns of inputs and of coordinates in another order, and the error in the middle then."""
 
-    text: str
-    """What is exchanged."""
+    text: str  # What is exchanged
     inputs: NDArray[np.intp]
     columns: NDArray[np.intp]
     miss: float = np.inf

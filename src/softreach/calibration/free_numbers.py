@@ -29,8 +29,7 @@ from softreach.support.errors import InvalidDesign, InvalidInput, Range
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
 
-_PLACES = ("station", "start", "end")
-"""Numbers in m that lie on the arm."""
+_PLACES = ("station", "start", "end")  # Numbers in m that lie on the arm
 _UNFIT = re.compile(r"(.*\.)?(lower|upper)(\[\d+\])?|base\..*|loads\.(follower|tip_moment).*")
 """Numbers that no wildcard frees: bounds, what the pose frees, loads without a derivative."""
 _UNSEEN = 1e-12  # angle by which an arm that counts as bent is bent at least [rad]
@@ -43,18 +42,12 @@ _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 1
 class FreeNumber:
     """A number that a fit may change."""
 
-    name: str
-    """Path of a parameter, one of the six of the pose, or paths tied by "="."""
-    unit: str
-    """SI unit; "1" for none."""
-    start: float
-    """Value of the design."""
-    range: Range
-    """Values that it may have."""
-    scale: float
-    """A change that matters."""
-    prior: tuple[float, float] | None = None
-    """Mean and width of what is known before."""
+    name: str  # Path of a parameter, one of the six of the pose, or paths tied by "="
+    unit: str  # SI unit; "1" for none
+    start: float  # Value of the design
+    range: Range  # Values that it may have
+    scale: float  # A change that matters
+    prior: tuple[float, float] | None = None  # Mean and width of what is known before
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_text
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import (
     InvalidInput,
     NotPossible,
@@ -158,8 +158,8 @@ def read_measurements(
     run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
     triples = _triples([name for name in columns if name not in (run, order)])
     chosen = _chosen_markers(arm, triples, starts_of)
-    taken = {run, order, *(name for triple in triples.values() for name in triple)}
-    sources = _input_columns(arm, [name for name in columns if name not in taken], columns_of)
+    used = {run, order, *(name for triple in triples.values() for name in triple)}
+    sources = _input_columns(arm, [name for name in columns if name not in used], columns_of)
     values = _inputs(table, sources, arm.input_units)
     places = _places(table, {name: triples[start] for name, start in chosen.items()})
     seen = np.asarray(np.isfinite(places).any(axis=(0, 2)))
@@ -170,6 +170,9 @@ def read_measurements(
     _refuse_inputs(arm, values, sources)
     every = np.full(len(table), "all") if run is None else table[run].to_numpy(object)
     run_names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
+    taken = np.arange(len(table))
+    if order is not None and table[order].dtype.kind in "iuf":  # names of samples say nothing
+        taken = np.lexsort((_numbers(table, order), begins[runs])).astype(np.intp)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
         inputs=values,
@@ -178,7 +181,7 @@ def read_measurements(
         marker_names=tuple(chosen),
         runs=runs,
         run_names=tuple(run_names.tolist()),
-        order=_order(table, begins[runs], order),
+        order=taken,
         rows=np.arange(len(values)),
         source=source,
         digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
@@ -441,10 +444,3 @@ def _numbers(table: pd.DataFrame, column: str) -> Array:
     if (rows := np.flatnonzero(np.isinf(values))).size:
         raise InvalidInput(f"{column} in row {rows[0]}", values[rows[0]], "a finite number")
     return values
-
-
-def _order(table: pd.DataFrame, begins: Index, order: str | None) -> NDArray[np.intp]:
-    """Samples in the order in which they were taken: run by run, as the file has them."""
-    if order is None or table[order].dtype.kind not in "iuf":  # names of samples say nothing
-        return np.arange(len(table))
-    return np.lexsort((_numbers(table, order), begins)).astype(np.intp)

@@ -43,19 +43,15 @@ _TOL = 1e-6
 _STEPS = 24
 _BODY = ("profile", "section", "actuators", "loads", "rest", "stations", "rigid_pieces", "markers")
 """Parts of an arm that are more than its drives and the pose of its base."""
-_ENDS = ("start", "end", "stations.")
-"""In names of numbers that move ends of actuators."""
+_ENDS = ("start", "end", "stations.")  # In names of numbers that move ends of actuators
 
 
 class Prediction(NamedTuple):
     """Predicted places of the markers of all samples."""
 
-    places: Array
-    """In the world [m], NaN without an equilibrium, shape (n, marker, 3)."""
-    slopes: Array | None
-    """Derivatives by the free numbers, shape (n, marker, 3, number)."""
-    status: NDArray[np.int8]
-    """`TipStatus`, shape (n,)."""
+    places: Array  # In the world [m], NaN without an equilibrium, shape (n, marker, 3)
+    slopes: Array | None  # Derivatives by the free numbers, shape (n, marker, 3, number)
+    status: NDArray[np.int8]  # `TipStatus`, shape (n,)
 
 
 class _Explicit(NamedTuple):
@@ -65,14 +61,12 @@ class _Explicit(NamedTuple):
     rotation: Array
     position: Array
     offsets: Array
-    bundles: Array
-    """Activations of all bundles, displacements among them, (n, bundle)."""
+    bundles: Array  # Activations of all bundles, displacements among them, (n, bundle)
     taut_from: Array
     compliance: Array
     measures: Array
     """M and N of tendons that are driven by length at the nodes, (step, 3, 4, tendon)."""
-    rest: Array
-    """û at rest at the nodes, (step, 3, 3)."""
+    rest: Array  # û at rest at the nodes, (step, 3, 3)
 
 
 def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
@@ -96,10 +90,8 @@ class MarkerModel:
     """Markers of an arm as functions of its free numbers, at given inputs."""
 
     free: FreeNumbers
-    inputs: Array
-    """Shape (n, input)."""
-    markers: NDArray[np.intp]
-    """Those of the arm's markers that were measured."""
+    inputs: Array  # Shape (n, input)
+    markers: NDArray[np.intp]  # Those of the arm's markers that were measured
 
     @property
     def names(self) -> tuple[str, ...]:

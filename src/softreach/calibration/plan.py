@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,14 @@ from softreach.calibration.measurements import marker_names
 from softreach.calibration.model import MarkerModel, marker_places
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
+from softreach.schema import provenance
 from softreach.support.arguments import as_integer, as_names, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, NotPossible, Range, did_you_mean
 from softreach.support.files.text import write_table
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CORNERS = 10  # free inputs up to which all corners of their box are candidates
 _APART = 0.5  # distance of two poses in the box at least, over the mean distance of so many points
@@ -71,6 +75,31 @@ class PosePlan:
         inverse = np.linalg.inv(self.information * np.outer(scale, scale))
         widths = noise * scale * np.sqrt(np.diag(inverse))
         return dict(zip(self.names, widths.tolist(), strict=True))
+
+    def to_dataset(self, noise: float = 1e-3) -> xr.Dataset:
+        """Activations over `pose`; values, standard deviations to expect and JᵀJ over `number`.
+
+        Args:
+            noise: As for `sigma`.
+        """
+        import xarray as xr
+
+        arm, numbers = self.free.arm, self.free.numbers
+        values = {
+            "activation": (("pose", "input"), self.activations),
+            "value": ("number", self.free.start),
+            "sigma": ("number", list(self.sigma(noise).values())),
+            "information": (("number", "other"), self.information),
+        }
+        names = {
+            "number": list(self.names),
+            "other": list(self.names),
+            "unit": ("number", [number.unit for number in numbers]),
+            "input": list(arm.input_names),
+            "input_unit": ("input", list(arm.input_units)),
+        }
+        about = {**provenance(arm), "noise": noise, "markers": ", ".join(self.markers)}
+        return xr.Dataset(values, names, about)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a CSV to fill in: a column for each input, and empty ones for the markers.

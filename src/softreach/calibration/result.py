@@ -106,6 +106,11 @@ class Calibration(Reported):
         """Their standard deviations."""
         return dict(zip(self.names, self.uncertainty.sigma.tolist(), strict=True))
 
+    @property
+    def _judged(self) -> Mask:
+        """Samples by which the fit is judged: those held out, or all if none is."""
+        return self.held if self.held.any() else ~self.held
+
     @cached_property
     def residuals(self) -> Array:
         """Predicted minus measured places of all samples [m], (n, marker, 3)."""
@@ -124,9 +129,8 @@ class Calibration(Reported):
     @property
     def by_marker(self) -> dict[str, PlacementErrors]:
         """Errors of each marker: of held-out samples, or of all if none is held out."""
-        rows = self.held if self.held.any() else ~self.held
         each = enumerate(self.data.marker_names)
-        return {name: misses(self.residuals[rows, k]) for k, name in each}
+        return {name: misses(self.residuals[self._judged, k]) for k, name in each}
 
     @cached_property
     def before(self) -> PlacementErrors:
@@ -136,9 +140,8 @@ class Calibration(Reported):
         """
         train = self.data.of(~self.held)
         free = started(MarkerModel.of(free_numbers(self.start, ["pose"]), train), train.places)
-        judged = self.data.of(self.held) if self.held.any() else train
-        model = MarkerModel.of(free, judged)
-        return misses(model.of_arm(free.made(free.start)).places - judged.places)
+        data = self.data.of(self._judged)
+        return misses(MarkerModel.of(free, data).of_arm(free.made(free.start)).places - data.places)
 
     @cached_property
     def repeatability(self) -> Repeatability:
@@ -273,7 +276,7 @@ class Calibration(Reported):
             "data_sha256": self.data.digest,
             "samples": f"{len(self.data)}, of which {int(self.held.sum())} held out",
             "free": ", ".join(self.names),
-            "error": (self.held_out if self.held.any() else self.train).text(self.arm.length),
+            "error": misses(self.residuals[self._judged]).text(self.arm.length),
             "verdict": self.verdict.sentence,
         }
 
@@ -361,7 +364,7 @@ class Calibration(Reported):
                 Section(
                     title="Errors",
                     head=(shown.label("error of places"), "samples", *_ERRORS),
-                    rows=[_error_cells(row, shown, arm.length) for row in self.errors],
+                    rows=list(_error_rows(self, shown)),
                     note="Distances between measured and predicted places of the markers. Samples "
                     "that are held out were not seen by any fit.",
                     points=list(_remarks(self, shown)),
@@ -389,11 +392,11 @@ def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, s
         yield number.name, text, f"{pose.get(number.name, number.start) / size:.4g}"
 
 
-def _error_cells(row: ErrorRow, unit: LengthUnit, length: float) -> tuple[str, ...]:
-    law, samples, errors = row
-    texts = [f"{value / unit.size:.3g}" for value in (errors.rms, errors.median, errors.most)]
-    texts.append(f"{100 * errors.rms / length:.2g} %")
-    return law, samples, *(texts if errors.number else "----")
+def _error_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, ...]]:
+    for law, samples, errors in result.errors:
+        texts = [f"{value / unit.size:.3g}" for value in (errors.rms, errors.median, errors.most)]
+        texts.append(f"{100 * errors.rms / result.arm.length:.2g} %")
+        yield law, samples, *(texts if errors.number else "----")
 
 
 def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,10 +16,11 @@ from softreach.support.errors import InvalidInput
 from softreach.support.units import TYPED, read_length
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.written import Written
     from softreach.calibration import Calibration, PlacementErrors
-    from softreach.calibration.free_numbers import FreeNumber
     from softreach.support.units import LengthUnit
 
 _COLUMNS = Group("Column names", sort_key=1)
@@ -31,7 +32,6 @@ Free = Annotated[
         "the base. May be repeated.",
     ),
 ]
-_POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 
 
 def calibrate(
@@ -132,15 +132,11 @@ def _noise(text: str) -> float:
 def _record(result: Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
     fit, held = result.fit, result.held
-    rows = zip(fit.free.numbers, result.values.values(), fit.at_bound.tolist(), strict=True)
     return {
         "samples": len(result.data),
         "held_out": int(held.sum()),
         "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
-        "numbers": [
-            _number(number, result.sigma, value) | {"at_bound": at_bound}
-            for number, value, at_bound in rows
-        ],
+        "numbers": _numbers(result.to_dataset()),
         "errors": [
             {"law": row.law, "samples": row.samples, **_errors(row.errors)} for row in result.errors
         ],
@@ -157,10 +153,18 @@ def _record(result: Calibration) -> dict[str, Any]:
     }
 
 
-def _number(number: FreeNumber, sigma: Mapping[str, float], value: float) -> dict[str, Any]:
-    read, unit = as_read(value, number.unit)
-    start, width = (as_read(x, number.unit)[0] for x in (number.start, sigma[number.name]))
-    return {"number": number.name, "value": read, "sigma": width, "start": start, "unit": unit}
+def _numbers(found: xr.Dataset) -> list[dict[str, Any]]:
+    records = []
+    for k, unit in enumerate(found["unit"].values.tolist()):
+        record: dict[str, Any] = {"number": str(found["number"].values[k])}
+        for name in ("value", "sigma", "start"):
+            values = found[name if name in found else "value"].values
+            record[name], read_in = as_read(values[k], unit)
+        record["unit"] = read_in
+        if "at_bound" in found:
+            record["at_bound"] = bool(found["at_bound"].values[k])
+        records.append(record)
+    return records
 
 
 def _errors(errors: PlacementErrors) -> dict[str, float]:
@@ -215,35 +219,31 @@ def plan_poses(
         candidates=candidates,
         seed=seed,
     )
-    sigma = plan.sigma(width)
+    found = plan.to_dataset(width)
     if json:
-        numbers = [_number(number, sigma, number.start) for number in plan.free.numbers]
-        names = arm.input_names
-        found = {"noise_m": width, "inputs": names, "poses": plan.activations, "numbers": numbers}
-        console.json(found)
+        poses = {"inputs": found["input"].values, "poses": found["activation"].values}
+        console.json({"noise_m": width, **poses, "numbers": _numbers(found)})
     else:
         seen = ", ".join(plan.markers)
         console.line(
             f"{n} poses of {design} with {seen}, "
             f"noise {arm.length_unit.rounded(width, digits='.6g')}"
         )
-        rows = _rows(plan.free.numbers, sigma.values(), arm.length_unit)
-        for line in columns([("number", "to be known", "share"), *rows]):
+        for line in columns([("number", "to be known", "share"), *_rows(found, arm.length_unit)]):
             console.line(f"  {line}")
     if out is not None:
         plan.save(out, overwrite=overwrite)
 
 
-def _rows(
-    numbers: Iterable[FreeNumber], sigma: Iterable[float], unit: LengthUnit
-) -> Iterator[tuple[str, str, str]]:
+def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     from softreach.support.quantity import quantity
     from softreach.support.units import readable_unit
 
-    for number, width in zip(numbers, sigma, strict=True):
-        name, size = readable_unit(number.unit, number.start, unit)
-        share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
-        yield number.name, quantity(number.start / size, name, width / size, digits=2), share
+    names = ("number", "unit", "value", "sigma")
+    for name, own, value, width in zip(*(found[k].values.tolist() for k in names), strict=True):
+        shown, size = readable_unit(own, value, unit)
+        share = f"{100 * width / abs(value):.2g} %" if value else "-"
+        yield name, quantity(value / size, shown, width / size, digits=2), share
 
 
 def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
@@ -262,12 +262,13 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
         InvalidInput: Text that is anything else, or no such number.
     """
     from softreach.arm.written import Written
+    from softreach.calibration.free_numbers import POSE
 
     names, result = Written.of(arm), {}
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
     for name, text in pairs_in("prior", texts, allowed).items():
         first = name.split("=")[0].strip()
-        unit = None if first not in _POSE else "m" if _POSE.index(first) < 3 else "rad"
+        unit = None if first not in POSE else "m" if POSE.index(first) < 3 else "rad"
         if unit is None and first not in names.by_key:
             raise InvalidInput("prior", name, "of a number that is free, by its full name")
         try:

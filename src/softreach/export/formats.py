@@ -78,7 +78,14 @@ def write_ply(
         for name, values in columns.items():
             rows[name] = values
         if number == 0:
-            file.write(_ply_header(count, rows.dtype, description, faces))
+            header = ["ply", "format binary_little_endian 1.0"]
+            for key, value in description.items():
+                header += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
+            header.append(f"element vertex {count}")
+            header += [f"property {_TYPES[kind.str[1:]]} {name}" for name, kind in fields]
+            if faces is not None:
+                header += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
+            file.write("\n".join([*header, "end_header", ""]).encode("ascii"))
         file.write(rows.data)
     if faces is not None:
         triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
@@ -99,22 +106,6 @@ def load_library(module: str) -> Any:
         if error.name is None or error.name.partition(".")[0] != library:
             raise
         raise MissingExtra((library, "export")) from error
-
-
-def _ply_header(
-    count: int,
-    fields: np.dtype[np.void],
-    description: Mapping[str, object],
-    faces: NDArray[np.integer] | None,
-) -> bytes:
-    lines = ["ply", "format binary_little_endian 1.0"]
-    for key, value in description.items():
-        lines += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
-    lines.append(f"element vertex {count}")
-    lines += [f"property {_TYPES[fields[name].str[1:]]} {name}" for name in fields.names or ()]
-    if faces is not None:
-        lines += [f"element face {len(faces)}", "property list uchar int vertex_indices"]
-    return "\n".join([*lines, "end_header", ""]).encode("ascii")
 
 
 def _ascii(text: str) -> str:

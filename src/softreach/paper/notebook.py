@@ -13,8 +13,7 @@ from typing import Any, NamedTuple, Self
 from softreach.plot.style import pyplot, save_figure
 from softreach.support.files.atomic import writing
 
-Numbers = SimpleNamespace
-"""Numbers that a section computed, by name."""
+Numbers = SimpleNamespace  # Numbers that a section computed, by name
 
 
 class Verdict(StrEnum):
@@ -58,8 +57,7 @@ class Settings:
 FULL = Settings(16, 400_000, 0.05, 7, 3e-3, 2_000_000, 10_000)
 """The sizes that the paper states (sections 3 and 5)."""
 
-QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)
-"""Coarse numbers in under a minute."""
+QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)  # Coarse numbers in under a minute
 
 
 class Picture(NamedTuple):
@@ -95,7 +93,7 @@ class Notebook:
         """Write what was found."""
         self.seconds = seconds
         content = {name: value for name, value in vars(self).items() if name != "folder"}
-        with writing(self._file, overwrite=True) as file:
+        with writing(self.folder / f"{self.part}.json", overwrite=True) as file:
             file.write(json.dumps(content, indent=1).encode())
 
     @classmethod
@@ -112,7 +110,3 @@ class Notebook:
     def png(self, picture: Picture) -> Path:
         """The file of a picture."""
         return self.folder / f"{picture.name}.png"
-
-    @property
-    def _file(self) -> Path:
-        return self.folder / f"{self.part}.json"

@@ -10,14 +10,14 @@ import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 from softreach.paper.notebook import FULL, QUICK, Finding, Notebook, Numbers, Settings, Verdict
 from softreach.paper.sections import misprints, model, redundancy, sweep, uniqueness, volume
@@ -26,8 +26,6 @@ from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import MARK, check_place, writing
 from softreach.support.files.formats import check_installed
 from softreach.support.report import Report, Section
-
-__all__ = ["CLAIMS", "PARTS", "Claim", "reproduce_paper"]
 
 _SECTIONS = {
     "model": model,
@@ -44,30 +42,23 @@ PARTS: dict[str, Callable[[Settings, Notebook], dict[str, Any]]] = {
 """Name -> what draws its figures and returns its numbers; short ones first."""
 
 
-@dataclass(frozen=True)
-class Claim:
+class Claim(NamedTuple):
     """A statement of the paper and its check."""
 
+    part: str  # The part of the report that computes the numbers
+    judge: str  # Function of this part that judges them
     section: str  # Its section of the paper
     says: str  # The statement, in the paper's words or nearly so
     how: str  # How it is checked
-    part: str  # The part of the report that computes the numbers
-    judge: Callable[[Numbers], Finding]
     full: bool = False  # True if only the full sizes test it
 
     def check(self, numbers: Mapping[str, Any]) -> Finding:
         """Finding from the numbers of its part."""
-        return self.judge(Numbers(**numbers))
+        return getattr(_SECTIONS[self.part], self.judge)(Numbers(**numbers))
 
 
-def _claims() -> Iterator[Claim]:
-    text = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
-    for name, row in tomllib.loads(text).items():
-        part, function = name.split(".")
-        yield Claim(**row, part=part, judge=getattr(_SECTIONS[part], function))
-
-
-CLAIMS = tuple(_claims())
+_TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
+CLAIMS = tuple(Claim(*name.split("."), **row) for name, row in tomllib.loads(_TEXT).items())
 """Every statement that is checked, in the paper's order."""
 
 _PAPER = (
@@ -139,7 +130,11 @@ def _claim(pages: Path, key: Mapping[str, Any], *, overwrite: bool) -> None:
 
 
 def _report(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) -> Report:
-    rows = list(_rows(notebooks, quick))
+    rows = list[tuple[str, ...]]()
+    for claim in CLAIMS:
+        text, verdict = claim.check(notebooks[claim.part].numbers)
+        verdict = Verdict.UNTESTED if quick and claim.full else verdict
+        rows.append((claim.section, claim.says, text, claim.how, verdict))
     counts = Counter(row[-1] for row in rows)
     facts = [
         _PAPER,
@@ -168,13 +163,6 @@ def _report(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) 
             Section(title="Run times", head=("Part", "Time"), rows=times, note=note),
         ],
     )
-
-
-def _rows(notebooks: Mapping[str, Notebook], quick: bool) -> Iterator[tuple[str, ...]]:
-    for claim in CLAIMS:
-        text, verdict = claim.check(notebooks[claim.part].numbers)
-        verdict = Verdict.UNTESTED if quick and claim.full else verdict
-        yield claim.section, claim.says, text, claim.how, verdict
 
 
 def _figures(notebooks: Mapping[str, Notebook]) -> Iterator[tuple[bytes, str]]:

@@ -116,8 +116,7 @@ def _write(file: BufferedWriter, values: Array) -> None:
         file.write("".join(",".join(map(repr, row)) + "\n" for row in rows).encode("ascii"))
 
 
-CLOUD_PAIR: Formats = {".csv": FileFormat()}
-"""Format of `write_cloud`."""
+CLOUD_PAIR: Formats = {".csv": FileFormat()}  # Format of `write_cloud`
 
 
 def _table(path: Path, columns: int, meaning: str) -> Array:

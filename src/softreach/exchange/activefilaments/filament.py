@@ -21,8 +21,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.text import write_text
 
-FILAMENT_SCRIPT: Formats = {".jl": FileFormat()}
-"""Format of `write_design`."""
+FILAMENT_SCRIPT: Formats = {".jl": FileFormat()}  # Format of `write_design`
 
 Bounds = tuple[tuple[float, float], ...]
 
@@ -70,26 +69,26 @@ class Filament:
 
     def to_columns(self, activation: Array) -> Array:
         """Their activations from those of the arm, shape (sample, bundle) to (sample, column)."""
-        return np.concatenate(
-            [
-                activation[:, list(ring.bundles)] * ring.scale
-                if ring.bundles
-                else np.zeros((len(activation), len(ring.bounds)))
-                for ring in self.rings
-            ],
-            axis=1,
-        )
+        columns = np.zeros((len(activation), self.columns))
+        for ring, places in self._places():
+            columns[:, places] = activation[:, list(ring.bundles)] * ring.scale
+        return columns
 
     def from_columns(self, columns: Array) -> Array:
         """Activations of the arm from theirs, shape (sample, column) to (sample, bundle)."""
         activation = np.zeros((len(columns), sum(len(ring.bundles) for ring in self.rings)))
+        for ring, places in self._places():
+            activation[:, list(ring.bundles)] = columns[:, places] / ring.scale
+        return activation
+
+    def _places(self) -> Iterator[tuple[FilamentRing, slice]]:
+        """Rings with fibers, and the columns of each."""
         first = 0
         for ring in self.rings:
             last = first + len(ring.bounds)
             if ring.bundles:
-                activation[:, list(ring.bundles)] = columns[:, first:last] / ring.scale
+                yield ring, slice(first, last)
             first = last
-        return activation
 
 
 def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -115,8 +114,27 @@ def design_script(arm: Manipulator) -> str:
         InvalidInput: As `write_design`.
     """
     filament = filament_of(a_manipulator("arm", arm))
-    lines = [_HEAD, *_definition(filament), "", *_activation(filament.rings)]
-    return "\n".join(lines) + "\n"
+    rings, activations, bounds = [], [], []
+    for ring in filament.rings:
+        mechanics = _mechanics(ring.young_modulus, ring.poisson_ratio)
+        fibers = f"FiberArchitecture({_angle(ring.angle, filament.length)})"
+        name = "".join(letter if letter.isprintable() else " " for letter in ring.name).strip()
+        scale = f"γ is {ring.scale:g} times that of softreach" if ring.scale != 1 else ""
+        comment = "; ".join(filter(None, (name, scale)))
+        rings.append(f"    Ring({mechanics}, Geometry{ring.radii}, {fibers}),")
+        rings[-1] += f"  # {comment}" if comment else ""
+        lows, highs = (_vector(side) for side in zip(*ring.bounds, strict=True))
+        sectors = f"{len(ring.bounds)}, {lows}, {ring.extent!r}, {ring.offset!r}"
+        activations.append(f"    ActivationPiecewiseGamma({sectors}),")
+        bounds.append(f"    ({lows}, {highs}),")
+    inside = _mechanics(filament.core_modulus, filament.core_poisson_ratio)
+    tube = f"InnerTube({inside}, Geometry(0.0, {filament.rings[0].radii[0]!r}))"
+    values = {"L": filament.length, "phi2": filament.taper, "ρvol": filament.density}
+    options = ", ".join(f"{name} = {x!r}" for name, x in values.items() if x is not None)
+    lines = [_HEAD, "rings = [", *rings, "]", f"innerTube = {tube}"]
+    lines += [f"filament = AFilament(rings; {options}, innerTube = innerTube)", ""]
+    lines += ["activation = [", *activations, "]", "γBounds = [", *bounds, "]", ""]
+    return "\n".join(lines)
 
 
 def filament_of(arm: Manipulator) -> Filament:
@@ -134,11 +152,17 @@ def filament_of(arm: Manipulator) -> Filament:
     assert isinstance(arm.profile, LinearTaper)
     core, layers = arm.section.core_material, arm.section.layers
     is_dense = all(layer.material.density is not None for layer in layers)
+    rings = list(_rings(arm))
+    orders = rings, sorted(rings, key=lambda ring: ring.radii[::-1])
+    right = [each for each in orders if is_from_inside_out([ring.radii for ring in each])]
+    if not right:
+        allowed = f"{_THERE} such that the innermost one is not the outermost of several"
+        raise InvalidInput("radii of the rings", [ring.radii for ring in rings], allowed)
     return Filament(
         length=arm.length,
         taper=arm.profile.taper,
         density=float(arm.section.mass_per_length(1.0)) / math.pi if is_dense else None,
-        rings=_ordered(list(_rings(arm))),
+        rings=right[0],
         core_modulus=_modulus(core),
         core_poisson_ratio=core.poisson_ratio,
     )
@@ -148,16 +172,6 @@ def is_from_inside_out(radii: Sequence[tuple[float, float]]) -> bool:
     """True if the first ring is the innermost and the last the outermost, as AFilament takes it."""
     inner, outer = zip(*radii, strict=True)
     return inner[0] == min(inner) and outer[-1] == max(outer)
-
-
-def _ordered(rings: list[FilamentRing]) -> Sequence[FilamentRing]:
-    """As they are, if the first is innermost and the last outermost; else sorted to be so."""
-    for order in rings, sorted(rings, key=lambda ring: ring.radii[::-1]):
-        if is_from_inside_out([ring.radii for ring in order]):
-            return order
-    spans = [ring.radii for ring in rings]
-    allowed = f"{_THERE} such that the innermost one is not the outermost of several"
-    raise InvalidInput("radii of the rings", spans, allowed)
 
 
 def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
@@ -225,39 +239,6 @@ def _faults(arm: Manipulator) -> Iterator[tuple[str, object, str]]:
         if isinstance(angle, AlongArm) and (taper != 0 or not isinstance(angle, Pieces)):
             name, kind = f"helical_angle of {actuator.name}", type(angle).__name__
             yield name, kind, "constant, or Pieces on an arm without taper,"
-
-
-def _definition(filament: Filament) -> Iterator[str]:
-    yield "rings = ["
-    for ring in filament.rings:
-        mechanics = _mechanics(ring.young_modulus, ring.poisson_ratio)
-        fibers = f"FiberArchitecture({_angle(ring.angle, filament.length)})"
-        yield f"    Ring({mechanics}, Geometry{ring.radii}, {fibers}),{_comment(ring)}"
-    yield "]"
-    inside = _mechanics(filament.core_modulus, filament.core_poisson_ratio)
-    yield f"innerTube = InnerTube({inside}, Geometry(0.0, {filament.rings[0].radii[0]!r}))"
-    values = {"L": filament.length, "phi2": filament.taper, "ρvol": filament.density}
-    options = [f"{name} = {value!r}" for name, value in values.items() if value is not None]
-    yield f"filament = AFilament(rings; {', '.join(options)}, innerTube = innerTube)"
-
-
-def _activation(rings: Sequence[FilamentRing]) -> Iterator[str]:
-    sides = [[_vector(pair[side] for pair in ring.bounds) for side in (0, 1)] for ring in rings]
-    yield "activation = ["
-    for ring, (lows, _) in zip(rings, sides, strict=True):
-        sectors = f"{len(ring.bounds)}, {lows}, {ring.extent!r}, {ring.offset!r}"
-        yield f"    ActivationPiecewiseGamma({sectors}),"
-    yield "]"
-    yield "γBounds = ["
-    yield from (f"    ({lows}, {highs})," for lows, highs in sides)
-    yield "]"
-
-
-def _comment(ring: FilamentRing) -> str:
-    name = "".join(character if character.isprintable() else " " for character in ring.name)
-    scale = f"γ is {ring.scale:g} times that of softreach" if ring.scale != 1 else ""
-    comment = "; ".join(part for part in (name.strip(), scale) if part)
-    return f"  # {comment}" if comment else ""
 
 
 def _mechanics(modulus: float, poisson_ratio: float) -> str:

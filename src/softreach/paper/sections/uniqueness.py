@@ -49,12 +49,16 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
 
 
 def unique(n: Numbers) -> Finding:
-    share = np.array(n.share, float)
+    share, example = np.array(n.share, float), "No place with two activations was found"
+    if len(n.activations) > 1:
+        rows = [", ".join(f"{g:.3f}" for g in row) for row in n.activations]
+        tip = ", ".join(f"{x:.3f}" for x in n.tip)
+        example = f"In the latter design γ = ({'); ('.join(rows)}) all reach ({tip}) m"
     words = (
         f"{n.paper_share:.2%} of the volume is reached by more than one activation at Ω = 108°, "
         f"φ = 2°, up to {n.worst:.1%} at Ω = {n.revolution_deg:.4g}°, "
         f"φ = {n.taper_deg:.3g}°; less than 0.1 % in {int((share < 1e-3).sum())} of "
-        f"{share.size} designs. {_example(n)}"
+        f"{share.size} designs. {example}"
     )
     return judged(words, len(n.activations) < 2, n.worst < 0.1)
 
@@ -65,14 +69,6 @@ def dimension(n: Numbers) -> Finding:
         f"{n.curve:.3f} L (of the minimal design, in the order of its fibers)"
     )
     return judged(words, min(n.area, n.curve) > 1e-6)
-
-
-def _example(n: Numbers) -> str:
-    if len(n.activations) < 2:
-        return "No place with two activations was found"
-    rows = [", ".join(f"{g:.3f}" for g in row) for row in n.activations]
-    tip = ", ".join(f"{x:.3f}" for x in n.tip)
-    return f"In the latter design γ = ({'); ('.join(rows)}) all reach ({tip}) m"
 
 
 def _clearest_pair(reached: ReachableSet) -> tuple[Array, Array]:
