@@ -62,8 +62,6 @@ def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):
 def test_a_path_says_that_the_arm_snaps(tmp_path, capsys, monkeypatch):
     import xarray as xr
 
-    from softreach.inverse import path
-
     ended = xr.Dataset(
         {
             "activation": (("point", "bundle"), [[0.0, 0.0, 0.0], [np.nan] * 3]),
@@ -74,7 +72,7 @@ def test_a_path_says_that_the_arm_snaps(tmp_path, capsys, monkeypatch):
         },
         attrs={"end": "snaps", "end_bundle": "", "end_bound": ""},
     )
-    monkeypatch.setattr(path, "track_path", lambda *_: ended)
+    monkeypatch.setattr(sr, "track_path", lambda *_: ended)
     (tmp_path / "path.csv").write_text("x,y,z\n0,0,1\n0,0,0.5\n")
     out = tmp_path / "activations.csv"
     assert run(["track", "minimal_trunk", str(tmp_path / "path.csv"), "--out", str(out)]) == 0

@@ -12,7 +12,7 @@ from typing import Annotated, Any, cast
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
-import softreach
+import softreach as sr
 from softreach.cli.console import HelpConsole, console
 from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
@@ -64,7 +64,7 @@ Start with
 
     softreach reach minimal_trunk
 """,
-    version=lambda: softreach.__version__,
+    version=lambda: sr.__version__,
     exit_on_error=False,
     print_error=False,
     suppress_keyboard_interrupt=False,

@@ -8,19 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.values import Number, Whole, as_read, pairs_in, read_positive
+from softreach.support import progress
 from softreach.support.errors import InvalidInput
-from softreach.support.units import TYPED, read_length
+from softreach.support.files.formats import TABLES
+from softreach.support.files.text import write_table
+from softreach.support.quantity import columns, quantity
+from softreach.support.units import TYPED, LengthUnit, read_length, readable_unit
 
 if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
     from softreach.arm.written import Written
-    from softreach.calibration import Calibration, PlacementErrors
     from softreach.calibration.free_numbers import FreeNumber
-    from softreach.support.units import LengthUnit
 
 _COLUMNS = Group("Column names", sort_key=1)
 Free = Annotated[
@@ -84,11 +86,7 @@ def calibrate(
         report: Write a report with pictures to this .html file.
         table: Write what was predicted and missed to this .csv file.
     """
-    from softreach import calibration
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.support import progress
-    from softreach.support.files.formats import TABLES
-    from softreach.support.files.text import write_table
     from softreach.support.report import REPORT
 
     arm = design_from(design, changes, unit)
@@ -96,7 +94,7 @@ def calibrate(
     for path, formats in outputs or [(None, {})]:
         options.check_output(path, formats, overwrite)
     with progress.bar("fitting", None) as step:
-        result = calibration.calibrate(
+        result = sr.calibrate(
             arm,
             data,
             free=free_names(arm, free),
@@ -129,7 +127,7 @@ def _noise(text: str) -> float:
     return read_positive("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})")
 
 
-def _record(result: Calibration) -> dict[str, Any]:
+def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
     fit, held = result.fit, result.held
     rows = zip(fit.free.numbers, result.values.values(), fit.at_bound.tolist(), strict=True)
@@ -163,7 +161,7 @@ def _number(number: FreeNumber, sigma: Mapping[str, float], value: float) -> dic
     return {"number": number.name, "value": read, "sigma": width, "start": start, "unit": unit}
 
 
-def _errors(errors: PlacementErrors) -> dict[str, float]:
+def _errors(errors: sr.calibration.PlacementErrors) -> dict[str, float]:
     keys = ("median_m", "mean_m", "rms_m", "below_95_percent_m", "places")
     return dict(zip(keys, errors, strict=True))
 
@@ -200,14 +198,10 @@ def plan_poses(
         seed: Seed of candidates and of their order.
         out: Write the poses as a CSV file to fill in.
     """
-    from softreach import calibration
-    from softreach.support.files.formats import TABLES
-    from softreach.support.quantity import columns
-
     arm = design_from(design, changes, unit)
     width = _noise(noise)
     options.check_output(out, TABLES, overwrite)
-    plan = calibration.plan_poses(
+    plan = sr.calibration.plan_poses(
         arm,
         free_names(arm, free),
         n,
@@ -237,16 +231,13 @@ def plan_poses(
 def _rows(
     numbers: Iterable[FreeNumber], sigma: Iterable[float], unit: LengthUnit
 ) -> Iterator[tuple[str, str, str]]:
-    from softreach.support.quantity import quantity
-    from softreach.support.units import readable_unit
-
     for number, width in zip(numbers, sigma, strict=True):
         name, size = readable_unit(number.unit, number.start, unit)
         share = f"{100 * width / abs(number.start):.2g} %" if number.start else "-"
         yield number.name, quantity(number.start / size, name, width / size, digits=2), share
 
 
-def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
+def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
     from softreach.arm.written import Written
 
@@ -255,7 +246,7 @@ def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
     return [_tied(names, name) for name in given if name]
 
 
-def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Width, or mean and width, of numbers in their units by name, from NAME=MEAN:WIDTH.
 
     Raises:

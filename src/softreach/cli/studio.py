@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +14,9 @@ from softreach.cli.changes import design_from
 from softreach.cli.console import console
 from softreach.cli.options import OUTPUT, Overwrite, Unit, refuse
 from softreach.cli.values import Whole
+from softreach.support import progress
+from softreach.support.errors import counted
+from softreach.support.interruption import wait_for_signal
 from softreach.support.units import as_unit
 
 if TYPE_CHECKING:
@@ -59,12 +64,8 @@ def studio(
         _write_static(source, static, vary, unit, overwrite=overwrite)
         return
     refuse("without --static", vary=vary, unit=unit, overwrite=overwrite)
-    import warnings
-    import webbrowser
-
     from softreach.studio import Studio
     from softreach.studio.serve import is_local, new_token
-    from softreach.support.interruption import wait_for_signal
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
@@ -87,8 +88,6 @@ def _write_static(
     source: str, folder: Path, vary: list[str] | None, unit: str | None, *, overwrite: bool
 ) -> None:
     from softreach.studio.static import write_static
-    from softreach.support import progress
-    from softreach.support.errors import counted
 
     as_unit(unit or "m", 1.0)
     space = grid_of(design_from(source), vary or [])
