@@ -10,7 +10,7 @@ from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
 from softreach.cli.console import console
 from softreach.cli.values import Whole, activation_text, record
-from softreach.support.errors import NotPossible, counted
+from softreach.support.errors import NotPossible
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
 from softreach.support.units import LengthUnit
@@ -167,11 +167,13 @@ def equilibria(
     arm = design_from(design, changes, unit)
     result = sr.equilibria(arm, options.activation_of(activation, arm))
     if json:
-        fields = vars(result) | {"status": _statuses(result), "degree": result.degree}
+        status = [sr.rod.TipStatus(each) for each in result.status]
+        fields = vars(result) | {"status": status, "degree": result.degree}
         del fields["rod"], fields["solver"]
         console.json(record(fields, arm.length, "tips"))
     else:
-        _print_all(result, arm)
+        at = activation_text(arm, result.activation)
+        console.line(f"equilibria{f' at {at}' if at else ''}: {result}")
     if out is not None:
         look = {"view": view or "oblique", "unit": arm.length_unit}
         page = options.is_page(out)
@@ -179,18 +181,3 @@ def equilibria(
             sr.plot.plot_3d([result], **look) if page else sr.plot.plot_equilibria(result, **look)
         )
         options.save_picture(figure, out, overwrite)
-
-
-def _statuses(result: sr.rod.AllEquilibria) -> list[str]:
-    return [sr.rod.TipStatus(status).name.lower() for status in result.status]
-
-
-def _print_all(result: sr.rod.AllEquilibria, arm: sr.Manipulator) -> None:
-    at = activation_text(arm, result.activation)
-    count = counted(len(result), "solution")
-    console.line(f"equilibria{f' at {at}' if at else ''}: {count}, degree {result.degree}")
-    for k, status in enumerate(_statuses(result)):
-        kind = f"{status}, any way around" if result.is_ring[k] else status
-        which = ", the posture" if k == result.followed else ""
-        tip = arm.length_unit.place(result.tips[k])
-        console.line(f"  tip {tip}: {kind}, margin {result.margin[k]:.3g}{which}")
