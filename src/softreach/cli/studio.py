@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from softreach.cli.atlas import grid_of
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
-from softreach.cli.options import OUTPUT, Overwrite, Unit, refuse
+from softreach.cli.options import OUTPUT, Overwrite, Unit, is_stored, refuse
 from softreach.cli.values import Whole
 from softreach.support import progress
 from softreach.support.errors import counted
@@ -70,8 +70,8 @@ def studio(
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
     with_token = not is_local(host) if token is None else token
-    start = _start(source)
-    secret, work = new_token() if with_token else "", _work(start, source, fresh=fresh)
+    start, work = _begun(source, fresh=fresh)
+    secret = new_token() if with_token else ""
     with Studio(start, host, port, secret, work=work) as running:
         console.line(f"{running.url}  (Ctrl-C ends it)")
         for url in running.urls_for_others:
@@ -109,21 +109,16 @@ def _warning(*, with_token: bool) -> str:
     )
 
 
-def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
-    """Work that is kept; a state or a cloud that is opened is shown as it is in its file."""
-    from softreach.studio.start import work_on
+def _begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
+    """What is shown first, and the work that is kept; a state or a cloud is shown as it is."""
+    from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 
-    as_it_is = source.lower().endswith(".json") or start.reach is not None
-    if as_it_is:
-        refuse("on a state or a cloud, which is always shown as it is", fresh=fresh)
-    return work_on(start.state.design, goes_on=not fresh and not as_it_is)
-
-
-def _start(source: str) -> Start:
-    from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
-
-    if source.rstrip("/").endswith(".zarr"):
-        return start_on_cloud(source)
-    if source.lower().endswith(".json"):
-        return start_on_state(source)
-    return start_on_design(design_from(source))
+    if is_stored(source):
+        start = start_on_cloud(source)
+    elif source.lower().endswith(".json"):
+        start = start_on_state(source)
+    else:
+        start = start_on_design(design_from(source))
+        return start, work_on(start.state.design, goes_on=not fresh)
+    refuse("on a state or a cloud, which is always shown as it is", fresh=fresh)
+    return start, work_on(start.state.design, goes_on=False)
