@@ -45,7 +45,7 @@ REFUSED = {
     "atlas figures a.zarr --panels 0": "panels = 0: must be a whole number, 1 or more",
     f"studio {TRUNK} --port 80000": "port = 80000: must be 1 to 65535; leave it out",
     f"studio {TRUNK} --no-open --host=": "host = '': must be an address to listen on",
-    f"studio {TRUNK} --static a": "parameters = none: must be at least one of",
+    f"studio {TRUNK} --static a": "give a slider of the page with --vary",
     "desgin": 'Did you mean "design"',
     "design": "give a design file or a built-in design, or use --schema",
     "design nowhere.toml": "nowhere.toml: must be a file that exists",

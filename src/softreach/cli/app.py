@@ -1,7 +1,7 @@
 """The `softreach` command and what its exit codes mean.
 
-0 done, 1 a requirement is missed (`check`, `search`), 2 wrong input or nowhere to write, 141
-standard output was closed, 128 + signal.
+0 done, 1 a requirement is missed and 3 one is undecided (`check`, `search`), 2 wrong input or
+nowhere to write, 141 standard output was closed, 128 + signal.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ Example: softreach atlas build a.zarr --vary taper_deg=0:3:4
 
 Store = Annotated[str, Parameter(help="The atlas: a folder (.zarr) or a URL.")]
 Shard = Annotated[
-    str, Parameter(help="Only part i of k, i from 0, as i/k; all k may share the store.")
+    str, Parameter(help="Compute part i of k, written i/k, i from 0; all k may share the store.")
 ]
 
 

@@ -70,11 +70,12 @@ def calibrate(
     Args:
         data: Measured poses (.csv .parquet): a column for each input and x, y, z of each marker,
             with units in their names, such as tension1_N and tip_x_mm.
-        prior: What is known of a number beforehand, its width about the value of the design or
-            MEAN:WIDTH: taper=1deg, rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
+        prior: What is known of a free number beforehand: NAME=WIDTH about its value in the design,
+            as in taper=1deg, or NAME=MEAN:WIDTH, as in
+            rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
         hold_out: Fraction of samples held out at random.
-        noise: Standard deviation of a measured coordinate, against which priors are weighed: 0.2mm.
-            That of the residuals if left out.
+        noise: Standard deviation of a measured coordinate, which decides how much priors count:
+            0.2mm. Estimated from the residuals if left out.
         robust: Down-weight outliers.
         rivals: Fit constant curvature and a quadratic law beside it.
         seed: Seed of the held-out samples.
@@ -260,7 +261,7 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
         first = name.split("=")[0].strip()
         unit = None if first not in _POSE else "m" if _POSE.index(first) < 3 else "rad"
         if unit is None and first not in names.by_key:
-            raise InvalidInput("prior", name, "of a number that is free, by its full name")
+            raise InvalidInput("prior", name, "NAME=WIDTH with the full name of a free number")
         try:
             values = tuple(names.number(first, part, unit) for part in text.split(":"))
         except ValueError:

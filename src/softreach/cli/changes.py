@@ -39,7 +39,7 @@ class Changes:
         gravity: down, up, sideways, none, or x,y,z [m/s²]; default down if there are loads.
         tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5
         point: Marker that counts as the tip, such as that of a tool.
-        settings: PATH=VALUE of a parameter: taper=2deg. May be repeated.
+        settings: Value of any parameter, as in taper=2deg. May be repeated.
     """
 
     base: Signed = None
@@ -160,7 +160,7 @@ def _unchanged(text: str) -> sr.Manipulator:
         return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
     hint = did_you_mean(text, names)
     if suffix == ".json":
-        hint = f"softreach import {text} {text[:-5]}.toml makes one of a filament"
+        hint = f"if it is a filament: softreach import {text} {text[:-5]}.toml"
     allowed = f"a .toml file, or one of {', '.join(names)}"
     raise InvalidInput("design", text, allowed, hint)
 

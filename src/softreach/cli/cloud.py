@@ -159,8 +159,8 @@ def show(
     Example: softreach show trunk.zarr --activation -1,0,-0.5 --out trunk.pdf
 
     Args:
-        color: rgb (mixed lights: if left out, of up to three bundles), strongest (bundle: if left
-            out, of more), effort, the name of a bundle, or compliance: how far the tip yields.
+        color: rgb (up to three bundles), strongest (the bundle that acts most; more than three),
+            effort, the name of a bundle, or compliance (how far the tip yields).
         out: Picture file: .png .pdf .svg, or .html to turn
     """
     options.check_picture(out, overwrite, page=True)

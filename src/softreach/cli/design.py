@@ -31,8 +31,8 @@ def design(
 ) -> None:
     """Describe a design: angles, radii, stiffness, weight, warnings.
 
-    With --verbose it also says where the linear laws of the actuators end; --unit
-    with --out goes into the design file.
+    --verbose adds the limits of the linear laws of the actuators. With --out,
+    --unit is written into the design file.
 
     Example: softreach design minimal_trunk --taper-deg 3
 

@@ -49,7 +49,7 @@ Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or bu
 _ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
 Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]
 AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "--json")]
-_UNIT = "Unit of lengths: m, cm, mm or L; that of the design file, or a handy one, if left out."
+_UNIT = "Unit of lengths: m, cm, mm or L. If left out: that of the design file, else m or mm."
 Unit = Annotated[str | None, _output(_UNIT)]
 Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
@@ -126,14 +126,14 @@ def written_unit(arm: sr.Manipulator) -> LengthUnit:
     return METER if arm.display_unit is None else arm.length_unit
 
 
-def activation_of(text: str | None, arm: sr.Manipulator) -> list[float]:
+def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation") -> list[float]:
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.input_bounds[:, 0].tolist()
     values = numbers_in(text, arm.inputs)
     if values is None:
         allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
-        raise InvalidInput("activation", text, allowed)
+        raise InvalidInput(name, text, allowed)
     return values
 
 

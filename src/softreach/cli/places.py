@@ -44,7 +44,7 @@ def solve(
         target: Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.
         targets: CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.
         within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
-        family: With more than three free bundles: solutions for each target (1).
+        family: Number of solutions for each target of more than three free bundles (1).
     """
     from softreach.inverse.request import length_in, position_in
 
@@ -120,7 +120,7 @@ def track(
 
     arm = design_from(design, changes, unit)
     options.check_output(out, TABLES, overwrite)
-    first = None if start is None else options.activation_of(start, arm)
+    first = None if start is None else options.activation_of(start, arm, "start")
     tracked = sr.track_path(arm, options.points_in("path", path, arm), first)
     write_text(out, path_csv(tracked), overwrite=overwrite)
     followed = int((tracked.status == 0).sum())

@@ -14,7 +14,8 @@ from softreach.cli.console import console
 from softreach.cli.design import load_rows
 from softreach.cli.values import ERROR, Number, Rows, as_read, rows_of
 from softreach.support import progress
-from softreach.support.errors import NotPossible, counted
+from softreach.support.arguments import as_number
+from softreach.support.errors import NotPossible, Range, counted
 from softreach.support.files.formats import PAGES, PICTURES
 
 
@@ -135,6 +136,7 @@ def payload(
         out: Draw the curve: .png .pdf .svg
     """
     arm = design_from(design, changes, unit)
+    as_number("share", share, Range(0.0, 1.0, open_low=True, open_high=True))
     options.check_picture(out, overwrite)
     if arm.loads is None:
         raise NotPossible("this design has no loads; add --gravity down")

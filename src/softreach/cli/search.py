@@ -119,9 +119,9 @@ def search(
         choice: Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.
         maximize: Objectives to make large, comma-separated; softreach list objectives has them.
         minimize: Objectives to make small, comma-separated.
-        designs: Number of designs to look at: 200 if left out everywhere.
+        designs: Number of designs to look at: 200 if the file says nothing.
         seed: Seed of the search.
-        accuracy: Relative error of volumes: 3e-3 if left out everywhere.
+        accuracy: Relative error of volumes: 3e-3 if the file says nothing.
         sampler: auto, cma, tpe, nsga2, nsga3, sobol or random.
         polish: Improve designs by their derivatives.
         storage: Journal or SQLite file (.db) of all designs, to resume a search or to share it

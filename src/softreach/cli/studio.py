@@ -15,7 +15,7 @@ from softreach.cli.console import console
 from softreach.cli.options import OUTPUT, Overwrite, Unit, is_stored, refuse
 from softreach.cli.values import Whole
 from softreach.support import progress
-from softreach.support.errors import counted
+from softreach.support.errors import NotPossible, counted
 from softreach.support.interruption import wait_for_signal
 from softreach.support.units import as_unit
 
@@ -89,8 +89,10 @@ def _write_static(
 ) -> None:
     from softreach.studio.static import write_static
 
+    if not vary:
+        raise NotPossible("give a slider of the page with --vary, such as --vary taper_deg=0:3:8")
     as_unit(unit or "m", 1.0)
-    space = grid_of(design_from(source), vary or [])
+    space = grid_of(design_from(source), vary)
     with progress.bar("computing designs", space.size) as step:
         title = Path(source).stem
         written = write_static(

@@ -29,7 +29,7 @@ def warmup(*, only: str | None = None) -> int:
     Example: softreach warmup --only free
 
     Args:
-        only: free for what arms without loads need, loaded for the rest; both if left out.
+        only: free (kernels of arms without loads) or loaded (the others): both if left out.
     """
     from softreach.kernels.compiler import not_kept
 
