@@ -34,7 +34,7 @@ REFUSED = {
     "solve redundant_trunk --target 0,0,1 --family 0": "family = 0: must be a whole number",
     f"equilibria {TRUNK} --activation=-7,-7,-7": SHAPE,
     f"studio {TRUNK} --port 80000": "port = 80000: must be 1 to 65535; leave it out",
-    f"studio {TRUNK} --static a": "parameters = none: must be at least one of",
+    f"studio {TRUNK} --static a": "give a slider of the page with --vary",
     "desgin": 'Did you mean "design"',
     "design": "give a design file or a built-in design, or use --schema",
     "design elephant": "elephant: must be a .toml file, or one of elephant_trunk, filament",

@@ -396,7 +396,7 @@ def test_no_value_in_place_of_another_makes_the_reader_crash(data):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("name = 'Süd'".encode("latin-1"), "must be text in UTF-8, but byte 9 is none"),
+        ("name = 'Süd'".encode("latin-1"), "must be text in UTF-8, which byte 9 is not"),
         ("version = 2".encode("utf-16"), "must be text in UTF-8"),
         (bytes(range(256)), "must be"),
         ("version = 2".encode("utf-16-le"), "is NUL"),

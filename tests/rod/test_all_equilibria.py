@@ -257,7 +257,7 @@ def test_all_numbers_are_in_a_dataset():
     np.testing.assert_array_equal(data.tip, every.tips)
     assert data.attrs["degree"] == 1
     assert int(data.is_followed.values.argmax()) == every.followed
-    assert f"{len(every)}, of which 1 stable" in repr(every)
+    assert repr(every).startswith(f"{len(every)} solutions, of which 1 stable; degree 1\n")
 
 
 # Branches of equilibria are followed to the whole load, or to the fold at which they turn back

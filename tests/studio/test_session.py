@@ -10,7 +10,7 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.cli.studio import _start, _work
+from softreach.cli.studio import _begun
 from softreach.inverse import solve_inverse
 from softreach.rod.rods import as_tip_map
 from softreach.studio.reach import (
@@ -192,9 +192,8 @@ def home(tmp_path, monkeypatch):
 def test_the_command_goes_on_with_the_work_on_its_design_unless_it_is_to_begin_afresh(home):
     bent = STATE.replace(activation=(-0.5, 0.0, 0.0))
     work_on(TRUNK).keep(bent)
-    start = _start("minimal_trunk")
-    assert _work(start, "minimal_trunk", fresh=False).latest == bent
-    assert _work(start, "minimal_trunk", fresh=True).latest is None
+    for fresh, latest in ((False, bent), (True, None)):
+        assert _begun("minimal_trunk", fresh=fresh)[1].latest == latest
     assert home in next(home.rglob("latest.json")).parents
 
 
@@ -202,7 +201,7 @@ def test_a_state_that_is_opened_by_its_file_is_shown_as_it_is(home, tmp_path):
     work_on(TRUNK).keep(STATE.replace(activation=(-0.5, 0.0, 0.0)))
     file = tmp_path / "state.json"
     file.write_text(STATE.to_json())
-    assert _work(_start(str(file)), str(file), fresh=False).latest is None
+    assert _begun(str(file), fresh=False)[1].latest is None
 
 
 @pytest.mark.usefixtures("home")

@@ -1,7 +1,7 @@
 """The `softreach` command and what its exit codes mean.
 
-0 done, 1 a requirement is missed (`check`, `search`), 2 wrong input or nowhere to write, 141
-standard output was closed, 128 + signal.
+0 done, 1 a requirement is missed and 3 one is undecided (`check`, `search`), 2 wrong input or
+nowhere to write, 141 standard output was closed, 128 + signal.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Annotated, Any, cast
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
-import softreach
+import softreach as sr
 from softreach.cli.console import HelpConsole, console
 from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
@@ -64,7 +64,7 @@ Start with
 
     softreach reach minimal_trunk
 """,
-    version=lambda: softreach.__version__,
+    version=lambda: sr.__version__,
     exit_on_error=False,
     print_error=False,
     suppress_keyboard_interrupt=False,

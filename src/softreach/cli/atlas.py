@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.values import Whole, pairs_in, read_positive, rows_of
+from softreach.support.arguments import as_integer
 from softreach.support.errors import InvalidInput, NotPossible, counted
+from softreach.support.files.formats import check_installed
+from softreach.support.files.text import read_text
 from softreach.support.quantity import read_number
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
-    from softreach.atlas import AtlasStatus
-    from softreach.atlas.executor import ExecutorLike
-    from softreach.atlas.space import DesignSpace
-
 
 atlas = App(
     name="atlas",
@@ -32,7 +29,7 @@ Example: softreach atlas build a.zarr --vary taper_deg=0:3:4
 
 Store = Annotated[str, Parameter(help="The atlas: a folder (.zarr) or a URL.")]
 Shard = Annotated[
-    str, Parameter(help="Only part i of k, i from 0, as i/k; all k may share the store.")
+    str, Parameter(help="Compute part i of k, written i/k, i from 0; all k may share the store.")
 ]
 
 
@@ -74,13 +71,10 @@ def build(
         scheduler: Dask scheduler: tcp://host:port
         scheduler_file: Dask scheduler file.
     """
-    from softreach.atlas import build_atlas
-    from softreach.atlas.metrics import METRIC_GROUPS
-
-    groups = tuple(METRIC_GROUPS) if metrics is None else tuple(metrics.split(","))
+    groups = tuple(sr.atlas.METRIC_GROUPS if metrics is None else metrics.split(","))
     if "concave" not in groups:
         options.refuse("without the metrics concave", alpha=alpha)
-    build_atlas(
+    sr.build_atlas(
         _space_of(space, design, vary, changes),
         store,
         **sampling.arguments,
@@ -100,12 +94,10 @@ def status(store: Store, /, *, json: options.AsJson = False) -> None:
 
     Example: softreach atlas status atlas.zarr
     """
-    from softreach.atlas import atlas_status
-
-    _print(store, atlas_status(store), json)
+    _print(store, sr.atlas.atlas_status(store), json)
 
 
-def _print(store: str, state: AtlasStatus, json: bool) -> None:
+def _print(store: str, state: sr.atlas.AtlasStatus, json: bool) -> None:
     if json:
         console.json(asdict(state))
     else:
@@ -120,9 +112,7 @@ def verify(store: Store, /, *, json: options.AsJson = False) -> None:
 
     Example: softreach atlas verify atlas.zarr
     """
-    from softreach.atlas import verify_atlas
-
-    _print(store, state := verify_atlas(store), json)
+    _print(store, state := sr.atlas.verify_atlas(store), json)
     if state.damaged:
         raise NotPossible(
             f"{counted(state.damaged, 'design')} of {store} damaged; the command that built the "
@@ -155,18 +145,19 @@ def best(
         out: Design file (.toml) for the best of them.
     """
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.atlas import atlas_design, best_designs, open_atlas
     from softreach.atlas.reading import command_of
 
     options.check_output(out, DESIGN_FILE, overwrite)
-    atlas = open_atlas(store)
-    designs = best_designs(atlas, metric, smallest=smallest, where=where or (), count=count)
+    atlas = sr.open_atlas(store)
+    designs = sr.atlas.best_designs(
+        atlas, metric, smallest=smallest, where=where or (), count=count
+    )
     if out is not None:
         if not designs.sizes["rank"]:
             raise NotPossible(f"no design of {store} meets {' and '.join(where or ())}")
         parameters = command_of(atlas).space.names
         first = {name: float(designs[name][0]) for name in parameters}
-        atlas_design(atlas, **first).save(out, overwrite=overwrite)
+        sr.atlas.atlas_design(atlas, **first).save(out, overwrite=overwrite)
     console.rows(f"best {metric} of {store}", rows_of(designs), json)
 
 
@@ -189,27 +180,23 @@ def figures(
         panels: Largest number of columns and rows of a sheet.
         out: Folder for the figures.
     """
-    from softreach.atlas import open_atlas
-    from softreach.plot import atlas_figures
-    from softreach.plot.style import pyplot, save_figure
-    from softreach.support.arguments import as_integer
+    from softreach.plot.style import pyplot
 
     as_integer("panels", panels, 1)
     for suffix in ("png", "pdf"):  # tried by a name that any of them may have
         options.check_picture(out / f"clouds.{suffix}", overwrite)
-    for name, figure in atlas_figures(open_atlas(store), panels):
+    for name, figure in sr.plot.atlas_figures(sr.open_atlas(store), panels):
         for suffix in ("png", "pdf"):
-            save_figure(figure, out / f"{name}.{suffix}", overwrite=overwrite)
+            sr.plot.save_figure(figure, out / f"{name}.{suffix}", overwrite=overwrite)
             console.line(f"{out / name}.{suffix}")
         pyplot().close(figure.get_figure(root=True))
 
 
 def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
-) -> DesignSpace:
+) -> sr.DesignSpace:
     from softreach.arm.design_file import LONGEST
     from softreach.atlas.space_file import parse_space
-    from softreach.support.files.text import read_text
 
     if (path is None) == (vary is None):
         raise NotPossible("give either --vary or --space")
@@ -219,18 +206,15 @@ def _space_of(
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
 
-def grid_of(base: Manipulator, vary: list[str]) -> DesignSpace:
+def grid_of(base: sr.Manipulator, vary: list[str]) -> sr.DesignSpace:
     """The grid that `--vary` asks for."""
-    from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter
 
     pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8")
-    return DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))
+    return sr.DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))
 
 
-def _executor(scheduler: str | None, scheduler_file: Path | None) -> ExecutorLike:
-    from softreach.support.files.formats import check_installed
-
+def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
     if scheduler is not None:
         options.refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:

@@ -8,20 +8,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.values import Number, Whole, as_read, pairs_in, read_positive
+from softreach.support import progress
 from softreach.support.errors import InvalidInput
-from softreach.support.units import TYPED, read_length
+from softreach.support.files.formats import TABLES
+from softreach.support.files.text import write_table
+from softreach.support.quantity import columns, quantity
+from softreach.support.units import TYPED, LengthUnit, read_length, readable_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.arm.manipulator import Manipulator
     from softreach.arm.written import Written
-    from softreach.calibration import Calibration, PlacementErrors
-    from softreach.support.units import LengthUnit
 
 _COLUMNS = Group("Column names", sort_key=1)
 Free = Annotated[
@@ -68,11 +70,12 @@ def calibrate(
     Args:
         data: Measured poses (.csv .parquet): a column for each input and x, y, z of each marker,
             with units in their names, such as tension1_N and tip_x_mm.
-        prior: What is known of a number beforehand, its width about the value of the design or
-            MEAN:WIDTH: taper=1deg, rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
+        prior: What is known of a free number beforehand: NAME=WIDTH about its value in the design,
+            as in taper=1deg, or NAME=MEAN:WIDTH, as in
+            rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
         hold_out: Fraction of samples held out at random.
-        noise: Standard deviation of a measured coordinate, against which priors are weighed: 0.2mm.
-            That of the residuals if left out.
+        noise: Standard deviation of a measured coordinate, which decides how much priors count:
+            0.2mm. Estimated from the residuals if left out.
         robust: Down-weight outliers.
         rivals: Fit constant curvature and a quadratic law beside it.
         seed: Seed of the held-out samples.
@@ -84,11 +87,7 @@ def calibrate(
         report: Write a report with pictures to this .html file.
         table: Write what was predicted and missed to this .csv file.
     """
-    from softreach import calibration
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.support import progress
-    from softreach.support.files.formats import TABLES
-    from softreach.support.files.text import write_table
     from softreach.support.report import REPORT
 
     arm = design_from(design, changes, unit)
@@ -96,7 +95,7 @@ def calibrate(
     for path, formats in outputs or [(None, {})]:
         options.check_output(path, formats, overwrite)
     with progress.bar("fitting", None) as step:
-        result = calibration.calibrate(
+        result = sr.calibrate(
             arm,
             data,
             free=free_names(arm, free),
@@ -129,7 +128,7 @@ def _noise(text: str) -> float:
     return read_positive("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})")
 
 
-def _record(result: Calibration) -> dict[str, Any]:
+def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
     fit, held = result.fit, result.held
     return {
@@ -167,7 +166,7 @@ def _numbers(found: xr.Dataset) -> list[dict[str, Any]]:
     return records
 
 
-def _errors(errors: PlacementErrors) -> dict[str, float]:
+def _errors(errors: sr.calibration.PlacementErrors) -> dict[str, float]:
     keys = ("median_m", "mean_m", "rms_m", "below_95_percent_m", "places")
     return dict(zip(keys, errors, strict=True))
 
@@ -204,14 +203,10 @@ def plan_poses(
         seed: Seed of candidates and of their order.
         out: Write the poses as a CSV file to fill in.
     """
-    from softreach import calibration
-    from softreach.support.files.formats import TABLES
-    from softreach.support.quantity import columns
-
     arm = design_from(design, changes, unit)
     width = _noise(noise)
     options.check_output(out, TABLES, overwrite)
-    plan = calibration.plan_poses(
+    plan = sr.calibration.plan_poses(
         arm,
         free_names(arm, free),
         n,
@@ -236,9 +231,6 @@ def plan_poses(
 
 
 def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
-    from softreach.support.quantity import quantity
-    from softreach.support.units import readable_unit
-
     names = ("number", "unit", "value", "sigma")
     for name, own, value, width in zip(*(found[k].values.tolist() for k in names), strict=True):
         shown, size = readable_unit(own, value, unit)
@@ -246,7 +238,7 @@ def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]
         yield name, quantity(value / size, shown, width / size, digits=2), share
 
 
-def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
+def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
     from softreach.arm.written import Written
 
@@ -255,7 +247,7 @@ def free_names(arm: Manipulator, texts: Sequence[str]) -> list[str]:
     return [_tied(names, name) for name in given if name]
 
 
-def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Width, or mean and width, of numbers in their units by name, from NAME=MEAN:WIDTH.
 
     Raises:
@@ -270,7 +262,7 @@ def priors(arm: Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...
         first = name.split("=")[0].strip()
         unit = None if first not in POSE else "m" if POSE.index(first) < 3 else "rad"
         if unit is None and first not in names.by_key:
-            raise InvalidInput("prior", name, "of a number that is free, by its full name")
+            raise InvalidInput("prior", name, "NAME=WIDTH with the full name of a free number")
         try:
             values = tuple(names.number(first, part, unit) for part in text.split(":"))
         except ValueError:

@@ -6,18 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Group, Parameter
 
+import softreach as sr
 from softreach.cli.values import Number, pairs_in, read_as
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, did_you_mean, warn
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import as_unit
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
-
 
 _POSTURES = {"upright": "up", "hanging": "down"}
 """Words for the way that a base points."""
@@ -42,7 +39,7 @@ class Changes:
         gravity: down, up, sideways, none, or x,y,z [m/s²]; default down if there are loads.
         tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5
         point: Marker that counts as the tip, such as that of a tool.
-        settings: PATH=VALUE of a parameter: taper=2deg. May be repeated.
+        settings: Value of any parameter, as in taper=2deg. May be repeated.
     """
 
     base: Signed = None
@@ -61,7 +58,7 @@ class Changes:
         del options["settings"]
         return {name: value for name, value in options.items() if value is not None}
 
-    def applied_to(self, arm: Manipulator) -> Manipulator:
+    def applied_to(self, arm: sr.Manipulator) -> sr.Manipulator:
         """The changed design: parameters first, which may give what loads need to know."""
         from softreach.arm.base import POINTS
         from softreach.arm.parameters import changed
@@ -83,9 +80,9 @@ class Changes:
             arm = changed(arm, _values(arm, [*of_loads.items()]))
         return arm.at_point(self.point)
 
-    def _loaded(self, arm: Manipulator, *, keep: bool) -> Manipulator:
+    def _loaded(self, arm: sr.Manipulator, *, keep: bool) -> sr.Manipulator:
         """The arm with the loads it has and those given; none where all are zero and none stay."""
-        from softreach.arm.loads import GRAVITIES, Loads
+        from softreach.arm.loads import GRAVITIES
 
         new: dict[str, object] = {}
         if self.payload is not None:
@@ -96,8 +93,8 @@ class Changes:
             new["gravity"] = vector or _vector("gravity", self.gravity, "m/s²", words)
         if self.tip_force is not None:
             new["tip_force"] = _vector("tip_force", self.tip_force, "N")
-        loads = (arm.loads or Loads()).replace(**new)
-        if not keep and loads == Loads(gravity=GRAVITIES["none"]):
+        loads = (arm.loads or sr.Loads()).replace(**new)
+        if not keep and loads == sr.Loads(gravity=GRAVITIES["none"]):
             return arm.replace(loads=None)
         lacking = {
             fault.path: _MATTER[field]
@@ -114,7 +111,7 @@ class Changes:
 UNCHANGED = Changes()
 
 
-def design_from(text: str, changes: Changes = UNCHANGED, unit: str | None = None) -> Manipulator:
+def design_from(text: str, changes: Changes = UNCHANGED, unit: str | None = None) -> sr.Manipulator:
     """The design of that name or file, changed as asked, to be shown in a unit."""
     from softreach.arm import design_file
     from softreach.arm.tables import check_extension
@@ -130,12 +127,12 @@ def design_from(text: str, changes: Changes = UNCHANGED, unit: str | None = None
     return changed
 
 
-def shown_in(unit: str | None, arm: Manipulator) -> Manipulator:
+def shown_in(unit: str | None, arm: sr.Manipulator) -> sr.Manipulator:
     """The design, shown in the unit that was asked for if there is one."""
     return arm if unit is None else arm.replace(display_unit=as_unit(unit, arm.length).name)
 
 
-def say_limits(arm: Manipulator) -> None:
+def say_limits(arm: sr.Manipulator) -> None:
     """Warn where the design leaves what the linear law covers."""
     from softreach.arm.lines import law_warning
 
@@ -147,12 +144,10 @@ _POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".mat", ".ply", "
 """Suffixes of points, surfaces and tables, which are no designs."""
 
 
-def _unchanged(text: str) -> Manipulator:
-    from softreach.arm import designs
-    from softreach.arm.manipulator import Manipulator
-
-    if text in designs.__all__:
-        return getattr(designs, text)()
+def _unchanged(text: str) -> sr.Manipulator:
+    names = sr.designs.__all__
+    if text in names:
+        return getattr(sr.designs, text)()
     path = Path(text)
     suffix = path.suffix.lower()
     if suffix in _POINTS:
@@ -162,11 +157,11 @@ def _unchanged(text: str) -> Manipulator:
         )
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
-        return Manipulator.load(text)  # which refuses what is no file, such as a pipe
-    hint = did_you_mean(text, designs.__all__)
+        return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
+    hint = did_you_mean(text, names)
     if suffix == ".json":
-        hint = f"softreach import {text} {text[:-5]}.toml makes one of a filament"
-    allowed = f"a .toml file, or one of {', '.join(designs.__all__)}"
+        hint = f"if it is a filament: softreach import {text} {text[:-5]}.toml"
+    allowed = f"a .toml file, or one of {', '.join(names)}"
     raise InvalidInput("design", text, allowed, hint)
 
 
@@ -194,7 +189,7 @@ def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, .
     return values
 
 
-def _values(arm: Manipulator, written: Sequence[tuple[str, object]]) -> dict[str, float]:
+def _values(arm: sr.Manipulator, written: Sequence[tuple[str, object]]) -> dict[str, float]:
     """Name of a parameter -> value in its unit, from what was written under any of its names."""
     from softreach.arm.parameters import find_parameter
     from softreach.arm.written import Written

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
 from softreach.cli.values import Number, Rows
+from softreach.support.memory import check_memory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,24 +40,21 @@ def cloud(
         tol: Largest tip error, in L.
         out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
-    from time import perf_counter
-
-    from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, save_cloud
-    from softreach.rod.rods import as_tip_map
+    from softreach.cloud.clouds import CLOUD_STORE
 
     arm = design_from(design, changes, unit)
     out = out or Path(f"{Path(design).stem}.zarr")
     options.check_output(out, CLOUD_STORE, overwrite)
     arguments = sampling.arguments
     start = perf_counter()
-    dataset = compute_cloud(arm, **arguments, tol=tol)
+    dataset = sr.compute_cloud(arm, **arguments, tol=tol)
     seconds = perf_counter() - start
-    save_cloud(dataset, out, overwrite=overwrite)
+    sr.save_cloud(dataset, out, overwrite=overwrite)
     rows: Rows = {
         "samples": (sampling.count, ""),
         "sampler": (arguments["sampler"], ""),
         "seed": (arguments["seed"], ""),
-        "steps per arm": (as_tip_map(arm, tol).steps, ""),
+        "steps per arm": (sr.rod.as_tip_map(arm, tol).steps, ""),
         "time to compute": (round(seconds, 3), "s"),
         **load_rows(arm),
         **_status_rows(dataset),
@@ -66,11 +66,9 @@ def cloud(
 
 
 def _status_rows(cloud: xr.Dataset) -> Rows:
-    from softreach.rod.tip_map import TipStatus
-
     return {
         status.name.lower().replace("_", " "): (int((cloud.status == status).sum()), "")
-        for status in (TipStatus if "status" in cloud else ())
+        for status in (sr.rod.TipStatus if "status" in cloud else ())
     }
 
 
@@ -97,8 +95,6 @@ def volume(
         alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical.
         out: Write the α-shape here: .ply .stl .obj .glb .3mf .vtu
     """
-    from softreach.cloud.volume import concave_hull, convex_hull, flat_areas
-    from softreach.export import export_mesh
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.schema import is_stable
 
@@ -106,9 +102,9 @@ def volume(
     options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
     cloud, arm = options.cloud_of(source, sampling, changes, unit, check_hull_memory)
     bias = cloud.attrs["sampler"] == "uniform"
-    concave = concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
-    rows = volume_rows(concave, convex_hull(cloud.tip))
-    areas = flat_areas(cloud.tip.values[is_stable(cloud.tip)], concave.alpha)
+    concave = sr.concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
+    rows = volume_rows(concave, sr.convex_hull(cloud.tip))
+    areas = sr.volume.flat_areas(cloud.tip.values[is_stable(cloud.tip)], concave.alpha)
     if areas is not None:
         share = 1 - areas[0] / areas[1] if areas[1] else None
         rows = {name: rows[name] for name in ("points", "alpha")}
@@ -116,7 +112,7 @@ def volume(
         rows["unreachability"] = (share, "")
     console.rows(f"volume of {source}", rows, json, arm)
     if out is not None:
-        export_mesh(concave, out, unit=options.written_unit(arm), overwrite=overwrite)
+        sr.export.export_mesh(concave, out, unit=options.written_unit(arm), overwrite=overwrite)
         console.written(out, options.written_unit(arm))
 
 
@@ -125,8 +121,6 @@ _BYTES = 700  # of memory that a sample and its share of the triangulation take 
 
 def check_hull_memory(n: int) -> None:
     """Refuse more samples than can be computed and triangulated in the free memory."""
-    from softreach.support.memory import check_memory
-
     check_memory("n", n, _BYTES * n)
 
 
@@ -165,20 +159,18 @@ def show(
     Example: softreach show trunk.zarr --activation -1,0,-0.5 --out trunk.pdf
 
     Args:
-        color: rgb (mixed lights: if left out, of up to three bundles), strongest (bundle: if left
-            out, of more), effort, the name of a bundle, or compliance: how far the tip yields.
+        color: rgb (up to three bundles), strongest (the bundle that acts most; more than three),
+            effort, the name of a bundle, or compliance (how far the tip yields).
         out: Picture file: .png .pdf .svg, or .html to turn
     """
-    from softreach.plot import plot_3d, plot_views
-
     options.check_picture(out, overwrite, page=True)
     cloud, arm = options.cloud_of(source, sampling, changes, unit)
     shape = None if activation is None else options.shape_of(activation, arm)
     look = {"color": _colors(cloud, color), "unit": arm.length_unit}
     if options.is_page(out):
-        figure = plot_3d([cloud, arm if shape is None else shape], **look)
+        figure = sr.plot.plot_3d([cloud, arm if shape is None else shape], **look)
     else:
-        figure = plot_views(cloud, arm, shape, **look)
+        figure = sr.plot.plot_views(cloud, arm, shape, **look)
     options.save_picture(figure, out, overwrite)
     console.line(out)
 
@@ -186,8 +178,7 @@ def show(
 def _colors(cloud: xr.Dataset, color: str | None) -> str | xr.DataArray | None:
     """The colors of the samples: a name that figures know, or numbers that they do not compute."""
     from softreach.plot.coloring import bundle_names
-    from softreach.stiffness import cloud_compliance
 
     if color != "compliance" or color in bundle_names(cloud):
         return color
-    return cloud_compliance(cloud)["largest_compliance"]
+    return sr.stiffness.cloud_compliance(cloud)["largest_compliance"]

@@ -14,20 +14,17 @@ from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
+import softreach as sr
 from softreach.cli.values import Rows, key, plain, rows_for_machines, rows_for_people, shown
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
 from softreach.support.quantity import columns
-from softreach.support.units import METER
+from softreach.support.units import METER, LengthUnit
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from rich.console import Console as RichConsole
-
-    from softreach.arm.manipulator import Manipulator
-    from softreach.support.units import LengthUnit
-
 
 _NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
 
@@ -65,7 +62,9 @@ class Console:
         """A result for machines; null where there is no number."""
         self.line(json.dumps(plain(value), indent=indent, allow_nan=False))
 
-    def rows(self, title: str, rows: Rows, as_json: bool, arm: Manipulator | None = None) -> None:
+    def rows(
+        self, title: str, rows: Rows, as_json: bool, arm: sr.Manipulator | None = None
+    ) -> None:
         """Named values with their units, one below the other.
 
         Args:

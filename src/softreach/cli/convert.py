@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
 from softreach.cli.console import console
 from softreach.cli.values import Number, Rows
 from softreach.support.errors import InvalidInput, NotPossible
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
 
 Format = Annotated[
     str | None,
@@ -62,31 +60,29 @@ def export(
 
 
 def _export_cloud(source: str, out: Path, overwrite: bool, unit: str | None) -> None:
-    from softreach.cloud.clouds import design_of, open_cloud
-    from softreach.export.clouds import CLOUD_FILES, export_cloud
+    from softreach.export.clouds import CLOUD_FILES
 
     options.check_output(out, CLOUD_FILES, overwrite)
-    cloud = open_cloud(source)
-    written = options.written_unit(shown_in(unit, design_of(cloud)))
-    export_cloud(cloud, out, unit=written, overwrite=overwrite)
+    cloud = sr.open_cloud(source)
+    written = options.written_unit(shown_in(unit, sr.cloud.design_of(cloud)))
+    sr.export.export_cloud(cloud, out, unit=written, overwrite=overwrite)
     console.written(out, written)
     console.line(out)
 
 
 def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> None:
-    from softreach.cloud.clouds import open_cloud
     from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
 
     options.refuse(_OTHER, unit=unit)
     written = out, gamma_path(out)
     for path in written:
         options.check_output(path, CLOUD_PAIR, overwrite)
-    write_cloud(open_cloud(source), out, overwrite=overwrite)
+    write_cloud(sr.open_cloud(source), out, overwrite=overwrite)
     for path in written:
         console.line(path)
 
 
-def _export_filament(arm: Manipulator, out: Path, overwrite: bool, unit: str | None) -> None:
+def _export_filament(arm: sr.Manipulator, out: Path, overwrite: bool, unit: str | None) -> None:
     from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
 
     options.refuse(_OTHER, unit=unit)
@@ -95,13 +91,12 @@ def _export_filament(arm: Manipulator, out: Path, overwrite: bool, unit: str | N
     console.line(out)
 
 
-def _export_arm(arm: Manipulator, out: Path, activation: str | None, overwrite: bool) -> None:
-    from softreach.export import export_arm
+def _export_arm(arm: sr.Manipulator, out: Path, activation: str | None, overwrite: bool) -> None:
     from softreach.export.surfaces import SURFACE_FILES
 
     options.check_output(out, SURFACE_FILES, overwrite)
     shape, written = options.shape_of(activation, arm), options.written_unit(arm)
-    export_arm(arm, shape, out, unit=written, overwrite=overwrite)
+    sr.export.export_arm(arm, shape, out, unit=written, overwrite=overwrite)
     console.written(out, written)
     console.line(out)
 
@@ -131,7 +126,7 @@ def import_file(
         tol: Largest error of the tips that a cloud is compared with, in L (1e-6).
     """
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.cloud.clouds import CLOUD_STORE, save_cloud
+    from softreach.cloud.clouds import CLOUD_STORE
     from softreach.exchange.activefilaments import read_cloud, read_design
 
     rows: Rows
@@ -155,7 +150,7 @@ def import_file(
         arm = shown_in(unit, given)
         options.check_output(out, CLOUD_STORE, overwrite)
         cloud = read_cloud(arm, source, tol=1e-6 if tol is None else tol)
-        save_cloud(cloud, out, overwrite=overwrite)
+        sr.save_cloud(cloud, out, overwrite=overwrite)
         rows = {
             "samples": (cloud.sizes["sample"], ""),
             "largest difference of tips": (float(cloud.attrs["largest_tip_difference"]), "m"),

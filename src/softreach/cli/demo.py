@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated
 
 from cyclopts import Parameter
 
-import softreach
+import softreach as sr
+from softreach.cli.changes import design_from
 from softreach.cli.cloud import check_hull_memory, volume_rows
 from softreach.cli.console import console
 from softreach.cli.options import OUT, AsJson, Overwrite, Unit, check_output, written_unit
 from softreach.cli.values import Whole
+from softreach.support import parallel
 from softreach.support.errors import InvalidInput
+from softreach.support.files.atomic import check_place, writing
+from softreach.support.files.formats import PICTURES
 
 _FILES = {
     "tentacle": ("tentacle.toml", "tentacle.csv"),
@@ -40,18 +46,9 @@ def demo(
         n: Number of samples.
         out: Folder for the results.
     """
-    from functools import partial
-    from time import perf_counter
-
-    from softreach import export, plot
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.cli.changes import design_from
-    from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, save_cloud
-    from softreach.cloud.volume import concave_hull, convex_hull
+    from softreach.cloud.clouds import CLOUD_STORE
     from softreach.export.clouds import CLOUD_FILES
-    from softreach.rod.kinematics import configuration
-    from softreach.support import parallel
-    from softreach.support.files.formats import PICTURES
 
     start = perf_counter()
     arm = design_from("minimal_trunk", unit=unit)
@@ -60,19 +57,19 @@ def demo(
     for name, kinds in formats.items():
         check_output(out / name, kinds, overwrite)
     check_hull_memory(n)
-    cloud = compute_cloud(arm, n)
+    cloud = sr.compute_cloud(arm, n)
     computed = perf_counter() - start
     written = written_unit(arm)
-    hulls = partial(concave_hull, cloud.tip, bias=True), partial(convex_hull, cloud.tip)
+    hulls = partial(sr.concave_hull, cloud.tip, bias=True), partial(sr.convex_hull, cloud.tip)
     with parallel.meanwhile(lambda: [make() for make in hulls]) as made:
         arm.save(out / "design.toml", overwrite=overwrite)
-        save_cloud(cloud, out / "cloud.zarr", overwrite=overwrite)
-        export.export_cloud(cloud, out / "cloud.ply", unit=written, overwrite=overwrite)
-        shape = configuration(arm, [-1.0, 0.0, -0.4])
-        figure = plot.plot_views(cloud, arm, shape, unit=arm.length_unit)
-        plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
+        sr.save_cloud(cloud, out / "cloud.zarr", overwrite=overwrite)
+        sr.export.export_cloud(cloud, out / "cloud.ply", unit=written, overwrite=overwrite)
+        shape = sr.configuration(arm, [-1.0, 0.0, -0.4])
+        figure = sr.plot.plot_views(cloud, arm, shape, unit=arm.length_unit)
+        sr.plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
         concave, convex = made()
-    export.export_mesh(concave, out / "hull.ply", unit=written, overwrite=overwrite)
+    sr.export.export_mesh(concave, out / "hull.ply", unit=written, overwrite=overwrite)
     for name in ("cloud.ply", "hull.ply"):
         console.written(out / name, written)
     rows = volume_rows(concave, convex)
@@ -96,8 +93,6 @@ def example(
         name: Name of the example.
         out: Folder for the files: this one if left out.
     """
-    from softreach.support.files.atomic import check_place, writing
-
     if name not in (known := examples()):
         raise InvalidInput("example", name, f"one of {', '.join(known)}")
     for file in known[name]:
@@ -119,7 +114,7 @@ def examples() -> dict[str, tuple[Path, ...]]:
 
 def _folder(name: str) -> Path:
     """Folder in the installed package, or at the root of a clone."""
-    package = Path(softreach.__file__).parent
+    package = Path(sr.__file__).parent
     return package / name if (package / name).is_dir() else package.parents[1] / name
 
 

@@ -7,6 +7,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
+import softreach as sr
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output, refuse
@@ -14,10 +15,7 @@ from softreach.cli.values import Rows, to_degrees
 from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 
 if TYPE_CHECKING:
-    from softreach.arm.loads import Loads
-    from softreach.arm.manipulator import Manipulator
     from softreach.rest import Rest
-    from softreach.rod.summary import DesignSummary
 
 
 def design(
@@ -33,8 +31,8 @@ def design(
 ) -> None:
     """Describe a design: angles, radii, stiffness, weight, warnings.
 
-    With --verbose it also says where the linear laws of the actuators end; --unit
-    with --out goes into the design file.
+    --verbose adds the limits of the linear laws of the actuators. With --out,
+    --unit is written into the design file.
 
     Example: softreach design minimal_trunk --taper-deg 3
 
@@ -43,7 +41,6 @@ def design(
         out: Write the design to this TOML file.
     """
     from softreach.arm.design_file import DESIGN_FILE
-    from softreach.rod.summary import describe
 
     if schema:
         given = {"out": out, "overwrite": overwrite, "unit": unit}
@@ -57,7 +54,7 @@ def design(
     with no_warnings():  # the report has them all
         arm = design_from(design, changes, unit)
     check_output(out, DESIGN_FILE, overwrite)
-    facts = describe(arm)
+    facts = sr.describe(arm)
     if out is not None:
         arm.save(out, overwrite=overwrite)
     details = _for_machines(arm, facts) if json else _bundle_rows(arm, facts)
@@ -69,7 +66,7 @@ def design(
             console.note(f"warning: {warning}")
 
 
-def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
+def _rows(arm: sr.Manipulator, facts: sr.rod.DesignSummary) -> Rows:
     from softreach.arm.number import fields_of
 
     rows: Rows = {"bundles": (arm.bundles, ""), "bundle names": (list(arm.bundle_names), "")}
@@ -105,7 +102,7 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     return known | load_rows(arm) | _rest_rows(arm)
 
 
-def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
+def _bundle_rows(arm: sr.Manipulator, facts: sr.rod.DesignSummary) -> Rows:
     """Bounds and effects of each activation; neighbors that are equal share a line."""
     texts = [
         f"{_span(arm.bounds[k], unit)}: length {_span(100.0 * facts.bundle_strain[k])} %, "
@@ -127,7 +124,7 @@ def _span(ends: Any, unit: str = "1") -> str:
     return f"{ends[0]:.4g} to {ends[1]:.4g}{'' if unit == '1' else f' {unit}'}"
 
 
-def _for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
+def _for_machines(arm: sr.Manipulator, facts: sr.rod.DesignSummary) -> Rows:
     bundles = {
         "name": arm.bundle_names,
         "unit": arm.bundle_units,
@@ -146,7 +143,7 @@ def _records(columns: dict[str, Any]) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-def load_rows(arm: Manipulator) -> Rows:
+def load_rows(arm: sr.Manipulator) -> Rows:
     """Posture of the base, gravity, and all other loads that are not 0; all of it in the world."""
     from softreach.arm.number import fields_of
 
@@ -166,22 +163,21 @@ def load_rows(arm: Manipulator) -> Rows:
     return rows | ({"point loads": (len(loads.point_loads), "")} if loads.point_loads else {})
 
 
-def _posture(loads: Loads) -> str:
+def _posture(loads: sr.Loads) -> str:
     """The way the base stands by gravity in its own frame: a straight arm points along +z there."""
     angle = to_degrees(math.acos(-loads.gravity[2] / math.hypot(*loads.gravity)))
     names = {0: "upright", 90: "sideways", 180: "hanging"}
     return names.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
 
 
-def _rest_rows(arm: Manipulator) -> Rows:
+def _rest_rows(arm: sr.Manipulator) -> Rows:
     """Sag and stability of the arm without activation.
 
     Without loads: the sag under its own weight of an arm held sideways, and whether it would stand
     upright; nothing where moduli or densities are not known.
     """
-    from softreach.arm.base import Base
     from softreach.arm.body import load_number_faults
-    from softreach.arm.loads import GRAVITIES, Loads
+    from softreach.arm.loads import GRAVITIES
 
     if load_number_faults(arm):
         return {}
@@ -189,8 +185,8 @@ def _rest_rows(arm: Manipulator) -> Rows:
         held = stood = _rest(arm)
         how = "", ""
     else:
-        ways = (Loads(gravity=GRAVITIES[way]) for way in ("sideways", "down"))
-        held, stood = (_rest(arm.replace(loads=loads, base=Base())) for loads in ways)
+        ways = (sr.Loads(gravity=GRAVITIES[way]) for way in ("sideways", "down"))
+        held, stood = (_rest(arm.replace(loads=loads, base=sr.Base())) for loads in ways)
         how = " sideways", " upright"
     return {
         f"sag at rest{how[0]}": (None if held is None else held.sag, "m"),
@@ -203,12 +199,10 @@ def _rest_rows(arm: Manipulator) -> Rows:
     }
 
 
-def _rest(arm: Manipulator) -> Rest | None:
+def _rest(arm: sr.Manipulator) -> Rest | None:
     """The arm at rest; None under loads too large to compute it."""
-    from softreach.rest import rest
-
     try:
-        return rest(arm)
+        return sr.rest.rest(arm)
     except InvalidInput as error:
         if error.name != "loads":
             raise

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 from cyclopts import App
 
+import softreach as sr
+from softreach.cli import demo
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.options import AsJson, Design
@@ -30,9 +32,7 @@ def designs(*, json: AsJson = False) -> None:
 
     Example: softreach list designs
     """
-    from softreach.arm import designs
-
-    makers = {name: getattr(designs, name) for name in designs.__all__}
+    makers = {name: getattr(sr.designs, name) for name in sr.designs.__all__}
     rows = [
         (name, (arm := make()).bundles, arm.length, _summary(make).rstrip(".").replace("`", ""))
         for name, make in makers.items()
@@ -50,15 +50,13 @@ def examples(*, json: AsJson = False) -> None:
 
     Example: softreach list examples
     """
-    from softreach.cli.demo import examples as known
-
     records = [
         {
             "example": name,
             "files": " ".join(file.name for file in files),
             "description": files[0].read_text("utf-8").partition("\n")[0].lstrip("# ").rstrip("."),
         }
-        for name, files in known().items()
+        for name, files in demo.examples().items()
     ]
     console.table(records, json)
 
@@ -69,9 +67,9 @@ def materials(*, json: AsJson = False) -> None:
 
     Example: softreach list materials
     """
-    from softreach.arm.material import material_names, material_record
+    from softreach.arm.material import material_record
 
-    records = [(name, material_record(name)) for name in material_names()]
+    records = [(name, material_record(name)) for name in sr.arm.material_names()]
     rows = [
         (
             name,
@@ -93,12 +91,11 @@ def actuators(*, json: AsJson = False) -> None:
 
     Example: softreach list actuators
     """
-    from softreach.arm.actuators import Actuator
     from softreach.arm.design_file.keys import every_kind
 
     rows = [
         (name, kind.activation, kind.unit, kind.__module__, _summary(kind))
-        for name, kind in every_kind(Actuator).items()
+        for name, kind in every_kind(sr.arm.Actuator).items()
     ]
     _print("kind activation unit module description", rows, json)
 
@@ -111,9 +108,9 @@ def metrics(*, json: AsJson = False) -> None:
 
     Example: softreach list metrics
     """
-    from softreach.atlas.metrics import METRIC_GROUPS, own_metrics
+    from softreach.atlas.metrics import own_metrics
 
-    groups = METRIC_GROUPS | {name: (metric,) for name, metric in own_metrics().items()}
+    groups = sr.atlas.METRIC_GROUPS | {name: (metric,) for name, metric in own_metrics().items()}
     rows = [
         (metric.name, group, metric.unit, metric.meaning)
         for group, members in groups.items()
@@ -130,11 +127,9 @@ def objectives(*, json: AsJson = False) -> None:
 
     Example: softreach list objectives
     """
-    from softreach.optimization import OBJECTIVES
-
     rows = [
         (each.name, each.unit, each.asks, "yes" if each.smooth else "no", each.meaning)
-        for each in OBJECTIVES.values()
+        for each in sr.optimization.OBJECTIVES.values()
     ]
     _print("objective unit asks derivatives meaning", rows, json)
 

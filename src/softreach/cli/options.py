@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+import softreach as sr
 from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
 from softreach.cli.values import Whole, read_positive
 from softreach.support.errors import InvalidInput, NotPossible
+from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import (
     PAGES,
     PICTURES,
@@ -27,9 +29,6 @@ from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_leng
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.arm.manipulator import Manipulator
-
 
 OUTPUT = Group("Output options", sort_key=3)
 OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
@@ -50,7 +49,7 @@ Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or bu
 _ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
 Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]
 AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "--json")]
-_UNIT = "Unit of lengths: m, cm, mm or L; that of the design file, or a handy one, if left out."
+_UNIT = "Unit of lengths: m, cm, mm or L. If left out: that of the design file, else m or mm."
 Unit = Annotated[str | None, _output(_UNIT)]
 Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
@@ -107,46 +106,42 @@ def cloud_of(
     changes: Changes,
     unit: str | None,
     check: Callable[[int], None] | None = None,
-) -> tuple[xr.Dataset, Manipulator]:
+) -> tuple[xr.Dataset, sr.Manipulator]:
     """The stored cloud, or one of the design once its number of samples is checked; its design."""
-    from softreach.cloud.clouds import compute_cloud, design_of, open_cloud
-
     if unit is not None:
         as_unit(unit, 1.0)  # before anything is computed
     if is_stored(source):
         refuse(_STORED, **changes.given, **vars(sampling))
-        cloud = open_cloud(source)
-        say_limits(arm := shown_in(unit, design_of(cloud)))
+        cloud = sr.open_cloud(source)
+        say_limits(arm := shown_in(unit, sr.cloud.design_of(cloud)))
         return cloud, arm
     if check is not None:
         check(sampling.count)
     arm = design_from(source, changes, unit)
-    return compute_cloud(arm, **sampling.arguments), arm
+    return sr.compute_cloud(arm, **sampling.arguments), arm
 
 
-def written_unit(arm: Manipulator) -> LengthUnit:
+def written_unit(arm: sr.Manipulator) -> LengthUnit:
     """Unit of tables and meshes, which other programs take to be in m unless one was chosen."""
     return METER if arm.display_unit is None else arm.length_unit
 
 
-def activation_of(text: str | None, arm: Manipulator) -> list[float]:
+def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation") -> list[float]:
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.input_bounds[:, 0].tolist()
     values = numbers_in(text, arm.inputs)
     if values is None:
         allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
-        raise InvalidInput("activation", text, allowed)
+        raise InvalidInput(name, text, allowed)
     return values
 
 
-def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
+def shape_of(text: str | None, arm: sr.Manipulator) -> xr.Dataset:
     """The arm as activations bend it, which must leave it a shape."""
     import numpy as np
 
-    from softreach.rod.kinematics import configuration
-
-    shape = configuration(arm, activation_of(text, arm))
+    shape = sr.configuration(arm, activation_of(text, arm))
     if not np.isfinite(shape.position.values).all():
         lower, upper = (",".join(f"{bound:g}" for bound in ends) for ends in arm.input_bounds.T)
         allowed = f"such that the arm has a shape, as from {lower} to {upper}"
@@ -154,7 +149,7 @@ def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
     return shape
 
 
-def points_in(name: str, file: Path, arm: Manipulator) -> list[list[float]]:
+def points_in(name: str, file: Path, arm: sr.Manipulator) -> list[list[float]]:
     """Positions [m] from a CSV file with columns x, y, z; a header says no more than units."""
     from softreach.inverse.request import positions_in
 
@@ -178,8 +173,6 @@ def check_outputs(
     paths: list[Path], formats: Formats, overwrite: bool, *libraries: tuple[str, str]
 ) -> None:
     """As `check_output`, of several files; all libraries that are missing are named at once."""
-    from softreach.support.files.atomic import check_place
-
     if not paths:
         refuse("without --out", overwrite=overwrite)
     known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
@@ -210,8 +203,6 @@ def is_page(path: Path) -> bool:
 
 def save_picture(figure: Any, path: Path, overwrite: bool) -> None:
     """Write a figure, and say what part of the data a page that turns shows."""
-    from softreach.plot import save_figure
-
-    save_figure(figure, path, overwrite=overwrite)
+    sr.plot.save_figure(figure, path, overwrite=overwrite)
     if note := getattr(figure, "note", ""):
         console.note(f"{path}: {note}")

@@ -5,19 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
 from softreach.cli.console import console
 from softreach.cli.values import Whole, activation_text, record
-from softreach.support.errors import NotPossible, counted
+from softreach.support.errors import NotPossible
+from softreach.support.files.formats import TABLES
+from softreach.support.files.text import write_text
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.arm.manipulator import Manipulator
-    from softreach.inverse import Solution
-    from softreach.rod import AllEquilibria
 
 _EXACT = 1e-6  # of L, the error of tips
 
@@ -45,9 +44,8 @@ def solve(
         target: Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.
         targets: CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.
         within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
-        family: With more than three free bundles: solutions for each target (1).
+        family: Number of solutions for each target of more than three free bundles (1).
     """
-    from softreach.inverse import solve_inverse
     from softreach.inverse.request import length_in, position_in
 
     if (target is None) == (targets is None):
@@ -61,7 +59,7 @@ def solve(
         points = options.points_in("targets", targets, arm)
     reach = 0.0 if within is None else length_in("within", within, arm.length)
     count = 1 if family is None else family
-    solutions = solve_inverse(arm, points, within=reach, family=count)
+    solutions = sr.solve_inverse(arm, points, within=reach, family=count)
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
         known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]
@@ -71,7 +69,7 @@ def solve(
         _print(solution, arm, count)
 
 
-def _print(solution: Solution, arm: Manipulator, family: int) -> None:
+def _print(solution: sr.inverse.Solution, arm: sr.Manipulator, family: int) -> None:
     unit = arm.length_unit
     status = solution.status.name.lower().replace("_", " ")
     if len(solution) and solution.gap > _EXACT * arm.length:
@@ -119,14 +117,11 @@ def track(
         out: CSV file for the activations.
     """
     from softreach.export.clouds import path_csv
-    from softreach.inverse.path import track_path
-    from softreach.support.files.formats import TABLES
-    from softreach.support.files.text import write_text
 
     arm = design_from(design, changes, unit)
     options.check_output(out, TABLES, overwrite)
-    first = None if start is None else options.activation_of(start, arm)
-    tracked = track_path(arm, options.points_in("path", path, arm), first)
+    first = None if start is None else options.activation_of(start, arm, "start")
+    tracked = sr.track_path(arm, options.points_in("path", path, arm), first)
     write_text(out, path_csv(tracked), overwrite=overwrite)
     followed = int((tracked.status == 0).sum())
     share = f"{followed} of {tracked.sizes['point']} points followed"
@@ -168,37 +163,21 @@ def equilibria(
     Args:
         out: Draw them: .png .pdf .svg, or .html to turn
     """
-    from softreach.plot import plot_3d, plot_equilibria
-    from softreach.rod import equilibria as all_of
-
     options.check_picture(out, overwrite, view=view, page=True)
     arm = design_from(design, changes, unit)
-    result = all_of(arm, options.activation_of(activation, arm))
+    result = sr.equilibria(arm, options.activation_of(activation, arm))
     if json:
-        fields = vars(result) | {"status": _statuses(result), "degree": result.degree}
+        status = [sr.rod.TipStatus(each) for each in result.status]
+        fields = vars(result) | {"status": status, "degree": result.degree}
         del fields["rod"], fields["solver"]
         console.json(record(fields, arm.length, "tips"))
     else:
-        _print_all(result, arm)
+        at = activation_text(arm, result.activation)
+        console.line(f"equilibria{f' at {at}' if at else ''}: {result}")
     if out is not None:
         look = {"view": view or "oblique", "unit": arm.length_unit}
         page = options.is_page(out)
-        figure = plot_3d([result], **look) if page else plot_equilibria(result, **look)
+        figure = (
+            sr.plot.plot_3d([result], **look) if page else sr.plot.plot_equilibria(result, **look)
+        )
         options.save_picture(figure, out, overwrite)
-
-
-def _statuses(result: AllEquilibria) -> list[str]:
-    from softreach.rod import TipStatus
-
-    return [TipStatus(status).name.lower() for status in result.status]
-
-
-def _print_all(result: AllEquilibria, arm: Manipulator) -> None:
-    at = activation_text(arm, result.activation)
-    count = counted(len(result), "solution")
-    console.line(f"equilibria{f' at {at}' if at else ''}: {count}, degree {result.degree}")
-    for k, status in enumerate(_statuses(result)):
-        kind = f"{status}, any way around" if result.is_ring[k] else status
-        which = ", the posture" if k == result.followed else ""
-        tip = arm.length_unit.place(result.tips[k])
-        console.line(f"  tip {tip}: {kind}, margin {result.margin[k]:.3g}{which}")

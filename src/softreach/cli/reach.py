@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
 from softreach.cli.console import console
 from softreach.cli.design import load_rows
 from softreach.cli.values import ERROR, Number, Rows, as_read, rows_of
-from softreach.support.errors import NotPossible, counted
+from softreach.support import progress
+from softreach.support.arguments import as_number
+from softreach.support.errors import NotPossible, Range, counted
 from softreach.support.files.formats import PAGES, PICTURES
-
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
-    from softreach.workspace import ReachableSet
 
 
 def reach(
@@ -47,8 +46,6 @@ def reach(
     """
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.inverse.request import position_in
-    from softreach.support import progress
-    from softreach.workspace import reachable_set
 
     arm = design_from(design, changes, unit)
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
@@ -62,7 +59,7 @@ def reach(
         options.refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)
     with progress.bar("mapping the activation box", None) as step:
-        reached = reachable_set(arm, accuracy=accuracy, progress=step)
+        reached = sr.reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | rows_of(reached.to_dataset())
     rows = rows if json else _by_activations(rows)
     console.rows(f"reachable set of {design}", rows, json, arm)
@@ -89,19 +86,21 @@ def _is_drawn(path: Path) -> bool:
 
 
 def _write(
-    reached: ReachableSet, arm: Manipulator, path: Path, at: list[float] | None, overwrite: bool
+    reached: sr.workspace.ReachableSet,
+    arm: sr.Manipulator,
+    path: Path,
+    at: list[float] | None,
+    overwrite: bool,
 ) -> None:
-    from softreach.export import export_mesh
-    from softreach.plot import plot_3d, plot_slices
-
     unit = arm.length_unit
     if options.is_page(path):
-        options.save_picture(plot_3d([reached, arm], unit=unit), path, overwrite)
+        options.save_picture(sr.plot.plot_3d([reached, arm], unit=unit), path, overwrite)
     elif _is_drawn(path) and reached.dimension == 3:
-        options.save_picture(plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
+        options.save_picture(sr.plot.plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
     elif not _is_drawn(path) and reached.dimension >= 2:
-        export_mesh(reached.surface(), path, unit=options.written_unit(arm), overwrite=overwrite)
-        console.written(path, options.written_unit(arm))
+        written = options.written_unit(arm)
+        sr.export.export_mesh(reached.surface(), path, unit=written, overwrite=overwrite)
+        console.written(path, written)
     else:
         raise _too_few(path)
 
@@ -136,16 +135,14 @@ def payload(
         accuracy: Relative error allowed in each volume.
         out: Draw the curve: .png .pdf .svg
     """
-    from softreach.support import progress
-    from softreach.workspace.payload import payload_curve
-
     arm = design_from(design, changes, unit)
+    as_number("share", share, Range(0.0, 1.0, open_low=True, open_high=True))
     options.check_picture(out, overwrite)
     if arm.loads is None:
         raise NotPossible("this design has no loads; add --gravity down")
     masses = None if payloads is None else [read_mass("payloads", m) for m in payloads.split(",")]
     with progress.bar("computing volumes", None) as step:
-        curve = payload_curve(arm, masses, accuracy=accuracy, progress=step)
+        curve = sr.payload_curve(arm, masses, accuracy=accuracy, progress=step)
         largest = curve.largest_payload(share)
     rows = rows_of(curve.to_dataset())
     rows |= {
@@ -157,9 +154,7 @@ def payload(
     if arm.loads.payload and not json:
         console.line(f"  they take the place of the design's own payload, {arm.loads.payload:g} kg")
     if out is not None:
-        from softreach.plot import plot_payload_curve
-
-        options.save_picture(plot_payload_curve(curve, largest=[largest]), out, overwrite)
+        options.save_picture(sr.plot.plot_payload_curve(curve, largest=[largest]), out, overwrite)
 
 
 def gradient(
@@ -183,14 +178,12 @@ def gradient(
     """
     from softreach.arm.parameters import parameters_by_every_name
     from softreach.arm.written import written_name
-    from softreach.support import progress
-    from softreach.workspace import volume_gradient
 
     arm = design_from(design, changes)
     plain = {written_name(name, p.unit): name for name, p in parameters_by_every_name(arm).items()}
     parameters = [plain.get(name, name) for name in parameters]
     with progress.bar("differentiating the volume", len(parameters)) as step:
-        derivatives = volume_gradient(arm, parameters, accuracy=accuracy, progress=step)
+        derivatives = sr.volume_gradient(arm, parameters, accuracy=accuracy, progress=step)
     numbers = rows_of(derivatives.to_dataset())
     rows: Rows = {"route": numbers.pop("route")}
     for k, (parameter, unit) in enumerate(

@@ -6,18 +6,17 @@ import math
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Group, Parameter
 
+import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
 from softreach.cli.console import console
 from softreach.cli.values import Number, Whole, as_read, pairs_in, record
-
-if TYPE_CHECKING:
-    from softreach.optimization import Candidate, Search
-    from softreach.requirements import Check, Finding
+from softreach.support import progress
+from softreach.support.files.text import read_text
 
 _ASKED = Group("Override the file", sort_key=1)
 _EXIT = {"met": 0, "missed": 1, "undecided": 3}
@@ -51,28 +50,22 @@ def check(
         accuracy: Accuracy of coverages and volumes.
         out: Draw the arm at the places (.png .pdf .svg).
     """
-    from softreach.requirements import Requirements
-    from softreach.requirements import check as checked
-    from softreach.support import progress
-
     arm = design_from(design, changes, unit)
     options.check_picture(out, overwrite, view=view)
-    requirements = Requirements.load(needs, length=arm.length)
+    requirements = sr.Requirements.load(needs, length=arm.length)
     with progress.bar("checking", None) as step:
-        result = checked(arm, requirements, accuracy=accuracy, progress=step)
+        result = sr.check(arm, requirements, accuracy=accuracy, progress=step)
     if json:
         console.json(_checked(result))
     else:
         console.line(result)
     if out is not None:
-        from softreach.plot import plot_check
-
-        axes: Any = plot_check(result, view=view or "oblique", unit=arm.length_unit)
+        axes: Any = sr.plot.plot_check(result, view=view or "oblique", unit=arm.length_unit)
         options.save_picture(axes.figure, out, overwrite)
     return _EXIT[result.verdict]
 
 
-def _checked(result: Check) -> dict[str, Any]:
+def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
     return {
         **record(
@@ -84,7 +77,7 @@ def _checked(result: Check) -> dict[str, Any]:
     }
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
+def _finding(finding: sr.requirements.Finding) -> dict[str, Any]:
     return {**vars(finding), "met": finding.met}
 
 
@@ -126,9 +119,9 @@ def search(
         choice: Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.
         maximize: Objectives to make large, comma-separated; softreach list objectives has them.
         minimize: Objectives to make small, comma-separated.
-        designs: Number of designs to look at: 200 if left out everywhere.
+        designs: Number of designs to look at: 200 if the file says nothing.
         seed: Seed of the search.
-        accuracy: Relative error of volumes: 3e-3 if left out everywhere.
+        accuracy: Relative error of volumes: 3e-3 if the file says nothing.
         sampler: auto, cma, tpe, nsga2, nsga3, sobol or random.
         polish: Improve designs by their derivatives.
         storage: Journal or SQLite file (.db) of all designs, to resume a search or to share it
@@ -138,7 +131,6 @@ def search(
     from softreach.optimization.result import check_folder
     from softreach.optimization.search_file import read_search
     from softreach.requirements.requirements import LONGEST
-    from softreach.support.files.text import read_text
 
     asked_for = {
         "design": design,
@@ -171,13 +163,10 @@ def search(
     return _EXIT[result.verdict]
 
 
-def _searched(asked: Any, storage: Path) -> Search:
-    from softreach import optimization
-    from softreach.support import progress
-
+def _searched(asked: Any, storage: Path) -> sr.optimization.Search:
     watch = _Watch()
     with progress.bar(watch.label, asked.options.get("designs", 200)) as step:
-        return optimization.search(
+        return sr.search(
             asked.base,
             asked.free,
             asked.requirements,
@@ -195,7 +184,7 @@ class _Watch:
     def __init__(self) -> None:
         self._met, self._excess = 0, math.inf
 
-    def __call__(self, candidate: Candidate) -> None:
+    def __call__(self, candidate: sr.optimization.Candidate) -> None:
         self._met += candidate.is_feasible
         if candidate.fidelity != "bounds":  # whose excess is at least that, and may be more
             self._excess = min(self._excess, candidate.excess or math.inf)
@@ -206,7 +195,7 @@ class _Watch:
         return "searching" + f", best misses {self._excess:.3g}" * math.isfinite(self._excess)
 
 
-def _found(result: Search, out: Path) -> dict[str, Any]:
+def _found(result: sr.optimization.Search, out: Path) -> dict[str, Any]:
     """The result for machines: SI units, angles in degrees."""
     names = ("met", "verdict", "restarts", "designs", "judged", "seconds", "at_ends")
     return {
@@ -217,7 +206,7 @@ def _found(result: Search, out: Path) -> dict[str, Any]:
     }
 
 
-def _design(result: Search, each: Candidate) -> dict[str, Any]:
+def _design(result: sr.optimization.Search, each: sr.optimization.Candidate) -> dict[str, Any]:
     parameters = []
     for parameter in result.problem.parameters.free:
         value = each.values[parameter.name]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,8 +12,11 @@ from cyclopts import Parameter
 from softreach.cli.atlas import grid_of
 from softreach.cli.changes import design_from
 from softreach.cli.console import console
-from softreach.cli.options import OUTPUT, Overwrite, Unit, refuse
+from softreach.cli.options import OUTPUT, Overwrite, Unit, is_stored, refuse
 from softreach.cli.values import Whole
+from softreach.support import progress
+from softreach.support.errors import NotPossible, counted
+from softreach.support.interruption import wait_for_signal
 from softreach.support.units import as_unit
 
 if TYPE_CHECKING:
@@ -59,18 +64,14 @@ def studio(
         _write_static(source, static, vary, unit, overwrite=overwrite)
         return
     refuse("without --static", vary=vary, unit=unit, overwrite=overwrite)
-    import warnings
-    import webbrowser
-
     from softreach.studio import Studio
     from softreach.studio.serve import is_local, new_token
-    from softreach.support.interruption import wait_for_signal
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
     with_token = not is_local(host) if token is None else token
-    start = _start(source)
-    secret, work = new_token() if with_token else "", _work(start, source, fresh=fresh)
+    start, work = _begun(source, fresh=fresh)
+    secret = new_token() if with_token else ""
     with Studio(start, host, port, secret, work=work) as running:
         console.line(f"{running.url}  (Ctrl-C ends it)")
         for url in running.urls_for_others:
@@ -87,11 +88,11 @@ def _write_static(
     source: str, folder: Path, vary: list[str] | None, unit: str | None, *, overwrite: bool
 ) -> None:
     from softreach.studio.static import write_static
-    from softreach.support import progress
-    from softreach.support.errors import counted
 
+    if not vary:
+        raise NotPossible("give a slider of the page with --vary, such as --vary taper_deg=0:3:8")
     as_unit(unit or "m", 1.0)
-    space = grid_of(design_from(source), vary or [])
+    space = grid_of(design_from(source), vary)
     with progress.bar("computing designs", space.size) as step:
         title = Path(source).stem
         written = write_static(
@@ -110,21 +111,16 @@ def _warning(*, with_token: bool) -> str:
     )
 
 
-def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
-    """Work that is kept; a state or a cloud that is opened is shown as it is in its file."""
-    from softreach.studio.start import work_on
+def _begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
+    """What is shown first, and the work that is kept; a state or a cloud is shown as it is."""
+    from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 
-    as_it_is = source.lower().endswith(".json") or start.reach is not None
-    if as_it_is:
-        refuse("on a state or a cloud, which is always shown as it is", fresh=fresh)
-    return work_on(start.state.design, goes_on=not fresh and not as_it_is)
-
-
-def _start(source: str) -> Start:
-    from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
-
-    if source.rstrip("/").endswith(".zarr"):
-        return start_on_cloud(source)
-    if source.lower().endswith(".json"):
-        return start_on_state(source)
-    return start_on_design(design_from(source))
+    if is_stored(source):
+        start = start_on_cloud(source)
+    elif source.lower().endswith(".json"):
+        start = start_on_state(source)
+    else:
+        start = start_on_design(design_from(source))
+        return start, work_on(start.state.design, goes_on=not fresh)
+    refuse("on a state or a cloud, which is always shown as it is", fresh=fresh)
+    return start, work_on(start.state.design, goes_on=False)

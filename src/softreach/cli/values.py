@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
+import softreach as sr
 from softreach.support.errors import InvalidInput
 from softreach.support.quantity import quantity, read_number, read_whole_number
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.arm.manipulator import Manipulator
 
 Rows = dict[str, tuple[Any, str]]
 """Name -> (value, unit)."""
@@ -150,7 +149,7 @@ def _over(value: Any, scale: float) -> Any:
     return None if value is None else value / scale
 
 
-def activation_text(arm: Manipulator, values: Iterable[float]) -> str:
+def activation_text(arm: sr.Manipulator, values: Iterable[float]) -> str:
     """Activations with the names and units of their bundles: "left -1, right 0.5 N"."""
     named = zip(arm.input_names, values, arm.input_units, strict=True)
     return ", ".join(

@@ -10,9 +10,14 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from itertools import chain
 from pathlib import Path
 
-import softreach
+import softreach as sr
 from softreach.cli.console import console
 from softreach.cli.options import AsJson
+from softreach.support.arguments import as_one_of
+from softreach.support.errors import no_warnings
+from softreach.support.memory import free_memory
+from softreach.support.parallel import thread_count
+from softreach.support.progress import bar
 
 
 def warmup(*, only: str | None = None) -> int:
@@ -24,12 +29,9 @@ def warmup(*, only: str | None = None) -> int:
     Example: softreach warmup --only free
 
     Args:
-        only: free for what arms without loads need, loaded for the rest; both if left out.
+        only: free (kernels of arms without loads) or loaded (the others): both if left out.
     """
     from softreach.kernels.compiler import not_kept
-    from softreach.support.arguments import as_one_of
-    from softreach.support.errors import no_warnings
-    from softreach.support.progress import bar
 
     if only is not None:
         as_one_of("only", only, [*_JOBS])
@@ -48,79 +50,57 @@ def warmup(*, only: str | None = None) -> int:
 
 def _free() -> Iterator[object]:
     """Results that need the kernels of arms without loads, each computed when it is asked for."""
-    from softreach import workspace
-    from softreach.arm import designs
-    from softreach.arm.base import Base
-    from softreach.inverse import prepared_map, solve_inverse
-    from softreach.inverse.path import track_path
-    from softreach.rod.kinematics import configuration, tip_jacobian
-
-    arm, redundant = designs.minimal_trunk(), designs.redundant_trunk()
-    hanging = arm.replace(base=Base(points="down"))
+    arm, redundant = sr.designs.minimal_trunk(), sr.designs.redundant_trunk()
+    hanging = arm.replace(base=sr.Base(points="down"))
     target, beyond = (0.2, 0.1, 0.6), (2.0, 0.0, 0.0)
     path = (target, (0.2, 0.1, 0.61))
     yield _hulls()
     yield _triangle()
     yield _calibration()
-    yield tip_jacobian(arm, [[-1.0, 0.0, -0.4]])
-    yield tip_jacobian(hanging, [[-1.0, 0.0, -0.4]])
-    yield configuration(arm, [-1.0, 0.0, -0.4])
-    yield _set()
-    yield solve_inverse(arm, [target, beyond])
-    yield prepared_map(arm).tree
-    yield track_path(arm, path)
-    yield workspace.reachable_set(redundant, accuracy=0.1)
-    yield solve_inverse(redundant, [target], near=[-0.5] * 4)
-    yield solve_inverse(redundant, [target])
-    yield track_path(redundant, path)
-
-
-def _set() -> None:
-    from softreach.arm import designs
-    from softreach.workspace import reachable_set
-
-    reached = reachable_set(designs.minimal_trunk(), accuracy=0.1)
-    reached.contains((0.2, 0.1, 0.6))
-    reached.distance((2.0, 0.0, 0.0))
+    yield sr.tip_jacobian(arm, [[-1.0, 0.0, -0.4]])
+    yield sr.tip_jacobian(hanging, [[-1.0, 0.0, -0.4]])
+    yield sr.configuration(arm, [-1.0, 0.0, -0.4])
+    reached = sr.reachable_set(arm, accuracy=0.1)
+    yield reached.contains(target)
+    yield reached.distance(beyond)
+    yield sr.solve_inverse(arm, [target, beyond])
+    yield sr.inverse.prepared_map(arm).tree
+    yield sr.track_path(arm, path)
+    yield sr.reachable_set(redundant, accuracy=0.1)
+    yield sr.solve_inverse(redundant, [target], near=[-0.5] * 4)
+    yield sr.solve_inverse(redundant, [target])
+    yield sr.track_path(redundant, path)
 
 
 def _calibration() -> None:
     import numpy as np
 
-    from softreach.arm.actuators import LengthTendon
-    from softreach.arm.manipulator import Manipulator
-    from softreach.calibration import calibrate
-
-    tendon = LengthTendon(distance=0.01, bundles=3, activation_bounds=(0.0, 0.01))
-    arm = Manipulator.tapered(
+    tendon = sr.arm.LengthTendon(distance=0.01, bundles=3, activation_bounds=(0.0, 0.01))
+    arm = sr.Manipulator.tapered(
         length=0.2, outer_radius=0.01, inner_radius=0.005, young_modulus=1e6, actuators=[tendon]
     )
     inputs = 0.01 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 1.0]])
     data = {f"{name}_m": values for name, values in zip(arm.input_names, inputs.T, strict=True)}
     places = np.array([[0.0, 0.0, 0.2], [0.01, 0.0, 0.2], [0.0, 0.01, 0.2]])
     data |= {f"{axis}_m": values for axis, values in zip("xyz", places.T, strict=True)}
-    calibrate(arm, data, free=["pose.x"], rivals=False)
+    sr.calibrate(arm, data, free=["pose.x"], rivals=False)
 
 
 def _hulls() -> None:
     import numpy as np
 
-    from softreach.arm import designs
-    from softreach.cloud.clouds import compute_cloud
-    from softreach.cloud.redundancy import activation_distance
-    from softreach.cloud.volume import concave_hull
     from softreach.geometry.alpha_shape import alpha_hull
     from softreach.geometry.surface import Surface
 
-    cloud = compute_cloud(designs.minimal_trunk(), 2000)
-    concave_hull(cloud.tip, alpha=0.2)
-    hull = concave_hull(cloud.tip, alpha="critical")
+    cloud = sr.compute_cloud(sr.designs.minimal_trunk(), 2000)
+    sr.concave_hull(cloud.tip, alpha=0.2)
+    hull = sr.concave_hull(cloud.tip, alpha="critical")
     Surface(vertices=hull.vertices, faces=hull.faces).distance(hull.vertices[:2])
     tips = cloud.tip.values
     alpha_hull(tips, 0.1, boxes=2)
-    concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
-    for design in (designs.minimal_trunk(), designs.redundant_trunk()):
-        activation_distance(compute_cloud(design, 2000), 0.1)
+    sr.concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
+    for design in (sr.designs.minimal_trunk(), sr.designs.redundant_trunk()):
+        sr.activation_distance(sr.compute_cloud(design, 2000), 0.1)
 
 
 def _triangle() -> None:
@@ -132,20 +112,15 @@ def _triangle() -> None:
 
 
 def _loaded() -> Iterator[object]:
-    from softreach.arm import designs
-    from softreach.arm.loads import Loads
-    from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
-    from softreach.rod.loaded.all_equilibria import equilibria
-
-    free = designs.lce_arm()
+    free = sr.designs.lce_arm()
     rest, pulled = [0.0] * free.bundles, free.input_bounds[:, 0].tolist()
-    weight = free.replace(loads=Loads(gravity=(0, 0, 9.81), payload=0.001))
-    follower = free.replace(loads=Loads(follower_force=(0, 0.001, 0)))
+    weight = free.replace(loads=sr.Loads(gravity=(0, 0, 9.81), payload=0.001))
+    follower = free.replace(loads=sr.Loads(follower_force=(0, 0.001, 0)))
     for arm in (weight, follower):
-        yield tip_positions(arm, [rest])
-        yield tip_jacobian(arm, [rest])
-        yield configuration(arm, rest)
-    yield equilibria(weight, pulled)
+        yield sr.tip_positions(arm, [rest])
+        yield sr.tip_jacobian(arm, [rest])
+        yield sr.configuration(arm, rest)
+    yield sr.equilibria(weight, pulled)
 
 
 _JOBS = {"free": _free, "loaded": _loaded}
@@ -156,21 +131,21 @@ def doctor(*, json: AsJson = False) -> None:
 
     Example: softreach doctor --json
     """
-    from softreach.support.memory import free_memory
-    from softreach.support.parallel import thread_count
-
+    names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
+    has_screen = platform.system() in ("Windows", "Darwin")
+    has_screen = has_screen or bool({"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ})
     rows = {
-        "softreach": (softreach.__version__, ""),
-        "installed in": (str(Path(softreach.__file__).parent), ""),
+        "softreach": (sr.__version__, ""),
+        "installed in": (str(Path(sr.__file__).parent), ""),
         "Python": (platform.python_version(), ""),
         "system": (platform.platform(), ""),
         "cores": (os.cpu_count(), ""),
         "threads used": (thread_count(), ""),
         "free memory": (round(free_memory() / 1e9, 1), "GB"),
         "kernels are kept in": (_kernel_cache(), ""),
-        "screen": (_screen(), ""),
+        "screen": ("yes" if has_screen else "none: headless", ""),
     }
-    rows |= {name: (_version(name), "") for name in _requirements()}
+    rows |= {name: (_version(name), "") for name in names if name != "softreach"}
     console.rows("this machine and this installation", rows, json)
 
 
@@ -182,18 +157,6 @@ def _kernel_cache() -> str:
     if not_kept:
         return f"nowhere: {not_kept[0]}"
     return str(getattr(getattr(tips._tips, "_cache", None), "cache_path", "nowhere: not compiled"))
-
-
-def _screen() -> str:
-    if platform.system() in ("Windows", "Darwin"):
-        return "yes"
-    return "yes" if {"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ} else "none: headless"
-
-
-def _requirements() -> list[str]:
-    """Packages that softreach and its extras need, each once."""
-    names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
-    return [name for name in dict.fromkeys(names) if name != "softreach"]
 
 
 def _version(package: str) -> str:

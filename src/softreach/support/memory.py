@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import math
 import os
+import re
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -13,22 +15,12 @@ from softreach.support.errors import NotPossible
 
 _UNKNOWN = 4e9  # where the system does not say
 _NOTICED = 1e8  # bytes; below, the system is not asked
-_CONTROL_GROUP = Path("/sys/fs/cgroup")
-_CONTROL_GROUPS = (
-    ("memory.max", "memory.current", "memory.stat", "inactive_file"),
-    (
-        "memory/memory.limit_in_bytes",
-        "memory/memory.usage_in_bytes",
-        "memory/memory.stat",
-        "total_inactive_file",
-    ),
-)
-"""Files of versions 2 and 1: limit, use, and the name and place of the cache that gives way."""
+_CONTROL_GROUP = Path("/sys/fs/cgroup")  # of version 2
 
 
 def free_memory() -> float:
     """Memory that can be had without swapping [bytes], or 4e9 where the system does not say."""
-    return min([_system(), *_control_groups()])
+    return min(_system(), _container())
 
 
 def _system() -> float:
@@ -40,16 +32,15 @@ def _system() -> float:
     return _UNKNOWN
 
 
-def _control_groups() -> list[float]:
+def _container() -> float:
     """Memory that a container leaves of its limit, with the files that it keeps only to read."""
-    found = []
-    for limit, used, stat, kept in _CONTROL_GROUPS:
-        with suppress(OSError, ValueError):  # no such group, or its limit is "max"
-            lines = map(str.split, (_CONTROL_GROUP / stat).read_text().splitlines())
-            cache = next((float(value) for name, value in lines if name == kept), 0.0)
-            free = float((_CONTROL_GROUP / limit).read_text())
-            found.append(free - float((_CONTROL_GROUP / used).read_text()) + cache)
-    return found
+    with suppress(OSError, ValueError):  # no such group, or its limit is "max"
+        limit, used, stat = (
+            (_CONTROL_GROUP / f"memory.{name}").read_text() for name in ("max", "current", "stat")
+        )
+        cache = re.search(r"^inactive_file (\d+)", stat, re.MULTILINE)
+        return float(limit) - float(used) + (float(cache[1]) if cache else 0.0)
+    return math.inf
 
 
 def return_memory() -> None:

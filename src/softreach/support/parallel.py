@@ -25,21 +25,14 @@ class _Unwanted(BaseException):
     """The result is no longer wanted; a task must not take this for a failure of its own."""
 
 
-class _Wanted:
-    def __init__(self, outer: _Wanted | None) -> None:
-        self.given_up, self._outer = False, outer
-
-    def check(self) -> None:
-        """Raise if this pool, or one that it was started in, was given up."""
-        if self.given_up:
-            raise _Unwanted
-        if self._outer is not None:
-            self._outer.check()
-
-
 class _Here(threading.local):
     undivided = False
-    wanted: _Wanted | None = None
+    given_up: tuple[threading.Event, ...] = ()
+    """Set once the pool of this thread, or one that it was started in, is given up."""
+
+    def check_wanted(self) -> None:
+        if any(event.is_set() for event in self.given_up):
+            raise _Unwanted
 
 
 _here = _Here()
@@ -78,7 +71,8 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
     first = list(islice(drawn, 2))
     if len(first) < 2 or _here.undivided:
         for task in chain(first, drawn):
-            _check_wanted()
+            check_stopped()
+            _here.check_wanted()
             task()
         return
     threads = thread_count()
@@ -131,33 +125,28 @@ def meanwhile(task: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
         yield submit(task).result
 
 
-def _check_wanted() -> None:
-    check_stopped()
-    if _here.wanted is not None:
-        _here.wanted.check()
-
-
 Submit = Callable[[Callable[[], Result]], "Future[Result]"]
 
 
 @contextmanager
 def _pool(threads: int) -> Iterator[Submit[Any]]:
     """Threads for a block; if it raises, what has not begun never does."""
-    wanted = _Wanted(_here.wanted)
+    given_up = threading.Event()
+    events = (*_here.given_up, given_up)
 
     def called(task: Callable[[], Any]) -> Any:
-        wanted.check()
-        _here.wanted = wanted
+        _here.given_up = events
+        _here.check_wanted()
         return task()
 
     pool = ThreadPoolExecutor(threads)
     try:
         yield partial(pool.submit, called)
     except BaseException:
-        wanted.given_up = True
+        given_up.set()
         raise
     finally:
-        pool.shutdown(cancel_futures=wanted.given_up)
+        pool.shutdown(cancel_futures=given_up.is_set())
 
 
 def _drain(pending: set[Future[object]]) -> set[Future[object]]:

@@ -18,8 +18,6 @@ from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
 from softreach.support.quantity import columns
 
-__all__ = ["REPORT", "Report", "Reported", "Section", "check_libraries"]
-
 REPORT: Formats = {".html": FileFormat(("jinja2",), "report")}
 """Formats of reports."""
 
@@ -84,9 +82,13 @@ class Report:
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         format_of(path, REPORT)
         check_libraries()
-        template = _template()
+        from jinja2 import Environment, StrictUndefined
+
+        text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
+        pages = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
         pictures = [[(_source(f), c) for f, c in part.figures()] for part in self.sections]
-        page = template.render(report=self, parts=list(zip(self.sections, pictures, strict=True)))
+        parts = list(zip(self.sections, pictures, strict=True))
+        page = pages.from_string(text).render(report=self, parts=parts)
         with writing(path, overwrite=overwrite) as file:
             file.write(page.encode())
 
@@ -112,16 +114,6 @@ def check_libraries() -> None:
         MissingExtra: matplotlib or Jinja2 is not installed.
     """
     check_installed(("matplotlib", "plot"), ("jinja2", "report"))
-
-
-def _template() -> Any:
-    """The page to be filled, everything in it escaped."""
-    from jinja2 import Environment, StrictUndefined
-
-    text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
-    return Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True).from_string(
-        text
-    )
 
 
 def _source(figure: Any) -> str:

@@ -170,7 +170,7 @@ def read_length(text: str, length: float | None = None) -> float:
     text = text.strip()
     if length is not None and text.endswith("L"):
         return length * read_number(text[:-1])
-    return read_number(text) if _is_number(text) else read_quantity(text, "m")
+    return read_quantity(text, "m") if text[-1:].isalpha() else read_number(text)
 
 
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
@@ -189,13 +189,5 @@ def lengths_in(text: str, count: int, length: float | None = None) -> list[float
         values = [read_length(part, length) for part in parts]
     except ValueError:
         return None
-    plain = {_is_number(part) for part, value in zip(parts, values, strict=True) if value}
-    return values if len(parts) == count and len(plain) < 2 else None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        read_number(text)
-    except ValueError:
-        return False
-    return True
+    named = {part.strip()[-1:].isalpha() for part, x in zip(parts, values, strict=True) if x}
+    return values if len(parts) == count and len(named) < 2 else None

@@ -40,8 +40,9 @@ def read_design(path: str | PathLike[str]) -> Manipulator:
             have.
     """
     source = as_path("path", path)
+    text = read_text("definition", source, MEGABYTE)
     try:
-        value = json.loads(read_text("definition", source, MEGABYTE))
+        value = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InvalidInput("definition", source, f"JSON, {error}") from None
     try:

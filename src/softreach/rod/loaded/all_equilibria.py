@@ -42,7 +42,7 @@ from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unst
 from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip
 from softreach.support.arrays import Array, Mask, as_floats
-from softreach.support.errors import InvalidInput, warn
+from softreach.support.errors import InvalidInput, counted, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,15 +131,16 @@ class AllEquilibria:
     def __repr__(self) -> str:
         stable = int((self.status == TipStatus.STABLE).sum())
         doubt = "" if self.complete else ", some may be missing"
-        head = f"<AllEquilibria: {len(self)}, of which {stable} stable; degree {self.degree}{doubt}"
-        return "\n".join([head, *(f"  {self._line(k)}" for k in range(len(self)))]) + ">"
+        count = counted(len(self), "solution")
+        head = f"{count}, of which {stable} stable; degree {self.degree}{doubt}"
+        return "\n  ".join([head, *map(self._line, range(len(self)))])
 
     def _line(self, k: int) -> str:
-        small = _SMALL * self.rod.length
-        tip = ", ".join(f"{x:.4g}" if abs(x) > small else "0" for x in self.tips[k])
+        small = np.abs(self.tips[k]) <= _SMALL * self.rod.length
+        tip = self.rod.arm.length_unit.place(np.where(small, 0.0, self.tips[k]))
         kind = TipStatus(self.status[k]).name.lower() + (" ring" if self.is_ring[k] else "")
         which = ", the posture" if k == self.followed else ""
-        return f"{kind}: tip ({tip}) m, margin {self.margin[k]:.3g}{which}"
+        return f"tip {tip}: {kind}, margin {self.margin[k]:.3g}{which}"
 
 
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))

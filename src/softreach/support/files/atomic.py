@@ -84,11 +84,11 @@ def _refusal(place: Path, mode: int, foreign: Foreign | None, overwrite: bool) -
     if not (stat.S_ISREG(mode) or (is_folder and foreign is not None)):
         return ("a new name: a folder, a device or a pipe is there",)
     if is_folder and foreign is not None and (strange := foreign(place)):
-        hint = f"{strange} is not as softreach wrote it: move it away, or choose another name"
-        return "a new name; a folder with other things is there, which is never replaced", hint
+        hint = f"softreach did not write {strange} in it: move it away, or choose another name"
+        return "a new name: a folder that holds other files is never replaced", hint
     if not overwrite:
         hint = "choose another name, or pass --overwrite (in Python overwrite=True)"
-        return "a new name, as something is there", hint
+        return "a new name, as this one is taken", hint
     return ()
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
 from collections.abc import Callable, Mapping
 from io import BufferedWriter
 from os import PathLike, fspath
@@ -62,15 +61,8 @@ def check_installed(*needed: tuple[str, str]) -> None:
     Raises:
         MissingExtra: Some are not installed.
     """
-    if missing := [(name, extra) for name, extra in needed if not _is_installed(name)]:
+    if missing := [pair for pair in needed if importlib.util.find_spec(pair[0]) is None]:
         raise MissingExtra(*((_PACKAGES.get(name, name), extra) for name, extra in missing))
-
-
-def _is_installed(library: str) -> bool:
-    try:
-        return importlib.util.find_spec(library) is not None
-    except ValueError:  # of modules without a specification
-        return sys.modules.get(library) is not None
 
 
 PICTURES: Formats = dict.fromkeys(

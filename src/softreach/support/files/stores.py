@@ -315,10 +315,9 @@ class CheckedStore(WrapperStore[Any]):
 
 def _sync_in(path: Path, root: Path) -> None:
     """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
-    sync(path)
-    for folder in path.parents:
-        sync(folder)
-        if folder == root:
+    for place in (path, *path.parents):
+        sync(place)
+        if place == root:
             return
 
 

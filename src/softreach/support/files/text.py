@@ -49,10 +49,10 @@ def text_of(name: str, shown: str, content: bytes, most: int) -> str:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        allowed = f"text in UTF-8, but byte {error.start} is none: save it in that encoding"
+        allowed = f"text in UTF-8, which byte {error.start} is not: save it in that encoding"
         raise InvalidInput(name, shown, allowed) from None
     if (place := text.find("\0")) >= 0:
-        allowed = f"text in UTF-8, but character {place} is NUL: save it in that encoding"
+        allowed = f"text, but character {place} is NUL: save it as text in UTF-8"
         raise InvalidInput(name, shown, allowed)
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
