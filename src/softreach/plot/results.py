@@ -10,13 +10,7 @@ import numpy as np
 from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
 from softreach.plot.axes import bounding_box, draw_box, view_extent
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import (
-    figure_style,
-    legend_above,
-    pyplot,
-    remark,
-    write_note,
-)
+from softreach.plot.style import figure_style, legend_above, pyplot, remark, write_note
 from softreach.support.arguments import as_given
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
@@ -352,7 +346,10 @@ def _draw_ranges(ax: Axes, shown: _Designs) -> None:
         for rows, style in styles:
             ax.scatter(shares[rows, k], np.full(rows.sum(), k), **style)
         for place, end, across in ((-0.01, low[k], "right"), (1.01, high[k], "left")):
-            text = _end_text(shown, k, float(end))
+            if choices := str(data["choices"].values[k]):
+                text = choices.split(", ")[round(float(end))]
+            else:
+                text = readable(float(end), str(data["parameter_unit"].values[k]), shown.unit)
             ax.text(place, k, text, ha=across, va="center", fontsize=7, color="0.25")
     ax.set_yticks(range(len(low)), [str(name) for name in data["parameter"].values])
     ax.tick_params(axis="y", length=0, pad=42)
@@ -360,9 +357,3 @@ def _draw_ranges(ax: Axes, shown: _Designs) -> None:
     word = "the best" if shown.front.sum() < 2 else "the front"
     remark(ax, f"free parameters in their ranges, {word} ◆")
     ax.spines[:].set_visible(False)
-
-
-def _end_text(shown: _Designs, k: int, end: float) -> str:
-    if choices := str(shown.data["choices"].values[k]):
-        return choices.split(", ")[round(end)]
-    return readable(end, str(shown.data["parameter_unit"].values[k]), shown.unit)

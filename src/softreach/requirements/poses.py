@@ -90,8 +90,8 @@ class PoseRules:
 
     def judged(self, gamma: Array) -> Judged:
         """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""
-        value, error = np.zeros((len(gamma), len(self))), np.zeros((len(gamma), len(self)))
-        if not len(self) or not len(gamma):
+        value, error = np.zeros((2, len(gamma), len(self)))
+        if not value.size:
             return Judged(value, value, error)
         for block in parallel.blocks(len(gamma), _BLOCK):
             k = len(self.keeps)
@@ -112,7 +112,9 @@ class PoseRules:
         left: dict[int, Index] = {}
         for column, keep in enumerate(self.keeps):
             if keep.of == "tip":
-                value[:, column] = _tips_missed(keep, self.rod.tips(gamma))
+                tips = self.rod.tips(gamma)
+                missed = keep.missed(np.nan_to_num(tips))
+                value[:, column] = np.where(np.isnan(tips).any(axis=1), np.nan, missed)
             else:
                 left[column] = np.arange(len(gamma))
         for parts in levels:
@@ -235,13 +237,6 @@ def _widest(arm: Manipulator, z: Array) -> Array:
     return radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
 
 
-def _tips_missed(keep: Keep, tips: Array) -> Array:
-    """Distances by which tips miss a region [m], NaN where there is none, shape (n,)."""
-    missed = keep.missed(np.where(np.isnan(tips), 0.0, tips))
-    missed[np.isnan(tips).any(axis=1)] = np.nan
-    return missed
-
-
 class Posed(NamedTuple):
     """The pose chosen for each place, under one payload."""
 
@@ -286,18 +281,14 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
         if error.name != "loads":
             raise
         return _without_equilibrium(rules, places)
-    best = _best(rules, solutions)
-    broken = (best.excess.sum(axis=1) > 0.0) & (solutions.statuses == Status.REACHED)
-    if (as_tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
-        rows = np.flatnonzero(broken)
+    best, reached = _best(rules, solutions), solutions.statuses == Status.REACHED
+    rows = np.flatnonzero((best.excess.sum(axis=1) > 0.0) & reached)
+    if (as_tip_map(arm).box.dimension > 3) and 0 < len(rows) <= _MOST_TRIED:
         with no_warnings():
-            family = solve_inverse(
-                prepared_map(arm, TOL, cells=_CELLS), places[rows], family=_FAMILY
-            )
+            family = solve_inverse(prepared, places[rows], family=_FAMILY)
         for all_places, some in zip(best, _best(rules, family), strict=True):
             all_places[rows] = some
     # A place that is reached to the error of the tips is reached.
-    reached = solutions.statuses == Status.REACHED
     gaps = np.where(reached, np.minimum(best.gaps, TOL * arm.length), best.gaps)
     return best._replace(gaps=gaps)
 
