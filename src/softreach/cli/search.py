@@ -156,7 +156,7 @@ def search(
     text = read_text("requirements", needs, LONGEST)
     designs_from = partial(design_from, changes=Changes(point=point))
     asked = read_search(text, needs.parent, designs_from, source=str(needs), given=given)
-    base = asked.base
+    base = asked["base"]
     arm = shown_in(unit, next(iter(base.values())) if isinstance(base, Mapping) else base)
     check_folder(out, overwrite=overwrite)
     if storage is None:
@@ -171,22 +171,13 @@ def search(
     return _EXIT[result.verdict]
 
 
-def _searched(asked: Any, storage: Path) -> Search:
+def _searched(asked: dict[str, Any], storage: Path) -> Search:
     from softreach import optimization
     from softreach.support import progress
 
     watch = _Watch()
-    with progress.bar(watch.label, asked.options.get("designs", 200)) as step:
-        return optimization.search(
-            asked.base,
-            asked.free,
-            asked.requirements,
-            choices=asked.choices,
-            storage=storage,
-            follow=watch,
-            progress=step,
-            **asked.options,
-        )
+    with progress.bar(watch.label, asked.get("designs", 200)) as step:
+        return optimization.search(**asked, storage=storage, follow=watch, progress=step)
 
 
 class _Watch:

@@ -34,7 +34,7 @@ class Estimate(NamedTuple):
     """A number and how far off it may be."""
 
     value: float
-    error: float
+    error: float = np.nan
 
 
 def solid_volume(
