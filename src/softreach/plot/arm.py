@@ -18,6 +18,7 @@ from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import (
     WIDTH,
+    a_result,
     figure_style,
     legend_above,
     pyplot,
@@ -239,9 +240,7 @@ def plot_check(
         InvalidInput: Unknown view or unit, or no check.
         MissingExtra: matplotlib is not installed.
     """
-    if isinstance(check, type) or not hasattr(check, "requirements"):
-        raise InvalidInput("check", as_given(check), "what `check` returned")
-    arm = check.arm
+    arm = a_result("check", check, "Check", "check").arm
     counted = unit_for(arm.length, arm.length_unit if unit is None else unit)
     shapes = shapes_of(check.shapes(_POSES)) or [rest_configuration(arm)]
     points = [arm_points(arm, shape, counted) for shape in shapes]

@@ -133,7 +133,7 @@ def _bundles(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[tuple[Ar
             handle: Artist = Line2D([], [], **_tendon_style(color))
         else:
             lumen = bundle.shape == "lumen"
-            handle = Patch(**(_lumen_style(color) if lumen else {"color": color}))
+            handle = Patch(**_lumen_style(color)) if lumen else Patch(color=color)
         course = "" if bundle.course == "along" else f", {bundle.course}"
         symbol, unit = arm.bundle_actuators[k].symbol, arm.bundle_units[k].replace("1", "-")
         yield handle, f"{arm.bundle_names[k]}{course}: {symbol} [{unit}]"

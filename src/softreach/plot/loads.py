@@ -13,10 +13,10 @@ from softreach.picture.projection import View, on_paper
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import figure_style, small_axes
+from softreach.plot.style import a_result, figure_style, small_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import POSITIVE, as_given, as_number
+from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 from softreach.support.quantity import round_below
@@ -66,9 +66,7 @@ def plot_equilibria(
         InvalidInput: Unknown view.
         MissingExtra: matplotlib is not installed.
     """
-    if type(equilibria).__name__ != "AllEquilibria":  # a class that need not be loaded
-        allowed = "what `softreach.equilibria` returned"
-        raise InvalidInput("equilibria", as_given(equilibria), allowed)
+    a_result("equilibria", equilibria, "AllEquilibria", "softreach.equilibria")
     arm = equilibria.rod.arm
     shapes = shapes_of(equilibria.configuration(_STATIONS))
     stable = equilibria.status == TipStatus.STABLE

@@ -175,6 +175,13 @@ def write_note(ax: Axes, text: str, right: float, up: float) -> None:
     ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)
 
 
+def a_result(name: str, value: Any, kind: str, maker: str) -> Any:
+    """What a function returned, of a class of that name, which need not be loaded."""
+    if kind in [base.__name__ for base in type(value).__mro__]:
+        return value
+    raise InvalidInput(name, as_given(value), f"what `{maker}` returned")
+
+
 def a_surface(name: str, value: Any) -> SurfaceMesh:
     """Anything with vertices and faces that index them."""
     allowed = "an object with vertices [m], shape (v, 3), and faces, shape (f, 3)"

@@ -20,15 +20,7 @@ from softreach.requirements.findings import (
     verdict_of,
 )
 from softreach.requirements.parts import Keep, Target
-from softreach.requirements.poses import (
-    TOL,
-    Chooser,
-    Posed,
-    PoseRules,
-    chosen,
-    descended,
-    solved,
-)
+from softreach.requirements.poses import TOL, Posed, PoseRules, solved
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.bending import bending_over_bounds
@@ -266,7 +258,7 @@ def quick_check(
     A place that these do not reach counts as missed, although another pose may reach it.
     """
     sets = sets_to(accuracy, quiet=True) if sets is None else sets
-    return checked(arm, requirements, accuracy, sets, choose=descended)
+    return checked(arm, requirements, accuracy, sets, quick=True)
 
 
 def sets_to(accuracy: float, *, quiet: bool = False) -> Sets:
@@ -282,9 +274,9 @@ def checked(
     sets: Sets,
     step: Progress = silent,
     *,
-    choose: Chooser = chosen,
+    quick: bool = False,
 ) -> Check:
-    """As `check`, with reachable sets to its accuracy, and poses that are chosen for places."""
+    """As `check`, with reachable sets to its accuracy; `quick` as `quick_check`."""
     payloads = tuple(needs.payloads) or (None,)
     keeps = tuple(keep for keep in needs.keeps if keep.when == "targets" and needs.targets)
     every: list[PoseRules] = []
@@ -293,10 +285,10 @@ def checked(
     for payload, loaded in zip(payloads, needs.under_payloads(arm), strict=True):
         rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
-        if choose is descended:  # on the way, with shapes in no more steps than tips
+        if quick:  # on the way, with shapes in no more steps than tips
             rod = as_tip_map(loaded, _ROUGH_TOL)
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
-        posed.append(solved(rules, needs.places, needs.within, step, choose))
+        posed.append(solved(rules, needs.places, needs.within, step, quick=quick))
         for target in needs.targets:
             if target.region is not None:
                 coverages.append(_coverage(rules, target, payload, accuracy, sets, step))
@@ -326,7 +318,7 @@ def _coverage(
     places = target.region.places(count)
     near = max(target.within, TOL * rules.arm.length)
     if len(rules):
-        posed = solved(rules, places, np.full(count, target.within), step, chosen)
+        posed = solved(rules, places, np.full(count, target.within), step)
         inside = (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
     else:
         inside = np.zeros(count, bool)

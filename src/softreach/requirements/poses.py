@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -252,14 +252,14 @@ class Posed(NamedTuple):
     """Of the values of regions between stations [m], shape (place, rule)."""
 
 
-Chooser = Callable[[PoseRules, Array, Array], Posed]
-"""Poses under rules for places, each with the distance to which it must be reached."""
-
-
 def solved(
-    rules: PoseRules, places: Array, within: Array, step: Progress, choose: Chooser
+    rules: PoseRules, places: Array, within: Array, step: Progress, *, quick: bool = False
 ) -> Posed:
-    """The poses at places, in blocks."""
+    """The poses at places, each with the distance to which it must be reached; in blocks.
+
+    From all solutions of the inverse, or `quick` ones from a few descents.
+    """
+    choose = _descended if quick else _chosen
     count, inputs, k = len(places), rules.arm.inputs, len(rules)
     shapes = ((), (inputs,), (), (3,), (k,), (k,), (k,))
     room = Posed(*(np.zeros((count, *shape)) for shape in shapes))
@@ -270,8 +270,7 @@ def solved(
     return room
 
 
-def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
-    """Poses at places from all solutions of the inverse."""
+def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     arm = rules.arm
     try:
         with no_warnings():
@@ -293,7 +292,7 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     return best._replace(gaps=gaps)
 
 
-def descended(rules: PoseRules, places: Array, within: Array) -> Posed:
+def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     """Poses at the ends of descents from the samples whose tips are nearest to each place."""
     from scipy.spatial import KDTree
 
