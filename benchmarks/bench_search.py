@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -137,16 +138,17 @@ def places(seeds: int = 10) -> Iterator[str]:
             log: list[Candidate] = []
             cpu = time.process_time()
             found = sr.search(
-                changed_bundles(asked.base),
-                asked.free,
-                asked.requirements.replace(payloads=(0.03,)),
+                changed_bundles(asked["base"]),
+                asked["free"],
+                asked["requirements"].replace(payloads=(0.03,)),
                 minimize="worst_effort",
                 designs=100,
                 seed=seed,
                 follow=log.append,
                 **options,
             )
-            log.append(found.best.with_designs(found.designs - sum(each.designs for each in log)))
+            left = found.designs - sum(each.designs for each in log)
+            log.append(replace(found.best, designs=left))
             runs.setdefault(method, []).append((log, time.process_time() - cpu))
     best = min(least(log)[-1] for each in runs.values() for log, _ in each)
     yield "| method | least effort, median | designs to 1 % of the best | CPU |"

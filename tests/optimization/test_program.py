@@ -21,13 +21,13 @@ from softreach.optimization.problem import (
     Goal,
     Objective,
     Problem,
-    Value,
     goals,
 )
 from softreach.optimization.program import DesignPoint, Point, stacked, stacked_slopes
 from softreach.requirements import Box, Keep, Limits, Requirements, Sphere, Target
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.workspace import volume_gradient
+from softreach.workspace.measure import Estimate
 
 ARM = sr.designs.minimal_trunk(revolution=np.radians(40), taper=np.radians(2))
 PLACES = sr.tip_positions(ARM, [[-0.4, -0.7, -0.2], [-0.9, -0.2, -0.6]])
@@ -214,9 +214,7 @@ def test_effort_is_differentiated_with_poses_that_follow():
 
 def of_design(name, compute):
     """A goal that is a function of the arm."""
-    return Goal(
-        Objective(name=name, unit="1", meaning="", compute=lambda case: compute(case.arm)), 1.0
-    )
+    return Goal(Objective(name, "1", "", lambda case: compute(case.arm), smooth=False), 1.0)
 
 
 def test_indices_of_a_sum_are_shares_of_its_variances():
@@ -227,10 +225,10 @@ def test_indices_of_a_sum_are_shares_of_its_variances():
         first, second = (
             (known[name].value(arm) - low) / (high - low) for name, (low, high) in ends.items()
         )
-        return Value(2.0 * first + second)
+        return Estimate(2.0 * first + second)
 
     asked = replace(
-        within(ends), goals=(of_design("sum", total), of_design("1", lambda _: Value(1.0)))
+        within(ends), goals=(of_design("sum", total), of_design("1", lambda _: Estimate(1.0)))
     )
     best = Candidate(values={"length": 1.0, "taper": 0.005})
     shares, constant = sensitivity(asked, best, n=256).variance

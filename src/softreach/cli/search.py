@@ -148,7 +148,7 @@ def search(
     text = read_text("requirements", needs, LONGEST)
     designs_from = partial(design_from, changes=Changes(point=point))
     asked = read_search(text, needs.parent, designs_from, source=str(needs), given=given)
-    base = asked.base
+    base = asked["base"]
     arm = shown_in(unit, next(iter(base.values())) if isinstance(base, Mapping) else base)
     check_folder(out, overwrite=overwrite)
     if storage is None:
@@ -163,19 +163,10 @@ def search(
     return _EXIT[result.verdict]
 
 
-def _searched(asked: Any, storage: Path) -> sr.optimization.Search:
+def _searched(asked: dict[str, Any], storage: Path) -> sr.optimization.Search:
     watch = _Watch()
-    with progress.bar(watch.label, asked.options.get("designs", 200)) as step:
-        return sr.search(
-            asked.base,
-            asked.free,
-            asked.requirements,
-            choices=asked.choices,
-            storage=storage,
-            follow=watch,
-            progress=step,
-            **asked.options,
-        )
+    with progress.bar(watch.label, asked.get("designs", 200)) as step:
+        return sr.search(**asked, storage=storage, follow=watch, progress=step)
 
 
 class _Watch:

@@ -12,7 +12,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters, shifted
 from softreach.arm.tables import check_extension
-from softreach.requirements.requirements import Requirements, Target, with_payload
+from softreach.requirements.requirements import Requirements, Target
 from softreach.support import parallel
 from softreach.support.arguments import as_mapping, as_number
 from softreach.support.arrays import Array
@@ -179,16 +179,15 @@ class FirstOrder:
     ) -> None:
         self.deviations, self.needs = deviations, needs
         self.accuracy, self.changes = accuracy, changes
-        self.targets = [target for target in needs.targets if target.places is not None]
-        self.regions = [target for target in needs.targets if target.region is not None]
+        self.targets = [target for target in needs.targets if target.region is None]
+        self.regions = [(x, x.region.places(_IN_REGION)) for x in needs.targets if x.region]
         self.gradient = volume_gradient(deviations.arm, deviations.names, accuracy=accuracy)
         self.solid = self.gradient.solid
         self.boundary = MovingBoundary.of(self.solid, deviations.parameters)
-        self.loaded = [self._under(payload) for payload in needs.payloads or (None,)]
+        self.loaded = [self._of(arm) for arm in needs.under_payloads(deviations.arm)]
 
-    def _under(self, payload: float | None) -> tuple[ReachableSet | None, MovingBoundary | None]:
-        """Set under a payload, and its boundary; none of either where nothing is stable."""
-        arm = with_payload(self.deviations.arm, payload)
+    def _of(self, arm: Manipulator) -> tuple[ReachableSet, MovingBoundary] | None:
+        """Set of the arm under a payload, and its boundary; None where nothing is stable."""
         if arm is self.deviations.arm or not self.needs.targets:
             return self.solid, self.boundary
         try:
@@ -196,8 +195,9 @@ class FirstOrder:
         except InvalidInput as error:
             if error.name != "loads":
                 raise
-            return None, None
+            return None
         if solid.dimension < 3:
+            payload = arm.loads.payload if arm.loads else 0.0
             raise NotPossible(f"with {payload:g} kg at its tip the arm reaches no volume")
         known = find_parameters(arm, self.deviations.names)
         return solid, MovingBoundary.of(solid, tuple(known.values()))
@@ -235,18 +235,16 @@ class FirstOrder:
 
     def depths(self, places: Array, within: float) -> Iterator[tuple[Array, Array]]:
         """Depth of places within reach [m], and how the boundary there moves, by payloads."""
-        for solid, boundary in self.loaded:
-            if solid is None or boundary is None:
-                yield (
-                    np.full(len(places), -np.inf),
-                    np.zeros((len(places), len(self.deviations.sigmas))),
-                )
+        for known in self.loaded:
+            if known is None:
+                still = np.zeros((len(places), len(self.deviations.sigmas)))
+                yield np.full(len(places), -np.inf), still
             else:
+                solid, boundary = known
                 yield within - solid.distance(places), boundary.speed_at(places)
 
     def probability(self, target: Target) -> Array:
         """Probability that each place is reached, under the worst payload."""
-        assert target.places is not None
         sigmas, within = self.deviations.sigmas, max(target.within, TOL * self.solid.arm.length)
         each = (
             probabilities(depth, np.linalg.norm(speed * sigmas, axis=1))
@@ -254,9 +252,8 @@ class FirstOrder:
         )
         return np.min([*each], axis=0)
 
-    def covered(self, target: Target) -> Spread:
-        """Share of a region that is covered, under the worst payload."""
-        places = region_places(target)
+    def covered(self, target: Target, places: Array) -> Spread:
+        """Share of a region with these places that is covered, under the worst payload."""
         shares, nominal = np.ones(len(self.changes)), 1.0
         for depth, speed in self.depths(places, target.within):
             nominal = min(nominal, float((depth >= 0.0).mean()))
@@ -271,9 +268,3 @@ def _spread_of(name: str, shares: Array, nominal: float, mean: float, error: flo
     low, deviation = max(0.0, float(np.quantile(shares, _QUANTILE))), float(shares.std())
     first = dict(nominal=nominal, mean=mean, deviation=deviation, quantile=low, error=error)
     return Spread(name=name, unit="1", **first)  # pyright: ignore[reportArgumentType]
-
-
-def region_places(target: Target) -> Array:
-    """Places of a region by which its share is measured."""
-    assert target.region is not None
-    return target.region.places(_IN_REGION)

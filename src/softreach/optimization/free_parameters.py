@@ -96,6 +96,11 @@ class FreeParameters:
         return len(self.free)
 
     @property
+    def base(self) -> Manipulator:
+        """The first of the designs."""
+        return next(iter(self.bases.values()))
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the free parameters."""
         return tuple(parameter.name for parameter in self.free)
@@ -116,9 +121,7 @@ class FreeParameters:
         Raises:
             InvalidDesign: No such arm can exist, or some activation would shorten it to nothing.
         """
-        arm = (
-            self.bases[str(values[DESIGN])] if DESIGN in values else next(iter(self.bases.values()))
-        )
+        arm = self.bases[str(values[DESIGN])] if DESIGN in values else self.base
         for name, make in _CHOICES.items():
             if name in values:
                 arm = make(arm, values[name])
@@ -147,8 +150,8 @@ class FreeParameters:
 
     def start(self) -> dict[str, float | str] | None:
         """Values of the first base, within the ranges; None where it does not tell them."""
-        arm = next(iter(self.bases.values()))
-        known, values = parameters_by_every_name(arm), {}
+        arm, values = self.base, {}
+        known = parameters_by_every_name(arm)
         for parameter in self.free:
             if parameter.name in _WORDS:
                 values[parameter.name] = parameter.choices[0]
@@ -226,8 +229,7 @@ def _parameter(known: Mapping[str, Parameter], name: str) -> Parameter:
 def _ranged(known: Mapping[str, Parameter], name: str, ends: Any) -> FreeParameter:
     parameter = _parameter(known, name)
     try:
-        low, high = (plain(end) for end in ends)
-        low, high = float(low), float(high)
+        low, high = (float(plain(end)) for end in ends)
     except (TypeError, ValueError):
         allowed = "a range (low, high), or text that ties it to a free parameter"
         raise InvalidInput(f"free {name}", as_given(ends), allowed) from None
@@ -236,9 +238,8 @@ def _ranged(known: Mapping[str, Parameter], name: str, ends: Any) -> FreeParamet
     for end in (low, high):
         if not parameter.range._replace(whole=False).admits(end):
             raise InvalidInput(f"free {name}", end, f"in its range: {parameter.range.text}")
-    if parameter.whole:
-        low, high = float(np.ceil(low)), float(np.floor(high))
     whole = parameter.whole
+    low, high = (float(np.ceil(low)), float(np.floor(high))) if whole else (low, high)
     return FreeParameter(name=name, unit=parameter.unit, low=low, high=high, whole=whole)
 
 
@@ -290,10 +291,10 @@ def _with_bundles(arm: Manipulator, count: Any) -> Manipulator:
         what = "arms with drives" if arm.drives else f"{first.name}, which has no offset"
         raise NotPossible(f"the number of bundles cannot be chosen for {what}")
     offset = float(first.value_on("offset", arm.profile, arm.section))
-    turns = offset + 2.0 * np.pi * np.arange(count) / count
+    turns = (offset + 2.0 * np.pi * np.arange(count) / count) % (2.0 * np.pi)
     copies = (
-        first.replace(name=f"{first.name} {k + 1}", offset=float(turn % (2.0 * np.pi)))
-        for k, turn in enumerate(turns)
+        first.replace(name=f"{first.name} {k}", offset=turn)
+        for k, turn in enumerate(turns.tolist(), 1)
     )
     return arm.replace(actuators=tuple(copies))
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -25,15 +26,6 @@ _GENTLE = 0.1  # of the cost: the first step is along its slope, and as long
 _BACK = (0.05, 0.1, 0.2, 0.4)  # of the way from an end that misses something to its start
 _AMPLE = 24  # designs of which some are kept for that way back
 _WORSE = 10.0  # times the cost of the start: a design that cannot exist
-
-
-class Polished(NamedTuple):
-    """The end of a polish."""
-
-    candidate: Candidate
-    """The better of both ends, judged as its start was."""
-    designs: int
-    """Designs that were looked at; none for a start that is too far from what is required."""
 
 
 def can_polish(problem: Problem) -> bool:
@@ -58,7 +50,7 @@ def polished(
     goal: int = 0,
     floors: Sequence[float] = (),
     designs: int = MOST_DESIGNS,
-) -> Polished:
+) -> Candidate:
     """The local optimum of one goal next to a design; poses at the targets move along with it.
 
     Args:
@@ -68,30 +60,34 @@ def polished(
         goal: Number of the goal that is optimized.
         floors: Costs of all goals that are not to be exceeded, but for that one.
         designs: Most designs that are made.
+
+    Returns:
+        The better of both ends, with the number of designs that were looked at: none for a start
+        that is too far from what is required.
     """
     if start.excess > _HOPELESS:
-        return Polished(start, 0)
-    allowed, most = designs, designs - len(_BACK) * (start.is_feasible and designs >= _AMPLE)
-    program = _Program(problem, start, accuracy or problem.coarse, goal, floors, most)
+        return replace(start, designs=0)
+    accuracy = accuracy or problem.coarse
+    kept = len(_BACK) * (start.is_feasible and designs >= _AMPLE)
+    program = _Program(problem, start, accuracy, goal, floors, designs - kept)
     try:
-        first = program.begin()
-        end = _solved(program, first)
+        end = program.optimum()
         candidate = problem.judged(program.values_of(end), program.point(end).design.case)
-        designs = program.designs
+        spent = program.designs
         if start.is_feasible and not candidate.is_feasible:
             # A program that was cut, or stalled, ends a little outside of what is required.
             low, high = (problem.parameters.reals(each.values) for each in (candidate, start))
-            for back in _BACK[: max(allowed - designs, 0)]:
+            for back in _BACK[: max(designs - spent, 0)]:
                 values = problem.parameters.moved(start.values, low + back * (high - low))
-                again = problem.judged(values, problem.case(values, accuracy or problem.coarse))
-                designs += 1
+                again = problem.judged(values, problem.case(values, accuracy))
+                spent += 1
                 if again.is_feasible:
                     candidate = again
                     break
     except (InvalidDesign, InvalidInput):
-        return Polished(start, max(1, program.designs))
+        return replace(start, designs=max(1, program.designs))
     better = min((start, candidate), key=problem.score) if len(problem.goals) < 2 else candidate
-    return Polished(better, designs)
+    return replace(better, designs=spent)
 
 
 @no_warnings()
@@ -101,59 +97,32 @@ def point_of(problem: Problem, candidate: Candidate, accuracy: float, goal: int 
     Raises:
         InvalidDesign: It is no design.
     """
-    program = _Program(problem, candidate, accuracy, goal, ())
+    program = _Program(problem, candidate, accuracy, goal)
     return program.point(program.begin())
-
-
-def _solved(program: _Program, first: Array) -> Array:
-    from scipy.optimize import minimize
-
-    point = program.point(first)
-    constraints = []
-    for kind, parts in (("eq", point.equations), ("ineq", point.inequalities)):
-        if parts:
-            fun, jac = program.asked(kind, stacked), program.asked(kind, stacked_slopes)
-            constraints.append({"type": kind, "fun": fun, "jac": jac})
-    try:
-        end = minimize(
-            program.cost,
-            first,
-            jac=program.cost_slope,
-            bounds=[(0.0, 1.0)] * len(first),
-            constraints=constraints,
-            method="SLSQP",
-            options={"maxiter": _ITERATIONS, "ftol": program.tolerance},
-        ).x
-    except _Spent:
-        end, program.accepted = program.accepted, np.empty(0)
-    return np.clip(end, 0.0, 1.0) if np.isfinite(end).all() else first
 
 
 class _Spent(Exception):
     """A polish has looked at as many designs as it may."""
 
 
+@dataclass(eq=False)
 class _Program:
     """The program of one start: unknowns are the real parameters and the poses, from 0 to 1."""
 
-    def __init__(
-        self,
-        problem: Problem,
-        start: Candidate,
-        accuracy: float,
-        goal: int,
-        floors: Sequence[float],
-        most: int = MOST_DESIGNS,
-    ) -> None:
-        self.designs, self._most = 0, most
-        """Designs made so far."""
-        self.accepted = np.empty(0)
-        """Unknowns at which the last quadratic program was set up."""
-        self._problem, self._start, self._accuracy = problem, start, accuracy
-        self._goal, self._floors = goal, floors
-        self._shape, self._scale = (0, 0), 1.0
-        self._points: dict[bytes, Point] = {}
-        self._like: Sequence[TipMap] = ()
+    problem: Problem
+    start: Candidate
+    accuracy: float
+    goal: int
+    floors: Sequence[float] = ()
+    most: int = MOST_DESIGNS
+    designs: int = 0
+    """Designs made so far."""
+    accepted: Array = field(default_factory=lambda: np.empty(0))
+    """Unknowns at which the last quadratic program was set up."""
+    _shape: tuple[int, ...] = (0, 0)  # of the poses
+    _scale: float = 1.0
+    _points: dict[bytes, Point] = field(default_factory=dict)
+    _like: Sequence[TipMap] = ()
 
     def begin(self) -> Array:
         """Unknowns of the start.
@@ -161,12 +130,12 @@ class _Program:
         Raises:
             InvalidDesign: It is no design.
         """
-        problem = self._problem
-        low, high = problem.parameters.bounds.T
-        reals = (problem.parameters.reals(self._start.values) - low) / (high - low)
+        parameters = self.problem.parameters
+        low, high = parameters.bounds.T
+        reals = (parameters.reals(self.start.values) - low) / (high - low)
         poses = np.empty((0, 0))
-        if len(problem.requirements.places):
-            case = problem.case(self._start.values, self._accuracy)
+        if len(self.problem.requirements.places):
+            case = self.problem.case(self.start.values, self.accuracy)
             box = as_tip_map(case.arm).box
             gamma = np.nan_to_num(case.check.poses.reshape(-1, box.bundles))
             poses = np.clip(box.to_cube(box.clip(gamma))[:, box.free], 0.0, 1.0)
@@ -177,38 +146,62 @@ class _Program:
         self._scale = (abs(self.point(first).cost) or 1.0) / _GENTLE
         return first
 
-    @property
-    def tolerance(self) -> float:
-        """Change of the cost, over that of the start, at which the program ends."""
-        return _TOLERANCE * self._accuracy * _GENTLE
+    def optimum(self) -> Array:
+        """Unknowns at which the program ends, or at which it was cut.
+
+        Raises:
+            InvalidDesign: The start is no design.
+        """
+        from scipy.optimize import minimize
+
+        first, constraints = self.begin(), []
+        for kind, parts in (("eq", "equations"), ("ineq", "inequalities")):
+            if getattr(self.point(first), parts):
+                fun, jac = (partial(self._asked, parts, of) for of in (stacked, stacked_slopes))
+                constraints.append({"type": kind, "fun": fun, "jac": jac})
+        # A cost that changes by less, over that of the start, is that of the end.
+        options = {"maxiter": _ITERATIONS, "ftol": _TOLERANCE * self.accuracy * _GENTLE}
+        try:
+            end = minimize(
+                self._cost,
+                first,
+                jac=self._cost_slope,
+                bounds=[(0.0, 1.0)] * len(first),
+                constraints=constraints,
+                method="SLSQP",
+                options=options,
+            ).x
+        except _Spent:
+            end, self.accepted = self.accepted, np.empty(0)
+        return np.clip(end, 0.0, 1.0) if np.isfinite(end).all() else first
 
     def values_of(self, unknowns: Array) -> Values:
-        parameters = self._problem.parameters
+        parameters = self.problem.parameters
         low, high = parameters.bounds.T
         reals = low + unknowns[: len(low)] * (high - low)
-        return parameters.moved(self._start.values, np.clip(reals, low, high))
+        return parameters.moved(self.start.values, np.clip(reals, low, high))
 
     def point(self, unknowns: Array) -> Point:
         """The program at some unknowns; designs that differ in their poses alone are made once."""
         key = unknowns.tobytes()
         if key not in self._points:
-            count = len(self._problem.parameters.real)
+            count = len(self.problem.parameters.real)
             reals, poses = unknowns[:count].copy(), unknowns[count:].reshape(self._shape).copy()
             alike = (p.design for p in self._points.values() if (p.reals == reals).all())
             design = next(alike, None)
             if design is None:
                 # one is left for the design that it ends with
-                if self.designs >= self._most - 1 and len(self.accepted):
+                if self.designs >= self.most - 1 and len(self.accepted):
                     raise _Spent
                 self.designs += 1
                 values = self.values_of(unknowns)
-                design = DesignPoint(self._problem, values, self._accuracy, self._like)
+                design = DesignPoint(self.problem, values, self.accuracy, self._like)
             if len(self._points) > 3:
                 self._points.pop(next(iter(self._points)))
-            self._points[key] = Point(design, reals, poses, self._goal, self._floors)
+            self._points[key] = Point(design, reals, poses, self.goal, self.floors)
         return self._points[key]
 
-    def cost(self, unknowns: Array) -> float:
+    def _cost(self, unknowns: Array) -> float:
         """Cost over that of the start; that of a design that cannot exist is large."""
         try:
             cost = self.point(unknowns).cost / self._scale
@@ -216,18 +209,13 @@ class _Program:
             return _WORSE
         return cost if math.isfinite(cost) else _WORSE
 
-    def cost_slope(self, unknowns: Array) -> Array:
+    def _cost_slope(self, unknowns: Array) -> Array:
         self.accepted = unknowns.copy()
         try:
             return np.nan_to_num(self.point(unknowns).cost_slope / self._scale)
         except (InvalidDesign, InvalidInput):
             return np.zeros(len(unknowns))
 
-    def asked(self, kind: str, what: Callable[[Sequence[Part]], Array]) -> Callable[[Array], Array]:
-        """Values or derivatives of equations ("eq") or inequalities ("ineq") by the unknowns."""
-
-        def values(unknowns: Array) -> Array:
-            point = self.point(unknowns)
-            return what(point.equations if kind == "eq" else point.inequalities)
-
-        return values
+    def _asked(self, parts: str, of: Callable[[Sequence[Part]], Array], unknowns: Array) -> Array:
+        """Values or derivatives of the "equations" or "inequalities"."""
+        return of(getattr(self.point(unknowns), parts))

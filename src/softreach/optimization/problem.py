@@ -25,6 +25,7 @@ from softreach.support.arguments import as_given, as_names
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, no_warnings
 from softreach.support.lazy import lazy
+from softreach.workspace.measure import Estimate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,13 +49,6 @@ _COARSE, _FINE = 1 << 12, 1 << 15
 """Samples of the cloud of coarse and of fine cases."""
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
-
-
-class Value(NamedTuple):
-    """A number and how far off it may be."""
-
-    value: float
-    error: float = math.nan
 
 
 @dataclass(eq=False)
@@ -99,29 +93,29 @@ class DesignCase:
         """Samples of a cloud."""
         return _FINE if self.fine else _COARSE
 
+    @lazy
+    def intermediates(self) -> Intermediates:
+        """Intermediate results behind metrics of the atlas."""
+        reached = partial(self.set_of, self.arm)
+        return Intermediates.of_one(self.arm, self.samples, self.accuracy, reached)
+
     @no_warnings()
     def metric(self, metric: Metric) -> float:
         """A metric of the atlas."""
-        return float(metric.value(self._intermediates, {}))
-
-    @lazy
-    def _intermediates(self) -> Intermediates:
-        return Intermediates.of_one(
-            self.arm, self.samples, self.accuracy, partial(self.set_of, self.arm)
-        )
+        return float(metric.value(self.intermediates, {}))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Objective:
     """A number of a design that a search makes large or small."""
 
     name: str
     unit: str
     meaning: str
-    compute: Callable[[DesignCase], Value]
+    compute: Callable[[DesignCase], Estimate]
     asks: str = ""
     """Part of the requirements that it is about: "targets" or "regions"; "" for none."""
-    smooth: bool = False
+    smooth: bool = True
     """A polish knows its derivatives."""
 
 
@@ -137,10 +131,10 @@ class Goal(NamedTuple):
         """Name of the objective."""
         return self.objective.name
 
-    def value(self, case: DesignCase) -> Value:
+    def value(self, case: DesignCase) -> Estimate:
         """Value of a design; NaN where it has none, as a flat set has no unreachability."""
         value = self.objective.compute(case)
-        return value if math.isfinite(value.value) else Value(math.nan)
+        return value if math.isfinite(value.value) else Estimate(math.nan)
 
 
 def goals(
@@ -187,34 +181,33 @@ def known_objective(word: str, given: str | Metric) -> Objective:
     if metric.over:
         raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
     return Objective(
-        name=metric.name,
-        unit=metric.unit,
-        meaning=metric.meaning,
-        compute=lambda case: Value(case.metric(metric)),
+        metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)), smooth=False
     )
 
 
-def _of_set(name: str, case: DesignCase) -> Value:
-    return Value(getattr(case.reached, name), getattr(case.reached, f"{name}_error"))
+def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
+    return lambda case: Estimate(
+        getattr(case.reached, name), getattr(case.reached, f"{name}_error")
+    )
 
 
-def _coverage(case: DesignCase) -> Value:
+def _coverage(case: DesignCase) -> Estimate:
     covered = case.check.coverages
-    shares = [each.share for each in covered]
-    return Value(float(np.mean(shares)), float(np.mean([each.error for each in covered])))
+    shares, errors = [each.share for each in covered], [each.error for each in covered]
+    return Estimate(float(np.mean(shares)), float(np.mean(errors)))
 
 
-def _effort(total: Callable[[Array], float], case: DesignCase) -> Value:
-    return Value(float(total(case.check.effort)), 0.0)
+def _effort(total: Callable[[Array], float]) -> Callable[[DesignCase], Estimate]:
+    return lambda case: Estimate(float(total(case.check.effort)), 0.0)
 
 
-def _sampled(values: Any) -> Value:
+def _sampled(values: Any) -> Estimate:
     """Mean of values over samples of the activation box, and its standard error."""
     known = np.asarray(values, float)
     known = known[np.isfinite(known)]
     if not len(known):
-        return Value(math.nan)
-    return Value(float(known.mean()), float(known.std() / math.sqrt(len(known))))
+        return Estimate(math.nan)
+    return Estimate(float(known.mean()), float(known.std() / math.sqrt(len(known))))
 
 
 def _dexterity(case: DesignCase) -> xr.Dataset:
@@ -223,68 +216,64 @@ def _dexterity(case: DesignCase) -> xr.Dataset:
     return dexterity(case.cloud)
 
 
-def _activation_distance(case: DesignCase) -> Value:
+def _activation_distance(case: DesignCase) -> Estimate:
     from softreach.cloud.redundancy import activation_distance
 
     radius = _RADIUS * case.arm.length
     return _sampled(activation_distance(case.cloud, radius, queries=min(4096, case.samples)))
 
 
-def _compliance(case: DesignCase) -> Value:
+def _compliance(case: DesignCase) -> Estimate:
     from softreach.stiffness import principal_compliances, tip_compliance
 
     gamma = case.cloud.activation.values[:256]
     return _sampled(principal_compliances(tip_compliance(case.arm, gamma)).values[:, 0])
 
 
-def _payload(case: DesignCase) -> Value:
+def _payload(case: DesignCase) -> Estimate:
     from softreach.workspace.payload import payload_curve
 
     accuracy = max(case.accuracy, 0.01)
     most = payload_curve(case.arm, [], accuracy=accuracy).largest_payload(_SHARE, accuracy=accuracy)
-    return Value(most.payload, most.payload_error)
+    return Estimate(most.payload, most.payload_error)
 
 
-_ROWS: tuple[tuple[str, str, str, Callable[[DesignCase], Value]], ...] = (
-    ("exact_volume", "m3", "volume of the reachable set", partial(_of_set, "volume")),
-    ("exact_convex_volume", "m3", "volume of its convex hull", partial(_of_set, "convex_volume")),
-    ("exact_unreachability", "1", "1 - volume / convex volume", partial(_of_set, "unreachability")),
-    ("coverage", "1", "mean share of the regions that is reached", _coverage),
-    ("mean_effort", "1", "mean effort at the targets", partial(_effort, np.mean)),
-    ("worst_effort", "1", "largest effort at the targets", partial(_effort, np.max)),
-    (
+_OBJECTIVES = (
+    Objective("exact_volume", "m3", "volume of the reachable set", _of_set("volume")),
+    Objective("exact_convex_volume", "m3", "volume of its convex hull", _of_set("convex_volume")),
+    Objective("exact_unreachability", "1", "1 - volume / convex volume", _of_set("unreachability")),
+    Objective("coverage", "1", "mean share of the regions that is reached", _coverage, "regions"),
+    Objective("mean_effort", "1", "mean effort at the targets", _effort(np.mean), "targets"),
+    Objective("worst_effort", "1", "largest effort at the targets", _effort(np.max), "targets"),
+    Objective(
         "manipulability",
         "m3/input3",
         "mean √det(J Jᵀ) over the box",
         lambda case: _sampled(_dexterity(case).manipulability),
+        smooth=False,
     ),
-    (
+    Objective(
         "dexterity",
         "1",
         "mean of 1 / condition of J over the box",
         lambda case: _sampled(1.0 / _dexterity(case).condition),
+        smooth=False,
     ),
-    ("activation_distance", "input", "mean D̄ within L/10", _activation_distance),
-    ("payload", "kg", "payload under which 80 % of the volume is left", _payload),
-    ("compliance", "m/N", "mean of the largest compliance of the tip", _compliance),
-    ("mass", "kg", "mass of the arm", lambda case: Value(mass(case.arm), 0.0)),
-    ("actuators", "1", "number of inputs", lambda case: Value(float(case.arm.inputs), 0.0)),
+    Objective(
+        "activation_distance", "input", "mean D̄ within L/10", _activation_distance, smooth=False
+    ),
+    Objective(
+        "payload", "kg", "payload under which 80 % of the volume is left", _payload, smooth=False
+    ),
+    Objective(
+        "compliance", "m/N", "mean of the largest compliance of the tip", _compliance, smooth=False
+    ),
+    Objective("mass", "kg", "mass of the arm", lambda case: Estimate(mass(case.arm), 0.0)),
+    Objective(
+        "actuators", "1", "number of inputs", lambda case: Estimate(float(case.arm.inputs), 0.0)
+    ),
 )
-_ASKS = {"coverage": "regions", "mean_effort": "targets", "worst_effort": "targets"}
-_ROUGH = {"manipulability", "dexterity", "activation_distance", "payload", "compliance"}
-"""Objectives without derivatives."""
-
-OBJECTIVES = {
-    name: Objective(
-        name=name,
-        unit=unit,
-        meaning=meaning,
-        compute=compute,
-        asks=_ASKS.get(name, ""),
-        smooth=name not in _ROUGH,
-    )
-    for name, unit, meaning, compute in _ROWS
-}
+OBJECTIVES = {each.name: each for each in _OBJECTIVES}
 """Objectives by name, beside the metrics of the atlas."""
 
 
@@ -294,7 +283,7 @@ class Candidate:
 
     values: Values
     """Its free parameters."""
-    objectives: tuple[Value, ...] = ()
+    objectives: tuple[Estimate, ...] = ()
     """One for each goal; none where requirements are missed."""
     excess: float = 0.0
     """Sum of what is missed, over L or relative; 0 if all requirements are met, infinite where no
@@ -323,7 +312,7 @@ class Candidate:
     @classmethod
     def from_dict(cls, record: Mapping[str, Any]) -> Self:
         """The candidate that `to_dict` described."""
-        objectives = tuple(Value(*pair) for pair in record["objectives"])
+        objectives = tuple(Estimate(*pair) for pair in record["objectives"])
         return cls(**{**record, "objectives": objectives, "undecided": (*record["undecided"],)})
 
 

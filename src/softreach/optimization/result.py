@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,17 +17,19 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import unit_suffix
 from softreach.arm.written import with_suffix
 from softreach.optimization.free_parameters import FreeParameter
-from softreach.optimization.problem import NEAR, Candidate, Goal, Problem, Value
+from softreach.optimization.problem import NEAR, Candidate, Goal, Problem
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
 from softreach.support.arguments import as_flag, as_path
+from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, counted
 from softreach.support.files.atomic import check_place
 from softreach.support.files.text import write_table, write_text
 from softreach.support.report import Report, Reported, Section, check_libraries
 from softreach.support.units import LengthUnit, as_unit, readable, readable_unit
 from softreach.support.versions import versions
+from softreach.workspace.measure import Estimate
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,10 +86,10 @@ class Search(Reported):
         """Polishes from designs apart that meet all, and those within a tenth of the best."""
         if not (self.goals and self.best.is_feasible):
             return 0, 0
-        best = np.array(self.problem.costs(self.best))
         ends = [each for each in self.candidates if each.designs > 1 and each.is_feasible]
-        apart = [np.abs(np.array(self.problem.costs(each)) - best) for each in ends]
-        return len(ends), sum(bool((each <= NEAR * np.abs(best)).all()) for each in apart)
+        best, *costs = (np.array(self.problem.costs(each)) for each in (self.best, *ends))
+        near = [bool((np.abs(each - best) <= NEAR * np.abs(best)).all()) for each in costs]
+        return len(ends), sum(near)
 
     @property
     def arm(self) -> Manipulator:
@@ -170,8 +172,7 @@ class Search(Reported):
         places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
         coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
         values = [[p.number(each.values[p.name]) for p in free] for each in every]
-        pairs = [each.objectives or [(math.nan, math.nan)] * len(goals) for each in every]
-        numbers = np.array(pairs, float).reshape(len(every), len(goals), 2)
+        numbers = self._numbers(every)
         looked_at = np.cumsum([each.designs for each in self.candidates], dtype=int)
         return xr.Dataset(
             {
@@ -180,7 +181,7 @@ class Search(Reported):
                 "objective_error": (("design", "objective"), numbers[..., 1]),
                 "excess": ("design", [each.excess for each in every], {"units": "1"}),
                 "feasible": ("design", [each.is_feasible for each in every]),
-                "front": ("design", [any(each is one for one in self.front) for each in every]),
+                "front": ("design", [self._is_in_front(each) for each in every]),
                 "fidelity": ("design", np.array([each.fidelity for each in every], dtype=str)),
                 "looked_at": ("design", [*looked_at, *[self.designs] * len(self.finalists)]),
                 "coarse_design": ("design", [-1] * len(self.candidates) + coarse),
@@ -205,7 +206,7 @@ class Search(Reported):
         try:
             return self.arm
         except SoftreachError:
-            return next(iter(self.problem.parameters.bases.values()))
+            return self.problem.parameters.base
 
     def save(
         self, folder: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
@@ -267,17 +268,16 @@ class Search(Reported):
         designs = self.every if as_flag("every", every) else self.front
         columns: dict[str, Any] = {
             "design": range(1, len(designs) + 1),
-            "front": [int(any(each is one for one in self.front)) for each in designs],
+            "front": [int(self._is_in_front(each)) for each in designs],
             "fidelity": [each.fidelity for each in designs],
             "feasible": [int(each.is_feasible) for each in designs],
             "excess": [each.excess for each in designs],
         }
-        lacks = [Value(math.nan)] * len(self.goals)
+        numbers = self._numbers(designs)
         for k, goal in enumerate(self.goals):
             suffix, size = _written_unit(goal.objective.unit, length)
-            values = [(each.objectives or lacks)[k] for each in designs]
-            columns[f"{goal.name}{suffix}"] = [each.value / size for each in values]
-            columns[f"{goal.name}_error{suffix}"] = [each.error / size for each in values]
+            for word, column in zip(("", "_error"), numbers[:, k].T / size, strict=True):
+                columns[f"{goal.name}{word}{suffix}"] = column
         for p in self.problem.parameters.free:
             suffix, size = _written_unit(p.unit, length)
             values = (each.values[p.name] for each in designs)
@@ -331,6 +331,15 @@ class Search(Reported):
         """All designs: those on the way in their order, then those at full accuracy."""
         return (*self.candidates, *self.finalists)
 
+    def _is_in_front(self, candidate: Candidate) -> bool:
+        return any(candidate is one for one in self.front)
+
+    def _numbers(self, designs: Sequence[Candidate]) -> Array:
+        """Objectives with their errors, NaN where there are none, shape (design, goal, 2)."""
+        lacks = [Estimate(math.nan)] * len(self.goals)
+        pairs = [each.objectives or lacks for each in designs]
+        return np.array(pairs, float).reshape(len(designs), len(self.goals), 2)
+
     def _repr_html_(self) -> str:
         from softreach.arm.skin import arm_card
 
@@ -370,7 +379,7 @@ def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
     goals, free = search.goals, search.problem.parameters.free
     rows = []
     for number, each in enumerate(search.front, 1):
-        pairs = zip(goals, each.objectives or [Value(math.nan)] * len(goals), strict=True)
+        pairs = zip(goals, each.objectives or [Estimate(math.nan)] * len(goals), strict=True)
         numbers = (_number_text(p, each.values[p.name], unit) for p in free)
         rows.append((str(number), *(_value_text(*pair, unit) for pair in pairs), *numbers))
     if len(rows) > 1:
@@ -400,7 +409,7 @@ def _goal_text(goal: Goal) -> str:
     return f"{'largest' if goal.sense > 0 else 'least'} {goal.name}"
 
 
-def _value_text(goal: Goal, value: Value, unit: LengthUnit) -> str:
+def _value_text(goal: Goal, value: Estimate, unit: LengthUnit) -> str:
     if not math.isfinite(value.value):
         return "-"
     return readable(value.value, goal.objective.unit, unit, value.error)

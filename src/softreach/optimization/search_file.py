@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -33,21 +32,6 @@ _TABLES = ("free", "choices")
 _KEYS = ("design", *_SENSES, *_OPTIONS, *_TABLES)
 
 
-@dataclass(frozen=True, kw_only=True)
-class SearchFile:
-    """Contents of a search file."""
-
-    base: Manipulator | Mapping[str, Manipulator]
-    """The design to vary, or several by name."""
-    requirements: Requirements
-    free: Mapping[str, tuple[float, float] | str]
-    """Parameter -> range [SI unit], or the parameter that it is tied to."""
-    choices: Mapping[str, Sequence[Any]]
-    """Parameter -> values [SI unit]."""
-    options: Mapping[str, Any] = field(default_factory=dict)
-    """Objectives and numbers of the search: further arguments of `search`."""
-
-
 def read_search(
     text: str,
     folder: Path,
@@ -55,8 +39,8 @@ def read_search(
     *,
     source: str = "",
     given: Mapping[str, Any] | None = None,
-) -> SearchFile:
-    """A search from the text of a file: requirements, and what is searched, in a table `[search]`.
+) -> dict[str, Any]:
+    """Arguments of `search` from the text of a file: requirements and a table `[search]`.
 
     ```toml
     [search]
@@ -96,13 +80,9 @@ def read_search(
     if needs is None or reader.faults:
         of_file = faults or any(fault.path.startswith("search") for fault in reader.faults)
         raise InvalidDesign([*faults, *reader.faults], source if of_file else "")
-    return SearchFile(
-        base=bases if len(bases) > 1 else next(iter(bases.values())),
-        requirements=needs,
-        free=reader.free,
-        choices=reader.choices,
-        options=options,
-    )
+    base = bases if len(bases) > 1 else next(iter(bases.values()))
+    of_file = {"requirements": needs, "free": reader.free, "choices": reader.choices}
+    return {"base": base, **of_file, **options}
 
 
 class _Reader(FaultReader):
@@ -145,7 +125,10 @@ class _Reader(FaultReader):
         self._bases = dict(bases)
         for path, key, value in self._entries("choices"):
             if key in NAMED_CHOICES:
-                self._add(path, value, self.choices, key, _named_choice(key, value))
+                values = value.split(",") if isinstance(value, str) else value
+                if key == "bundles" and isinstance(value, str):
+                    values = [int(x) if x.strip().isdecimal() else x for x in values]
+                self._add(path, value, self.choices, key, values)
         names = Written(known_parameters(bases.values(), self.choices.get("bundles", ())))
         for path, key, value in self._entries("choices", names):
             if key not in NAMED_CHOICES:
@@ -244,10 +227,3 @@ class _Reader(FaultReader):
             make = partial(free_parameters, self._bases, of_free, choices)
             if self._tried(path, given, make) is not WRONG:
                 table[name] = value
-
-
-def _named_choice(key: str, value: Any) -> Any:
-    values = value.split(",") if isinstance(value, str) else value
-    if key == "bundles" and isinstance(value, str):
-        return [int(x) if x.strip().isdecimal() else x for x in values]
-    return values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from os import PathLike
 from typing import Any
@@ -206,8 +206,8 @@ class _Run:
         tasks = []
         for k, start in enumerate(starts):
             turn = self._turn(start, k)
-            make = partial(self._polished, start, most, turn)
             what = ["polish", dict(start.values), most, *turn]
+            make = partial(self._polished, start, most, turn)
             tasks.append(partial(self._study.judged, what, make))
         for candidate, is_new in parallel.in_order(tasks):
             if candidate.designs:
@@ -227,11 +227,9 @@ class _Run:
         self, start: Candidate, most: int, turn: tuple[int, Any], accuracy: float | None = None
     ) -> Candidate:
         goal, floors = turn
+        at = {"accuracy": accuracy, "goal": goal, "floors": floors}
         with parallel.undivided():
-            end = polished(
-                self.problem, start, goal=goal, floors=floors, designs=most, accuracy=accuracy
-            )
-        return replace(end.candidate, designs=end.designs)
+            return polished(self.problem, start, designs=most, **at)
 
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best designs that lie apart from each other and from ends of polishes."""

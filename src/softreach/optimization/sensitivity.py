@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.atlas.metric import MetricFailed
 from softreach.optimization.polish import point_of
-from softreach.optimization.problem import SETS, Candidate, Goal, Problem
+from softreach.optimization.problem import SETS, Candidate, Problem
 from softreach.optimization.program import Point, stacked_slopes
 from softreach.optimization.result import Search
 from softreach.support import parallel
@@ -198,16 +198,16 @@ def sensitivity(
 
 
 def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
-    count = len(problem.parameters.real)
-    values = np.full((len(problem.goals), count), math.nan)
-    errors = np.full_like(values, math.nan)
     widths = np.ptp(problem.parameters.bounds, axis=1)
+    values, errors = np.full((2, len(problem.goals), len(widths)), math.nan)
     for k, goal in enumerate(problem.goals):
-        if not goal.objective.smooth or not count:
-            continue
-        point = point_of(problem, candidate, problem.accuracy, k)
-        values[k] = -goal.sense * _with_poses(point) / widths
-        errors[k] = _error(point, goal) / widths
+        if goal.objective.smooth and len(widths):
+            point = point_of(problem, candidate, problem.accuracy, k)
+            design, error = point.design, np.zeros(len(widths))
+            if goal.name in SETS:
+                error = getattr(design.sets, f"{SETS[goal.name]}_error") @ np.abs(design.chain)
+            values[k] = -goal.sense * _with_poses(point) / widths
+            errors[k] = error / widths
     return values, errors
 
 
@@ -221,18 +221,11 @@ def _with_poses(point: Point) -> Array:
     return slope[:count] + forces @ equations[:, :count]
 
 
-def _error(point: Point, goal: Goal) -> Array:
-    design = point.design
-    if goal.name not in SETS:
-        return np.zeros(len(point.reals))
-    return getattr(design.sets, f"{SETS[goal.name]}_error") @ np.abs(design.chain)
-
-
 class _Condition(NamedTuple):
     """A column of the conditions of optimality, and what its multiplier is worth."""
 
     slope: Array
-    name: str
+    name: str = ""
     """Empty for a pose at its bounds."""
     unit: str = ""
     gain: float = 0.0
@@ -284,12 +277,11 @@ def _ends(problem: Problem, point: Point) -> list[_Condition]:
         for end, sign, word in ((0.0, -1.0, "low"), (1.0, 1.0, "high")):
             if abs(place - end) > _AT_END:
                 continue
-            if j >= len(problem.parameters.real):
-                result.append(_Condition(sign * rows[j], ""))
-                continue
-            real = problem.parameters.real[j]
-            name, gain = f"{word} end of {real.name}", 1.0 / (real.high - real.low)
-            result.append(_Condition(sign * rows[j], name, real.unit, gain))
+            result.append(_Condition(sign * rows[j]))
+            if j < len(point.reals):
+                real = problem.parameters.real[j]
+                name, gain = f"{word} end of {real.name}", 1.0 / (real.high - real.low)
+                result[-1] = _Condition(sign * rows[j], name, real.unit, gain)
     return result
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import optuna
 
 Sampler = Literal["auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random"]
-SAMPLERS = ("auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random")
+SAMPLERS: tuple[str, ...] = get_args(Sampler)
 
 _NAME = "softreach"
 _MISSED = 1e12
@@ -107,10 +107,8 @@ class Study:
             return [each for key, each in self._kept.items() if key not in self._asked]
 
     def _read(self) -> None:
-        if self._storage is None:
-            return
         with _quiet():
-            trials = self._storage.get_trials(deepcopy=False)
+            trials = self._storage.get_trials(deepcopy=False) if self._storage else []
         for record in (trial.user_attrs for trial in trials[self._seen :]):
             if _KEY in record:  # what others added by Optuna itself has none
                 self._kept.setdefault(record[_KEY], Candidate.from_dict(record[_JUDGED]))
@@ -131,11 +129,10 @@ class Study:
         """Let a sampler that begins at one place begin where the best of the known designs are."""
         if self.kind != "cma" or len(self.candidates) < _WARM:
             return
+        complete = (self._optuna.trial.TrialState.COMPLETE,)
         with _quiet():
             self._study.sampler = self._optuna.samplers.CmaEsSampler(
-                source_trials=self._study.get_trials(
-                    states=(self._optuna.trial.TrialState.COMPLETE,)
-                ),
+                source_trials=self._study.get_trials(states=complete),
                 n_startup_trials=0,
                 seed=self.seed + 1,
                 warn_independent_sampling=False,
@@ -153,8 +150,7 @@ class Study:
     def _opened(self, place: str) -> optuna.Study:
         try:
             study = self._created(_storage(place))
-            noted = study.user_attrs.get(_PROBLEM)
-            if noted is None:
+            if (noted := study.user_attrs.get(_PROBLEM)) is None:
                 study.set_user_attr(_PROBLEM, self.problem.digest)
         except InvalidInput:
             raise
@@ -235,8 +231,7 @@ def _storage(place: str) -> Any:
     """
     path = Path(place)
     if not path.parent.is_dir() or (path.exists() and not path.is_file()):
-        allowed = "a file in a folder that exists"
-        raise InvalidInput("storage", place, allowed)
+        raise InvalidInput("storage", place, "a file in a folder that exists")
     is_new = not path.exists() or not path.stat().st_size
     is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
     if not is_new and not _is_own(path, is_database):

@@ -12,8 +12,8 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
-from softreach.optimization.deviations import TOL, FirstOrder, Spread, deviations_of, region_places
-from softreach.requirements.requirements import Requirements, Target, with_payload
+from softreach.optimization.deviations import TOL, FirstOrder, Spread, deviations_of
+from softreach.requirements.requirements import Requirements, Target
 from softreach.rod.rods import as_tip_map
 from softreach.sampling import sample_cube
 from softreach.schema import provenance
@@ -223,7 +223,7 @@ def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -
         (first.kept(), lambda arm, solid: followed.kept(solid) if followed else math.nan),
         (first.of_set("volume", "m3", 1.0), lambda arm, solid: solid.volume),
         (first.of_set("unreachability", "1", -1.0), lambda arm, solid: solid.unreachability),
-        *((first.covered(target), partial(_share, first, target)) for target in first.regions),
+        *((first.covered(*region), partial(_share, first, *region)) for region in first.regions),
     ]
     starts = [_starts(first, target) for target in first.targets] if checked else []
     asked = [ask for _, ask in numbers]
@@ -260,11 +260,10 @@ def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -
 
 
 def _target(first: FirstOrder, target: Target, reached: list[Mask]) -> TargetTolerance:
-    probability = first.probability(target)
-    share = np.full(len(probability), np.nan)
+    share = np.full(len(target.points), np.nan)
     if reached:
-        share[_tried(len(share))] = np.mean(reached, axis=0)
-    return TargetTolerance(target.name, probability, share, len(reached))
+        share[_tried(target)] = np.mean(reached, axis=0)
+    return TargetTolerance(target.name, first.probability(target), share, len(reached))
 
 
 class _Followed(NamedTuple):
@@ -326,19 +325,15 @@ def _made(
             return None
 
 
-def _tried(count: int) -> Index:
+def _tried(target: Target) -> Index:
     """Numbers of the places that arms are made for, evenly spread over all."""
+    count = len(target.points)
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_TRIED)).astype(np.int64))
-
-
-def _places(target: Target) -> Array:
-    assert target.places is not None
-    return target.points[_tried(len(target.points))]
 
 
 def _starts(first: FirstOrder, target: Target) -> list[Array]:
     """Places of the cube to search from: of all solutions of the design, and of a grid."""
-    arm, places = first.deviations.arm, _places(target)
+    arm, places = first.deviations.arm, target.points[_tried(target)]
     box, solutions = as_tip_map(arm).box, solve_inverse(arm, places, from_rest=True)
     rows = [solutions.nearest_activations]
     for number in range(int(solutions.counts.max(initial=0))):
@@ -353,10 +348,10 @@ def _starts(first: FirstOrder, target: Target) -> list[Array]:
 
 def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[Array]) -> Mask:
     """Places that an arm reaches under every payload, of those that are tried: by searches."""
-    places = _places(target)
+    places = target.points[_tried(target)]
     within, held = max(target.within, TOL * arm.length), np.ones(len(places), bool)
-    for payload in first.needs.payloads or (None,):
-        rod, gaps = as_tip_map(with_payload(arm, payload)), np.full(len(places), np.inf)
+    for laden in first.needs.under_payloads(arm):
+        rod, gaps = as_tip_map(laden), np.full(len(places), np.inf)
         for start in starts:
             left = np.flatnonzero(gaps > within)
             if len(left):
@@ -367,11 +362,12 @@ def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[A
     return held
 
 
-def _share(first: FirstOrder, target: Target, arm: Manipulator, solid: ReachableSet) -> float:
-    places, share = region_places(target), 1.0
-    for payload in first.needs.payloads or (None,):
-        loaded = with_payload(arm, payload)
-        own = solid if loaded is arm else reachable_set(loaded, accuracy=first.accuracy)
+def _share(
+    first: FirstOrder, target: Target, places: Array, arm: Manipulator, solid: ReachableSet
+) -> float:
+    share = 1.0
+    for laden in first.needs.under_payloads(arm):
+        own = solid if laden is arm else reachable_set(laden, accuracy=first.accuracy)
         if own.dimension < 3:
             return 0.0
         inside = own.distance(places) <= target.within if target.within else own.contains(places)

@@ -145,18 +145,16 @@ def axes_box(
             continue
         corner, away = np.where(edge.high, high, low), np.zeros(3)
         away[edge.outward] = size if edge.high[edge.outward] else -size
-        for value in _ticks(low[axis], high[axis], side.steps[axis]):
+        step = side.steps[axis]
+        for number in np.arange(np.ceil(low[axis] / step), np.floor(high[axis] / step) + 1):
+            value = number * step + 0.0  # no -0
             at = np.where(np.arange(3) == axis, value, corner)
             lines.append(np.stack([at, at + away]))
-            number = f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
-            labels.append((number, at + _NUMBERS_AT * away))
+            text = f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
+            labels.append((text, at + _NUMBERS_AT * away))
         middle = np.where(np.arange(3) == axis, (low[axis] + high[axis]) / 2, corner)
         labels.append((label("xyz"[axis]), middle + side.names[axis] * away))
     return AxesBox(np.array(lines), labels)
-
-
-def _ticks(low: float, high: float, step: float) -> Array:
-    return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step + 0.0
 
 
 def round_box(*points: Array) -> tuple[Array, Array]:

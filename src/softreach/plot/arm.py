@@ -18,9 +18,9 @@ from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import (
     WIDTH,
+    a_result,
     figure_style,
     legend_above,
-    panel_arguments,
     pyplot,
     some_bundles,
 )
@@ -79,13 +79,11 @@ def plot_arm(
         MissingExtra: matplotlib is not installed.
     """
     arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
-    ax, box = panel_arguments(ax, view, box)
     shapes, counted = shapes_of(configuration), unit_for(arm.length, unit)
     resting = [rest_configuration(arm)] if rest or not shapes else []
-    with figure_style(ax):
-        points = np.concatenate([arm_points(arm, shape, counted) for shape in shapes + resting])
-        panel = Panel.opened(points, counted, ax, view, box)
-        drawn = range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
+    drawn = some_bundles(arm, bundles)
+    points = np.concatenate([arm_points(arm, shape, counted) for shape in shapes + resting])
+    with Panel.opened(points, counted, ax, view, box) as panel:
         draw_arms(panel, arm, resting, drawn, _FADE if shapes else 0.0)
         draw_arms(panel, arm, shapes, drawn)
     return panel.ax
@@ -128,10 +126,9 @@ def draw_arms(
 
 def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
     """Small dots where the markers of all shapes are."""
-    if arm.markers and shapes:
-        panel.dot(
-            np.concatenate([marker_points(arm.markers, shape) for shape in shapes]), 1.0 - fade
-        )
+    if arm.markers:
+        points = [marker_points(arm.markers, shape) for shape in shapes]
+        panel.dot(np.concatenate(points), 1.0 - fade)
 
 
 def arm_images(
@@ -243,21 +240,17 @@ def plot_check(
         InvalidInput: Unknown view or unit, or no check.
         MissingExtra: matplotlib is not installed.
     """
-    if isinstance(check, type) or not hasattr(check, "requirements"):
-        raise InvalidInput("check", as_given(check), "what `check` returned")
-    arm = check.arm
-    ax, _ = panel_arguments(ax, view, None)
+    arm = a_result("check", check, "Check", "check").arm
     counted = unit_for(arm.length, arm.length_unit if unit is None else unit)
     shapes = shapes_of(check.shapes(_POSES)) or [rest_configuration(arm)]
-    with figure_style(ax):
-        points = [arm_points(arm, shape, counted) for shape in shapes]
-        points.append(counted.of(check.places))
-        around = counted.size * bounding_box(*points)
-        lines: dict[str, list[Array]] = {kind: [] for kind in _REGIONS}
-        for kind, region in check.regions:
-            lines[kind] += [counted.of(line) for line in region.wireframe(around)]
-        points += [line for each in lines.values() for line in each]
-        panel = Panel.opened(np.concatenate(points), counted, ax, view, None)
+    points = [arm_points(arm, shape, counted) for shape in shapes]
+    points.append(counted.of(check.places))
+    around = counted.size * bounding_box(*points)
+    lines: dict[str, list[Array]] = {kind: [] for kind in _REGIONS}
+    for kind, region in check.regions:
+        lines[kind] += [counted.of(line) for line in region.wireframe(around)]
+    points += [line for each in lines.values() for line in each]
+    with Panel.opened(np.concatenate(points), counted, ax, view) as panel:
         draw_arms(panel, arm, shapes, range(arm.bundles), _CHECKED)
         for kind, each in lines.items():
             style = {"linewidth": 0.9, **_REGIONS[kind]}

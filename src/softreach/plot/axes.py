@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import permutations
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, project, view_axes
+from softreach.picture.projection import (
+    View,
+    is_mirrored,
+    on_paper,
+    plane_of,
+    project,
+    view_angles,
+    view_axes,
+)
 from softreach.picture.shading import seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
-from softreach.plot.style import DPI, pyplot
+from softreach.plot.style import DPI, as_axes, as_box, figure_style, small_axes
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.units import LengthUnit
@@ -41,8 +51,12 @@ def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
     edges = [_outer_edge(box, view, axis) for axis in range(3)]
     ticks = _ticks(box, [project(edge, view)[:, :2] for edge in edges])
     camera = view_axes(view)[2]
-    far = np.where(camera > 0, box[0], box[1])
-    lines = [project(line, view)[:, :2] for line in _wall_lines(box, ticks, far)]
+    far, lines = np.where(camera > 0, box[0], box[1]), []
+    for along, across in permutations(range(3), 2):
+        for value in (*ticks[across], *box[:, across]):
+            line = np.tile(far, (2, 1))
+            line[:, along], line[:, across] = box[:, along], value
+            lines.append(project(line, view)[:, :2])
     walls = LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False)
     ax.add_collection(walls)
     for axis in range(3):
@@ -61,16 +75,22 @@ class Panel:
     unit: LengthUnit
 
     @classmethod
+    @contextmanager
     def opened(
-        cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: ArrayLike | None
-    ) -> Self:
-        """Axes for points in their unit, shape (..., 3), or for a box [m], shape (2, 3).
+        cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: object = None
+    ) -> Iterator[Self]:
+        """Axes in our style for points in their unit, shape (..., 3), or a box [m], shape (2, 3).
 
         Raises:
-            InvalidInput: Unknown view, a box of another shape, or no finite point to show.
+            InvalidInput: Unknown view, no axes, no box, or no finite point to show.
         """
-        shown = bounding_box(points) if box is None else unit.of(box)
-        return cls(_framed_axes(shown, view) if ax is None else ax, shown, view, unit)
+        view_angles(view)
+        with figure_style(as_axes(ax)):
+            shown = bounding_box(points) if box is None else unit.of(as_box("box", box))
+            if ax is None:
+                span = view_extent(shown, view).size
+                ax = small_axes(*(span * (_ROOM / span).min() + _AROUND))
+            yield cls(ax, shown, view, unit)
 
     @property
     def extent(self) -> Extent:
@@ -94,8 +114,12 @@ class Panel:
         Raises:
             InvalidInput: What is there is counted in another unit.
         """
-        _check_unit(self.ax, self.unit)
         ax, first, plane = self.ax, not self.ax.images, plane_of(self.view)
+        marks = [str(image.get_label()).partition(_UNIT_MARK) for image in ax.images]
+        if others := {name for _, mark, name in marks if mark} - {self.unit.name}:
+            hint = "give one unit= to all that shares axes, or length= to all of it or to none"
+            found = f"counted in {', '.join(others)}"
+            raise InvalidInput("ax", found, f"in {self.unit.name}", hint)
         mirror = -1 if is_mirrored(self.view) else 1
         left, right, bottom, top = buffer.extent
         extent, order = (mirror * left, mirror * right, bottom, top), 2 + len(ax.images) / 100
@@ -163,19 +187,13 @@ def _ticks(box: Array, edges: list[Array]) -> list[Array]:
     return ticks
 
 
-def _wall_lines(box: Array, ticks: list[Array], far: Array) -> Iterator[Array]:
-    for along in range(3):
-        for across in {0, 1, 2} - {along}:
-            for value in (*ticks[across], *box[:, across]):
-                line = np.tile(far, (2, 1))
-                line[:, along] = box[:, along]
-                line[:, across] = value
-                yield line
-
-
 def _label_edge(ax: Axes, box: Array, view: View, edge: Array, ticks: Array, label: str) -> None:
-    ends = project(edge, view)[:, :2]
-    outward = _outward(ends, project(box.mean(axis=0), view)[:2])
+    ends, center = project(edge, view)[:, :2], project(box.mean(axis=0), view)[:2]
+    right, up = ends[1] - ends[0]
+    outward = np.array([0.0, -1.0])  # where the edge points at the camera
+    if size := np.hypot(right, up):
+        normal = np.array([-up, right])
+        outward = normal / size * np.sign((ends.mean(axis=0) - center) @ normal or 1.0)
     axis = int(np.argmax(np.ptp(edge, axis=0)))
     low, high = edge[:, axis]
     texts = []
@@ -200,29 +218,6 @@ def _outer_edge(box: Array, view: View, axis: int) -> Array:
         edge[:, others] = box[pick, others]
     place = 0 if axis == 2 else 1
     return min(edges, key=lambda edge: project(edge, view)[:, place].mean())
-
-
-def _outward(ends: Array, center: Array) -> Array:
-    along = ends[1] - ends[0]
-    normal = np.array([-along[1], along[0]])
-    size = np.linalg.norm(normal)
-    if size == 0:  # the edge points at the camera
-        return np.array([0.0, -1.0])
-    return normal / size * np.sign((ends.mean(axis=0) - center) @ normal or 1.0)
-
-
-def _framed_axes(box: Array, view: View) -> Axes:
-    span = view_extent(box, view).size
-    inches = span * (_ROOM / span).min() + _AROUND
-    return pyplot().subplots(figsize=tuple(inches), layout="constrained")[1]
-
-
-def _check_unit(ax: Axes, unit: LengthUnit) -> None:
-    marks = (str(image.get_label()) for image in ax.images)
-    symbols = {mark.removeprefix(_UNIT_MARK) for mark in marks if mark.startswith(_UNIT_MARK)}
-    if symbols - {unit.name}:
-        hint = "give one unit= to all that shares axes, or length= to all of it or to none"
-        raise InvalidInput("ax", f"counted in {', '.join(symbols)}", f"in {unit.name}", hint)
 
 
 def _inches(ax: Axes, extent: Extent) -> Array:

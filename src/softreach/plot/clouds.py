@@ -22,7 +22,6 @@ from softreach.plot.style import (
     PLACE,
     SIZE,
     figure_style,
-    panel_arguments,
     place_panels,
     write_note,
 )
@@ -82,12 +81,9 @@ def plot_cloud(
     """
     cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
     size = None if size is None else as_number("size", size, SIZE)
-    ax, box = panel_arguments(ax, view, box)
-    with figure_style(ax):
-        counted = unit_of(cloud["tip"], unit)
-        tips = drawn_tips(cloud, counted)
-        panel = Panel.opened(tips, counted, ax, view, box)
-        coloring = color_samples(cloud, color)
+    counted = unit_of(cloud["tip"], unit)
+    tips, coloring = drawn_tips(cloud, counted), color_samples(cloud, color)
+    with Panel.opened(tips, counted, ax, view, box) as panel:
         panel.show(cloud_image(panel, tips, coloring.rgb, size))
         if key:
             draw_key(panel.ax, coloring.key)
@@ -151,7 +147,6 @@ def plot_slab(
     """
     cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
     size = None if size is None else as_number("size", size, SIZE)
-    ax, box = panel_arguments(ax, view, box)
     counted, axis = unit_of(cloud["tip"], unit), sight_axis(view)
     tips = drawn_tips(cloud, counted)
     at = float(base_of(cloud)["xyz".index(axis)]) if at is None else as_number("at", at, PLACE)
@@ -166,8 +161,7 @@ def plot_slab(
         allowed = f"such that a tip lies in the slab about {axis} = {at:.4g} m"
         raise InvalidInput("thickness", f"{2 * half * counted.size:.4g} m", allowed)
     coloring = color_samples(cloud, color)
-    with figure_style(ax):
-        panel = Panel.opened(tips, counted, ax, view, box)
+    with Panel.opened(tips, counted, ax, view, box) as panel:
         area = np.prod(panel.extent.size) / inside.sum()
         # about the mean spacing in the plane, which closes the slab
         spacing = float(np.clip(1.2 * np.sqrt(area) * panel.pixels_per_unit, 2.0, 8.0))

@@ -107,25 +107,25 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
 def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring:
     activation = bundle_activations(cloud)
     names, units = bundle_names(cloud), activation_units(activation)
-    symbols = activation_symbols(units)
+    symbols, magnitude = activation_symbols(units), np.abs(activation.values)
     if color is None:
         color = "rgb" if len(names) <= _MIXED else "strongest"
-    if isinstance(color, str) and color in _OF_ALL and color not in names:
-        return _OF_ALL[color](np.abs(activation.values), names, units)
-    if isinstance(color, str) and color == "rgb":
-        lights = activation_colors(np.eye(len(names)))
-        key = BundleKey(names, lights, symbols)
-        return Coloring(activation_colors(_comparable(activation.values, units)), key)
-    if isinstance(color, str | int | np.integer) and not isinstance(color, bool):
+    if not isinstance(color, str | int | np.integer) or isinstance(color, bool):
+        return _given(color, len(activation))
+    if color in ("strongest", "effort") and color not in names:
+        of_all = _strongest if color == "strongest" else _effort
+        return of_all(magnitude, names, units)
+    if color == "rgb":
+        key = BundleKey(names, activation_colors(np.eye(len(names))), symbols)
+        return Coloring(activation_colors(_comparable(magnitude, units)), key)
+    if color not in names and color not in range(len(names)):
         known = f"a bundle ({', '.join(names)}) or its index"
-        if color not in names and color not in range(len(names)):
-            allowed = f'"rgb", "strongest", "effort", {known}, or an array'
-            raise InvalidInput("color", color, allowed)
-        bundle = names.index(color) if isinstance(color, str) else int(color)
-        magnitude = np.abs(activation.values[:, bundle])
-        unit = "" if units[bundle] == "1" else f" [{units[bundle]}]"
-        return Coloring(*_scalar(magnitude, f"|{symbols[bundle]}| {names[bundle]}{unit}", 0.0))
-    return _given(color, len(activation))
+        allowed = f'"rgb", "strongest", "effort", {known}, or an array'
+        raise InvalidInput("color", color, allowed)
+    bundle = names.index(color) if isinstance(color, str) else int(color)
+    unit = "" if units[bundle] == "1" else f" [{units[bundle]}]"
+    label = f"|{symbols[bundle]}| {names[bundle]}{unit}"
+    return Coloring(*_scalar(magnitude[:, bundle], label, 0.0))
 
 
 def _comparable(activation: Array, units: Sequence[str]) -> Array:
@@ -154,10 +154,6 @@ def _effort(magnitude: Array, names: tuple[str, ...], units: Sequence[str]) -> C
     (symbol, *others) = sorted(set(activation_symbols(units)))
     symbol = "a" if others else symbol
     return Coloring(*_scalar(share, f"effort: mean |{symbol}| / max |{symbol}| [-]", 0.0))
-
-
-_OF_ALL = {"strongest": _strongest, "effort": _effort}
-"""Colors by all bundles that have a key of their own, beside the mixture; names of bundles win."""
 
 
 def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:

@@ -69,14 +69,16 @@ def plot_cross_section(
     """
     arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
     half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
-    legend = _needs_legend(arm) if legend is None else as_flag("legend", legend)
+    if legend is None:  # where colors alone leave open what is what
+        shapes, courses = arm.outline(0.0).shape, arm.fiber_directions
+        plain = set(shapes) == {"sector"} and set(courses) == {"along"}
+        legend = not plain or len(_section_materials(arm.section)) > 1
+    legend = as_flag("legend", legend)
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     counted = unit_for(arm.length, unit)
     outer = float(counted.of(arm.profile.radius(z)))
-    placed = _placed_bundles(
-        arm, z, range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
-    )
+    placed = _placed_bundles(arm, z, some_bundles(arm, bundles))
     with figure_style(ax):
         entries = [*_materials(arm), *_bundles(arm, placed)] if legend else []
         labels = [label for _, label in entries[:_MOST]]
@@ -96,13 +98,6 @@ def plot_cross_section(
             handles = [artist for artist, _ in entries[:_MOST]]
             ax.legend(handles, labels, frameon=False, fontsize=7, **place)
     return ax
-
-
-def _needs_legend(arm: Manipulator) -> bool:
-    """True where colors alone leave open what is what."""
-    along = {actuator.fiber_direction for actuator in arm.actuators} == {"along"}
-    plain = along and set(arm.outline(0.0).shape) == {"sector"}
-    return not plain or len(_section_materials(arm.section)) > 1
 
 
 def section_reach(arm: Manipulator, z: float) -> float:
@@ -159,24 +154,25 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
         ax.add_patch(_annulus(outer * low, outer * high, "white"))
     for k, ring in enumerate(section.rings):
         low, high = ring.inner_ratio, ring.outer_ratio
+        if not several:
+            ax.add_patch(_annulus(outer * low, outer * high, BODY))
+            continue
         below = section.rings[:k]
         over = any(low < other.outer_ratio and other.inner_ratio < high for other in below)
-        if several:
-            alpha = 0.5 if over else 1.0
-            _draw_material(ax, section, ring.material, outer * low, outer * high, alpha)
-        else:
-            ax.add_patch(_annulus(outer * low, outer * high, BODY))
+        alpha = 0.5 if over else 1.0
+        _draw_material(ax, section, ring.material, outer * low, outer * high, alpha)
 
 
 def _section_materials(section: Section) -> tuple[tuple[str, Material], ...]:
     """The different materials of a section, rings first, each with the part it is found in."""
-    rings = [
+    parts = [
         (ring.name or ("ring" if len(section.rings) == 1 else f"ring {k + 1}"), ring.material)
         for k, ring in enumerate(section.rings)
     ]
-    has_core = section.inner_ratio > section.bore_ratio
+    if section.inner_ratio > section.bore_ratio:
+        parts.append(("core", section.core_material))
     materials: list[tuple[str, Material]] = []
-    for part, material in [*rings, *([("core", section.core_material)] if has_core else [])]:
+    for part, material in parts:
         if not any(material.same_matter(other) for _, other in materials):
             materials.append((part, material))
     return tuple(materials)
@@ -239,22 +235,21 @@ def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
         for above in sectors[k + 1 :]:
             for part in bundle.overlaps(above):
                 look = {"facecolor": "none", "edgecolor": part.color, "linewidth": 0.0}
-                stripes = _sector(part, outer, **look)
-                stripes.set_hatch("//////")
+                stripes = _sector(part, outer, hatch="//////", **look)
                 stripes.set_hatch_linewidth(1.2)
                 ax.add_patch(stripes)
     for bundle in sectors:
         _draw_strokes(ax, bundle, outer)
     for bundle in (bundle for bundle in placed if bundle.shape == "lumen"):
         radius = 0.5 * outer * (bundle.outer_ratio - bundle.inner_ratio)
-        (x,), (y,) = _middle(bundle, outer)
-        ax.add_patch(Circle((x, y), radius, **_lumen_style(bundle.color)))
+        ax.add_patch(Circle(_middle(bundle, outer), radius, **_lumen_style(bundle.color)))
     lines = [bundle for bundle in placed if bundle.shape == "line"]
     for ratio in sorted({round(line.outer_ratio, 9) for line in lines if line.outer_ratio > 1}):
         disk = {"facecolor": "none", "edgecolor": "0.6", "linewidth": 0.6, "linestyle": ":"}
         ax.add_patch(Circle((0, 0), outer * ratio, **disk))
     for bundle in lines:
-        ax.plot(*_middle(bundle, outer), zorder=3, **_tendon_style(bundle.color))
+        x, y = _middle(bundle, outer)
+        ax.plot([x], [y], zorder=3, **_tendon_style(bundle.color))
 
 
 def _tendon_style(color: Color) -> dict[str, Any]:
@@ -270,8 +265,7 @@ def _lumen_style(color: Color) -> dict[str, Any]:
 def _draw_material(
     ax: Axes, section: Section, material: Material, low: float, high: float, alpha: float = 1.0
 ) -> None:
-    style = _material_style(section, material)
-    fill = _annulus(low, high, "none")
+    fill, style = _annulus(low, high, "none"), _material_style(section, material)
     fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
     fill.set_hatch_linewidth(0.4)
     ax.add_patch(fill)
@@ -323,6 +317,6 @@ def _draw_strokes(ax: Axes, bundle: _Placed, outer: float) -> None:
     ax.add_collection(strokes)
 
 
-def _middle(bundle: _Placed, outer: float) -> tuple[list[float], list[float]]:
+def _middle(bundle: _Placed, outer: float) -> tuple[float, float]:
     radius = 0.5 * outer * (bundle.inner_ratio + bundle.outer_ratio)
-    return [radius * np.cos(bundle.center)], [radius * np.sin(bundle.center)]
+    return radius * np.cos(bundle.center), radius * np.sin(bundle.center)

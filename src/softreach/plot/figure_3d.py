@@ -35,8 +35,6 @@ from softreach.support.units import LengthUnit
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Detail", "Figure3D", "Scene", "plot_3d"]
-
 _POINTS = 200_000  # of a cloud: 2.4 MB of the page
 _STATIONS = 121  # of equilibria
 _PALE = 0.62  # how far the colors of the arm at rest go toward white
@@ -139,17 +137,17 @@ class Scene:
     def add_cloud(self, cloud: xr.Dataset) -> None:
         """A cloud, of which a random part is enough."""
         tips, coloring = drawn_tips(cloud, self.unit), color_samples(cloud, self.color)
-        known = np.flatnonzero(np.isfinite(tips).all(axis=1))
-        chosen = known
-        if len(known) > _POINTS:
-            chosen = np.sort(np.random.default_rng(0).choice(known, _POINTS, replace=False))
-        shown, of = f"{len(chosen):,}", f"{len(known):,}"
-        self.notes.append(f"{of} points" if shown == of else f"{shown} of {of} points, at random")
+        chosen = np.flatnonzero(np.isfinite(tips).all(axis=1))
+        of = f"{len(chosen):,}"
         self.captions.append(f"Cloud of {of} tips")
-        name, tips = self._name("cloud"), tips[chosen]
-        dots = Dots(tips, coloring.rgb[chosen])
+        if len(chosen) > _POINTS:
+            chosen = np.sort(np.random.default_rng(0).choice(chosen, _POINTS, replace=False))
+            self.notes.append(f"{_POINTS:,} of {of} points, at random")
+        else:
+            self.notes.append(f"{of} points")
+        tips, rgb = tips[chosen], coloring.rgb[chosen]
         size = point_size(len(tips), np.array([tips.min(axis=0), tips.max(axis=0)]))
-        self.parts.append(PagePart(name, dots, size=size))
+        self.parts.append(PagePart(self._name("cloud"), Dots(tips, rgb), size=size))
         self.keys += page_keys(coloring.key)
 
     def add_set(self, reached: Any) -> None:
@@ -168,8 +166,7 @@ class Scene:
     def add_hull(self, hull: Any) -> None:
         """A hull, whose volume is known."""
         kind = "convex hull" if np.isinf(hull.alpha) else "alpha shape"
-        volume = self.unit.text(hull.volume, 3)
-        self.captions.append(f"{kind.capitalize()}: volume {volume}")
+        self.captions.append(f"{kind.capitalize()}: volume {self.unit.text(hull.volume, 3)}")
         self.add_surface(hull, kind)
 
     def add_surface(self, mesh: Any, word: str = "surface") -> None:
@@ -184,8 +181,7 @@ class Scene:
         tint = _SURFACES[number % len(_SURFACES)]
         several = sum(kind in ("set", "hull", "surface") for kind in self.kinds) > 1
         opacity = _CLEAR if several or "cloud" in self.kinds else 1.0
-        skin = Skin(vertices, faces, tint)
-        self.parts.append(PagePart(name, skin, opacity=opacity, surface=True))
+        self.parts.append(PagePart(name, Skin(vertices, faces, tint), opacity, surface=True))
         if several:
             self.keys.append(Swatches([(name, css_color(tint))]))
 
@@ -210,8 +206,7 @@ class Scene:
         stable = equilibria.status == TipStatus.STABLE
         for k, shape in enumerate(shapes):
             if k == equilibria.followed:
-                name = "posture" + ("" if stable[k] else ", unstable")
-                self._add_body(arm, shape, name)
+                self._add_body(arm, shape, "posture" + ("" if stable[k] else ", unstable"))
             elif stable[k]:
                 self._add_body(arm, shape, "other stable ones", _PALE)
             else:
@@ -231,8 +226,7 @@ class Scene:
             vertices, faces = compact_surface(body.vertices, faces)
             self._add_skin(name, vertices, faces, _faded(BODY, fade), opacity)
         for index, skin in enumerate(bundle_skins(arm, shape, lift=0.01)):
-            tint = _faded(bundle_color(index), fade)
-            self._add_skin(name, skin.vertices, skin.faces, tint)
+            self._add_skin(name, skin.vertices, skin.faces, _faded(bundle_color(index), fade))
         if arm.markers:
             dots = Dots(self.unit.of(marker_points(arm.markers, shape)))
             size = _MARKER * float(self.unit.of(arm.length))
@@ -242,7 +236,7 @@ class Scene:
         self, name: str, vertices: Array, faces: Any, tint: Color, opacity: float = 1.0
     ) -> None:
         skin = Skin(self.unit.of(vertices), faces, tint)
-        self.parts.append(PagePart(name, skin, opacity=opacity, through=True))
+        self.parts.append(PagePart(name, skin, opacity, through=True))
 
     def _explain_bundles(self, arm: Manipulator) -> None:
         names = enumerate(arm.bundle_names)

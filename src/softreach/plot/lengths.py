@@ -10,8 +10,6 @@ from softreach.support.units import LengthUnit, as_unit, in_lengths
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Unit", "common_unit", "unit_for", "unit_of"]
-
 Unit = str | LengthUnit | None
 """A unit asked for, "m", "cm", "mm" or "L"; None for L where it is known, else m."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,10 +13,10 @@ from softreach.picture.projection import View, on_paper
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import figure_style, panel_arguments, small_axes
+from softreach.plot.style import a_result, figure_style, small_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import POSITIVE, as_given, as_number
+from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 from softreach.support.quantity import round_below
@@ -66,32 +66,34 @@ def plot_equilibria(
         InvalidInput: Unknown view.
         MissingExtra: matplotlib is not installed.
     """
-    if type(equilibria).__name__ != "AllEquilibria":  # a class that need not be loaded
-        allowed = "what `softreach.equilibria` returned"
-        raise InvalidInput("equilibria", as_given(equilibria), allowed)
-    ax, box = panel_arguments(ax, view, box)
+    a_result("equilibria", equilibria, "AllEquilibria", "softreach.equilibria")
     arm = equilibria.rod.arm
     shapes = shapes_of(equilibria.configuration(_STATIONS))
     stable = equilibria.status == TipStatus.STABLE
     pale = [shapes[k] for k in np.flatnonzero(stable) if k != equilibria.followed]
     followed = [] if equilibria.followed is None else [shapes[equilibria.followed]]
     counted = unit_for(arm.length, unit)
-    rings = [k for k, ring in enumerate(equilibria.is_ring) if ring]
+    rings = np.flatnonzero(equilibria.is_ring).tolist()
     circles = {k: counted.of(_circle(equilibria, k)) for k in rings}
-    with figure_style(ax):
-        turn = np.linspace(0.0, 2.0 * np.pi, 65)
-        rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-        rim *= _BASE * float(arm.profile.radius(0.0))
-        rim = counted.of(equilibria.rod.pose.to_world(rim))
-        points = [rim, *(arm_points(arm, shape, counted) for shape in shapes), *circles.values()]
-        panel = Panel.opened(np.concatenate(points), counted, ax, view, box)
+    rim = counted.of(equilibria.rod.pose.to_world(_rim(arm)))
+    points = [rim, *(arm_points(arm, shape, counted) for shape in shapes), *circles.values()]
+    with Panel.opened(np.concatenate(points), counted, ax, view, box) as panel:
         draw_arms(panel, arm, pale, range(arm.bundles), _PALE)
         draw_arms(panel, arm, followed, range(arm.bundles))
         for k, circle in circles.items():
             color = _STABLE if stable[k] else _UNSTABLE
             panel.plot(circle, color=color, linestyle=":", linewidth=0.8, solid_capstyle="round")
         for k, shape in enumerate(shapes):
-            panel.plot(counted.of(shape["position"].values), **_style(equilibria, k))
+            follows, ring = k == equilibria.followed, " ring" * bool(equilibria.is_ring[k])
+            kind = ("stable" if stable[k] else "unstable") + ring
+            panel.plot(
+                counted.of(shape["position"].values),
+                color=_FOLLOWED if follows else _STABLE if stable[k] else _UNSTABLE,
+                linestyle="-" if stable[k] else "--",
+                linewidth=1.4 if stable[k] or follows else 1.0,
+                solid_capstyle="round",
+                label=f"{kind}, the posture" if follows else kind,
+            )
         panel.plot(rim, color="0.2", linewidth=2.0, solid_capstyle="round")
         _gravity_arrow(panel, equilibria)
         _add_legend(panel.ax, own_figure=ax is None)
@@ -131,7 +133,6 @@ def plot_compliance(
     shapes = shapes_of(a_configuration("configuration", configuration))
     values = as_floats("compliance", compliance)
     force = None if force is None else as_number("force", force, POSITIVE)
-    ax, box = panel_arguments(ax, view, box)
     matrices = values if values.ndim == 3 else values[None]
     if matrices.shape[1:] != (3, 3):
         raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
@@ -195,17 +196,11 @@ def plot_payload_curve(
     return ax
 
 
-def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
-    stable = equilibria.status[k] == TipStatus.STABLE
-    follows = k == equilibria.followed
-    kind = ("stable" if stable else "unstable") + (" ring" if equilibria.is_ring[k] else "")
-    return {
-        "color": _FOLLOWED if follows else _STABLE if stable else _UNSTABLE,
-        "linestyle": "-" if stable else "--",
-        "linewidth": 1.4 if stable or follows else 1.0,
-        "solid_capstyle": "round",
-        "label": f"{kind}, the posture" if follows else kind,
-    }
+def _rim(arm: Manipulator) -> Array:
+    """Edge of the disk that the arm stands on [m], shape (n, 3)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 65)
+    circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    return circle * (_BASE * float(arm.profile.radius(0.0)))
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:

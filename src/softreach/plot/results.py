@@ -9,17 +9,10 @@ import numpy as np
 
 from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
 from softreach.plot.axes import bounding_box, draw_box, view_extent
+from softreach.plot.coloring import COLORMAP
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import (
-    figure_style,
-    legend_above,
-    pyplot,
-    remark,
-    write_note,
-)
-from softreach.support.arguments import as_given
+from softreach.plot.style import a_result, figure_style, legend_above, pyplot, remark, write_note
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput
 from softreach.support.palette import BEST, MET, MISSED
 from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
 
@@ -42,14 +35,6 @@ _BARS: dict[str, Any] = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zord
 _MOST_LINES = 200
 
 
-def _dataset_of(name: str, result: Any, maker: str, variable: str) -> xr.Dataset:
-    of_maker = hasattr(result, "to_dataset") and not isinstance(result, type)
-    data = result.to_dataset() if of_maker else None
-    if data is None or variable not in getattr(data, "variables", {}):
-        raise InvalidInput(name, as_given(result), f"what `{maker}` returned")
-    return data
-
-
 def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = None) -> Figure:
     """Draw how far measured and predicted places of the markers are apart.
 
@@ -66,7 +51,7 @@ def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = N
         InvalidInput: Unknown view or unit, or no calibration.
         MissingExtra: matplotlib is not installed.
     """
-    data = _dataset_of("calibration", calibration, "calibrate", "residual")
+    data = a_result("calibration", calibration, "Calibration", "calibrate").to_dataset()
     view_angles(view)
     arm = calibration.arm
     shown = _Errors(data, unit_for(arm.length, arm.length_unit if unit is None else unit))
@@ -200,7 +185,7 @@ def plot_search(search: Any, *, unit: Unit = None) -> Figure:
         InvalidInput: Unknown unit, or no search.
         MissingExtra: matplotlib is not installed.
     """
-    data = _dataset_of("search", search, "search", "objective_value")
+    data = a_result("search", search, "Search", "search").to_dataset()
     length = float(data.attrs["length"])
     name = data.attrs["display_unit"] or handy_unit(length)
     shown = _Designs(data, unit_for(length, name if unit is None else unit))
@@ -324,7 +309,7 @@ def _draw_objectives(ax: Axes, shown: _Designs) -> None:
     low, high = values.min(axis=0), values.max(axis=0)
     shares = (values - low) / np.where(high > low, high - low, 1.0)
     shares = np.where(shown.senses > 0, shares, 1.0 - shares)
-    colors = pyplot().get_cmap("viridis")(0.9 * shares[:, 0])
+    colors = pyplot().get_cmap(COLORMAP)(0.9 * shares[:, 0])
     places = np.arange(values.shape[1])
     for share, color in zip(shares, colors, strict=True):
         ax.plot(places, share, "-D", color=color, lw=0.9, ms=3.5)
@@ -352,7 +337,10 @@ def _draw_ranges(ax: Axes, shown: _Designs) -> None:
         for rows, style in styles:
             ax.scatter(shares[rows, k], np.full(rows.sum(), k), **style)
         for place, end, across in ((-0.01, low[k], "right"), (1.01, high[k], "left")):
-            text = _end_text(shown, k, float(end))
+            if choices := str(data["choices"].values[k]):
+                text = choices.split(", ")[round(float(end))]
+            else:
+                text = readable(float(end), str(data["parameter_unit"].values[k]), shown.unit)
             ax.text(place, k, text, ha=across, va="center", fontsize=7, color="0.25")
     ax.set_yticks(range(len(low)), [str(name) for name in data["parameter"].values])
     ax.tick_params(axis="y", length=0, pad=42)
@@ -360,9 +348,3 @@ def _draw_ranges(ax: Axes, shown: _Designs) -> None:
     word = "the best" if shown.front.sum() < 2 else "the front"
     remark(ax, f"free parameters in their ranges, {word} ◆")
     ax.spines[:].set_visible(False)
-
-
-def _end_text(shown: _Designs, k: int, end: float) -> str:
-    if choices := str(shown.data["choices"].values[k]):
-        return choices.split(", ")[round(end)]
-    return readable(end, str(shown.data["parameter_unit"].values[k]), shown.unit)

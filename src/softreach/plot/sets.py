@@ -23,7 +23,6 @@ from softreach.plot.style import (
     a_surface,
     as_axes,
     figure_style,
-    panel_arguments,
     pyplot,
     small_axes,
 )
@@ -71,11 +70,9 @@ def plot_hull(
     """
     hull = a_surface("hull", hull)
     length = None if length is None else as_number("length", length, LENGTH)
-    ax, box = panel_arguments(ax, view, box)
-    with figure_style(ax):
-        counted = unit_for(length, unit)
-        vertices = counted.of(hull.vertices)
-        panel = Panel.opened(vertices, counted, ax, view, box)
+    counted = unit_for(length, unit)
+    vertices = counted.of(hull.vertices)
+    with Panel.opened(vertices, counted, ax, view, box) as panel:
         buffer = panel.buffer(oversample=3)
         draw_mesh(buffer, vertices, hull.faces, STEEL, view)
         panel.show(buffer)

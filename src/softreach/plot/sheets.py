@@ -60,9 +60,17 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         return
     yield "clouds", plot_cloud_sheet(atlas, panels=panels)
     ends = _thinned(atlas, 2)
-    yield "corners", plot_opposite_sides(_corners(ends), box_over_length=box_over_length(atlas))
-    if (curvature := _curvature(ends)) is not None:
-        yield "curvature", curvature
+    across, up = sheet_axes(ends)
+    places = np.ndindex(len(across.values), len(up.values))  # in the paper's order
+    clouds = {at: cloud for at in places if (cloud := _cloud_at(ends, *at)) is not None}
+    named = {f"{across.text(j)}, {up.text(k)}": cloud for (j, k), cloud in clouds.items()}
+    yield "corners", plot_opposite_sides(named, box_over_length=box_over_length(atlas))
+    last = len(across.values) - 1
+    those = {up.text(k): cloud for (j, k), cloud in clouds.items() if j == last}
+    if those:
+        ax = plot_curvature({label: curvature_statistics(x) for label, x in those.items()})
+        ax.set_title(across.text(last), fontsize=9)
+        yield "curvature", ax
     yield "hulls", plot_hull_sheet(atlas, panels=panels)
 
 
@@ -281,28 +289,3 @@ def _cloud_at(atlas: xr.Dataset, column: int, row: int) -> xr.Dataset | None:
     except DamagedStore as error:
         warn(f"a cloud is left out: {error}")
         return None
-
-
-def _corners(ends: xr.Dataset) -> dict[str, xr.Dataset]:
-    """Title and cloud at the ends of both parameters, in the paper's order."""
-    across, up = sheet_axes(ends)
-    clouds = {
-        f"{across.text(column)}, {up.text(row)}": _cloud_at(ends, column, row)
-        for column, row in np.ndindex(len(across.values), len(up.values))
-    }
-    return {title: cloud for title, cloud in clouds.items() if cloud is not None}
-
-
-def _curvature(ends: xr.Dataset) -> Axes | None:
-    """The first against the last value of the second parameter, at the last of the first.
-
-    None if neither design is done.
-    """
-    across, up = sheet_axes(ends)
-    clouds = {up.text(k): _cloud_at(ends, -1, k) for k in range(len(up.values))}
-    done = {k: curvature_statistics(cloud) for k, cloud in clouds.items() if cloud is not None}
-    if not done:
-        return None
-    ax = plot_curvature(done)
-    ax.set_title(across.text(-1), fontsize=9)
-    return ax

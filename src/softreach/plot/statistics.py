@@ -26,7 +26,6 @@ from softreach.plot.style import (
     PAGE,
     as_axes,
     figure_style,
-    panel_arguments,
     place_panels,
     pyplot,
     small_axes,
@@ -58,10 +57,6 @@ _a_distance = partial(as_dataset, kind="DataArray")
 _COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
 _SYMBOLS = {"bending": "κ", "torsion": "u₃", "extension": "ζ"}
 _COARSE = 64  # bins of a distribution of curvature
-
-
-def _some_statistics(name: str, value: object) -> xr.Dataset:
-    return as_dataset(name, value, "bending_count", "Z")
 
 
 def plot_distance(
@@ -96,11 +91,9 @@ def plot_distance(
     cloud, distance = a_cloud("cloud", cloud), _a_distance("distance", distance)
     high = largest_distance([distance]) if high is None else as_number("high", high, POSITIVE)
     key, values = as_flag("key", key), distance.values
-    ax, box = panel_arguments(ax, view, box)
     counted = unit_of(cloud["tip"], unit)
     tips = drawn_tips(cloud, counted)[distance["sample"].values]
-    with figure_style(ax):
-        panel = Panel.opened(tips, counted, ax, view, box)
+    with Panel.opened(tips, counted, ax, view, box) as panel:
         buffer = panel.buffer(oversample=2)
         seen = project(tips, view)
         seen[np.isnan(values), 2] -= 10.0 * np.ptp(panel.box)  # behind all others
@@ -239,7 +232,8 @@ def plot_curvature(
         InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
             the arm, or designs of which only one knows L.
     """
-    statistics, ax = as_mapping("statistics", statistics, _some_statistics), as_axes(ax)
+    ax, variables = as_axes(ax), ("bending_count", "Z")
+    statistics = as_mapping("statistics", statistics, lambda *x: as_dataset(*x, *variables))
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
     as_one_of("quantity", quantity, _SYMBOLS)

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import SurfaceMesh
 from softreach.picture.page import Figure3D
-from softreach.picture.projection import View, view_angles
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
@@ -48,6 +47,11 @@ _RC |= {f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.i
 _TEXT: dict[str, Any] = {"text.parse_math": False, "text.usetex": False}
 # text stays text in vector files, so that a journal can set it in its own type
 _SAVING: dict[str, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none"}
+_ENCODINGS: dict[str, Any] = {
+    # at this level a PNG takes less than half the time of the default for 5 % more bytes
+    ".png": {"pil_kwargs": {"compress_level": 4}},
+    ".pdf": {"metadata": {"CreationDate": None}},
+}
 LENGTH = POSITIVE._replace(unit="m")
 PLACE = Range(unit="m")
 SIZE = Range(0.0, 1e3, "pixels", open_low=True)
@@ -150,13 +154,7 @@ def save_figure(
     with pyplot().rc_context(_SAVING), writing(path, overwrite=overwrite) as file:
         root = figure.get_figure(root=True)
         if root is not None:
-            # at this level a PNG takes less than half the time of the default for 5 % more bytes
-            encodings: dict[str, Any] = {
-                ".png": {"pil_kwargs": {"compress_level": 4}},
-                ".pdf": {"metadata": {"CreationDate": None}},
-            }
-            options = encodings.get(suffix, {})
-            root.savefig(file, dpi=DPI, format=suffix[1:], **options)
+            root.savefig(file, dpi=DPI, format=suffix[1:], **_ENCODINGS.get(suffix, {}))
 
 
 def legend_above(ax: Axes, columns: int = 3, **more: Any) -> None:
@@ -177,6 +175,13 @@ def write_note(ax: Axes, text: str, right: float, up: float) -> None:
     ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)
 
 
+def a_result(name: str, value: Any, kind: str, maker: str) -> Any:
+    """What a function returned, of a class of that name, which need not be loaded."""
+    if kind in [base.__name__ for base in type(value).__mro__]:
+        return value
+    raise InvalidInput(name, as_given(value), f"what `{maker}` returned")
+
+
 def a_surface(name: str, value: Any) -> SurfaceMesh:
     """Anything with vertices and faces that index them."""
     allowed = "an object with vertices [m], shape (v, 3), and faces, shape (f, 3)"
@@ -185,11 +190,12 @@ def a_surface(name: str, value: Any) -> SurfaceMesh:
     return value
 
 
-def some_bundles(name: str, value: Any, arm: Manipulator) -> list[int]:
-    """Indices of bundles of an arm."""
+def some_bundles(arm: Manipulator, value: Any) -> list[int]:
+    """Indices of bundles of an arm; None stands for all."""
+    value = range(arm.bundles) if value is None else value
     if isinstance(value, set | frozenset | range):
         value = sorted(value)
-    return as_indices(name, value, arm.bundles, "bundles of the arm").tolist()
+    return as_indices("bundles", value, arm.bundles, "bundles of the arm").tolist()
 
 
 def as_axes(ax: Any) -> Any:
@@ -208,9 +214,3 @@ def as_box(name: str, value: Any) -> Array:
     if rising and np.isfinite(corners).all():
         return corners
     raise InvalidInput(name, corners.tolist(), allowed)
-
-
-def panel_arguments(ax: Any, view: View, box: object) -> tuple[Any, Array | None]:
-    """Axes and box of a figure of one panel, each of which may be None; its view is looked at."""
-    view_angles(view)
-    return as_axes(ax), None if box is None else as_box("box", box)

@@ -17,19 +17,10 @@ from softreach.requirements.findings import (
     design_limits,
     limit_finding,
     measure_findings,
-    places_text,
     verdict_of,
 )
 from softreach.requirements.parts import Keep, Target
-from softreach.requirements.poses import (
-    TOL,
-    Chooser,
-    Posed,
-    PoseRules,
-    chosen,
-    descended,
-    solved,
-)
+from softreach.requirements.poses import TOL, Posed, PoseRules, solved
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.bending import bending_over_bounds
@@ -38,7 +29,7 @@ from softreach.rod.rods import as_tip_map, in_steps
 from softreach.schema import AXES, provenance
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
-from softreach.support.errors import InvalidInput, NotPossible, Range, no_warnings
+from softreach.support.errors import InvalidInput, NotPossible, Range, counted, no_warnings
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.report import Report, Reported, Section
@@ -143,11 +134,10 @@ class Check(Reported):
         Returns:
             As `configuration` has them; None where there are no places.
         """
-        count = as_integer("count", count, 0)
-        rows = np.unique(np.linspace(0, len(self.places) - 1, count).round().astype(int))
-        rows = rows[rows >= 0] if len(self.places) else rows[:0]
-        if not len(rows):
+        count = min(as_integer("count", count, 0), len(self.places))
+        if not count:
             return None
+        rows = np.unique(np.linspace(0, len(self.places) - 1, count).round().astype(int))
         arm = with_payload(self.arm, self.payloads[-1])
         shapes = configuration(arm, self.poses[-1, rows])
         held = np.isfinite(shapes["position"].values).all(axis=(1, 2))
@@ -268,7 +258,7 @@ def quick_check(
     A place that these do not reach counts as missed, although another pose may reach it.
     """
     sets = sets_to(accuracy, quiet=True) if sets is None else sets
-    return checked(arm, requirements, accuracy, sets, choose=descended)
+    return checked(arm, requirements, accuracy, sets, quick=True)
 
 
 def sets_to(accuracy: float, *, quiet: bool = False) -> Sets:
@@ -284,9 +274,9 @@ def checked(
     sets: Sets,
     step: Progress = silent,
     *,
-    choose: Chooser = chosen,
+    quick: bool = False,
 ) -> Check:
-    """As `check`, with reachable sets to its accuracy, and poses that are chosen for places."""
+    """As `check`, with reachable sets to its accuracy; `quick` as `quick_check`."""
     payloads = tuple(needs.payloads) or (None,)
     keeps = tuple(keep for keep in needs.keeps if keep.when == "targets" and needs.targets)
     every: list[PoseRules] = []
@@ -295,16 +285,15 @@ def checked(
     for payload, loaded in zip(payloads, needs.under_payloads(arm), strict=True):
         rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
-        if choose is descended:  # on the way, with shapes in no more steps than tips
+        if quick:  # on the way, with shapes in no more steps than tips
             rod = as_tip_map(loaded, _ROUGH_TOL)
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
-        posed.append(solved(rules, needs.places, needs.within, step, choose))
+        posed.append(solved(rules, needs.places, needs.within, step, quick=quick))
         for target in needs.targets:
             if target.region is not None:
                 coverages.append(_coverage(rules, target, payload, accuracy, sets, step))
     joined = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
-    numbers = (joined.gaps, joined.poses, joined.effort, joined.nearest)
-    made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *numbers)
+    made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *joined[:4])
     findings = (
         *_reach_findings(made, every),
         *_cover_findings(made),
@@ -329,7 +318,7 @@ def _coverage(
     places = target.region.places(count)
     near = max(target.within, TOL * rules.arm.length)
     if len(rules):
-        posed = solved(rules, places, np.full(count, target.within), step, chosen)
+        posed = solved(rules, places, np.full(count, target.within), step)
         inside = (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
     else:
         inside = np.zeros(count, bool)
@@ -351,6 +340,12 @@ def _coverage(
     return Coverage(target.name, payload, share, error, count)
 
 
+def _largest(values: Array) -> tuple[int, int]:
+    """Payload and place of the largest value, by their numbers."""
+    load, place = np.unravel_index(int(values.argmax()), values.shape)
+    return int(load), int(place)
+
+
 def _under(payload: float | None) -> str:
     return "" if payload is None else f" with {payload:.4g} kg"
 
@@ -362,29 +357,28 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
             continue
         own = made.target_of == index
         gaps, reached = made.gaps[:, own], made.reached[:, own]
-        load, place = np.unravel_index(int(gaps.argmax()), gaps.shape)
-        met = places_text(int(reached.all(axis=0).sum()), len(target.points))
+        load, place = _largest(gaps)
+        met, of = int(reached.all(axis=0).sum()), counted(len(target.points), "place")
         if reached.all():
             effort = float(made.effort[:, own].max())
             near = f" to {unit.text(target.within)}" if target.within else ""
-            text = f"{met} reached{near}, effort up to {effort:.3g}"
+            text = f"{of} reached{near}, effort up to {effort:.3g}"
             yield Finding(target.name, "reach", "met", 0.0, text)
             continue
-        gap, number = float(gaps[load, place]), int(np.flatnonzero(own)[place])
+        gap = float(gaps[load, place])
         excess = max(gap - target.within, TOL * length) / length
         where = ", ".join(f"{x / unit.size:.4g}" for x in target.points[place])
-        text = f"{met} reached; place {place + 1} at ({where}) {unit.name}"
+        text = f"{met:,} of {of} reached; place {place + 1} at ({where}) {unit.name}"
         more, laden = "", _under(made.payloads[load])
         away = float(np.linalg.norm(target.points[place] - made.arm.base.position))
         if gap > length + away - 1e-9:
             text += f" is not held{laden}: no stable equilibrium"
         else:
             text += f" is missed by {unit.rounded(gap - target.within)}{laden}"
-            pose = made.poses[load, number]
-            more = advice(rules[int(load)].arm, target.points[place], pose, unit)
+            pose = made.poses[load, own][place]
+            more = advice(rules[load].arm, target.points[place], pose, unit)
         pairs = zip(made.payloads, reached, strict=True)
-        held = [payload for payload, row in pairs if payload is not None and row.all()]
-        if held:
+        if held := [payload for payload, row in pairs if payload is not None and row.all()]:
             more += f"; all reached with {max(held):.4g} kg"
         yield Finding(target.name, "reach", "missed", excess, text + more)
 
@@ -424,7 +418,7 @@ def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Ite
             yield Finding(keep.name, keep.kind, "met", 0.0, "counted in what is covered")
             continue
         decides = value if value.max() > 0.0 or (value + error).max() <= 0.0 else value + error
-        load, place = np.unravel_index(int(decides.argmax()), value.shape)
+        load, place = _largest(decides)
         most, off = float(value[load, place]), float(error[load, place])
         where = f"at place {place + 1}{_under(made.payloads[load])}"
         yield _kept(keep, most, off, float(excess.max()), where, made.arm.length_unit)
@@ -450,7 +444,7 @@ def _limit_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> It
     for column, (name, most) in enumerate(rules[0].limits.items(), len(rules[0].keeps)):
         values = posed.value[..., column]
         if values.size:
-            load, place = np.unravel_index(int(values.argmax()), values.shape)
+            load, place = _largest(values)
             value = float(values[load, place])
             where = f", at place {place + 1}{_under(made.payloads[load])}"
         elif made.requirements.targets:

@@ -18,7 +18,7 @@ from softreach.atlas.metrics import known_metric
 from softreach.requirements.parts import LIMIT_UNITS
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.support.arguments import as_instance
-from softreach.support.errors import counted, no_warnings
+from softreach.support.errors import no_warnings
 from softreach.support.quantity import quantity
 
 if TYPE_CHECKING:
@@ -99,30 +99,26 @@ def longest_reach(arm: Manipulator) -> float:
 
 
 def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
-    unloaded = arm.loads is None and not any(needs.payloads)
-    if not (unloaded and needs.targets):
+    if arm.loads is not None or any(needs.payloads) or not needs.targets:
         return
-    longest, unit = longest_reach(arm), arm.length_unit
+    longest = longest_reach(arm)
     for target in needs.targets:
-        room = longest + target.within
-        if target.places is not None:
+        room, text = longest + target.within, "farther from the base than the arm is ever long"
+        if target.region is None:
             away = np.linalg.norm(target.points - arm.base.position, axis=1)
             gap = float(away.max()) - room
-            text = f"{unit.text(gap)} farther from the base than the arm is ever long"
-        elif target.region is not None:
-            gap = float(target.region.distance([arm.base.position])[0]) - room
-            text = "farther from the base than the arm is ever long"
+            kind, excess = "reach", gap / arm.length
+            text = f"{arm.length_unit.text(gap)} {text}"
         else:
-            continue
+            gap = float(target.region.distance([arm.base.position])[0]) - room
+            kind, excess = "cover", target.share
         if gap > 1e-6 * arm.length:
-            excess = gap / arm.length if target.region is None else target.share
-            kind = "reach" if target.region is None else "cover"
             yield Finding(target.name, kind, "missed", excess, text)
 
 
 def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:
     """A limit against its value."""
-    unit, symbol = arm.length_unit, LIMIT_UNITS[name]
+    symbol = LIMIT_UNITS[name]
     excess = max(value - most, 0.0) / (most or 1.0)
     excess = excess if excess > _ROUNDING else 0.0
     if name == "actuators":
@@ -130,7 +126,7 @@ def limit_finding(name: str, value: float, most: float, arm: Manipulator, where:
     elif name == "shortening":
         texts = [f"{100 * value:.3g} %", f"{100 * most:.3g} %"]
     elif symbol == "m":
-        texts = [unit.text(x) for x in (value, most)]
+        texts = [arm.length_unit.text(x) for x in (value, most)]
     else:
         texts = [f"{x:.4g} {symbol}".strip() for x in (value, most)]
     text = f"{texts[0]} of at most {texts[1]}{where}"
@@ -139,17 +135,16 @@ def limit_finding(name: str, value: float, most: float, arm: Manipulator, where:
 
 def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     """Limits that follow from the design alone."""
-    limits = needs.limits
-    if limits.actuators is not None:
-        low, high = arm.input_bounds.T
-        moving = int((low < high).sum())
-        yield limit_finding("actuators", moving, limits.actuators, arm, "")
-    if limits.mass is not None:
-        yield limit_finding("mass", mass(arm), limits.mass, arm, "")
-    if limits.load_number is not None:
-        heaviest = with_payload(arm, max(needs.payloads, default=None))
-        value = load_number(heaviest)
-        yield limit_finding("load_number", value, limits.load_number, arm, "")
+    low, high = arm.input_bounds.T
+    heaviest = max(needs.payloads, default=None)
+    numbers: dict[str, Callable[[], float]] = {
+        "actuators": lambda: int((low < high).sum()),
+        "mass": lambda: mass(arm),
+        "load_number": lambda: load_number(with_payload(arm, heaviest)),
+    }
+    for name, value in numbers.items():
+        if name in needs.limits.given:
+            yield limit_finding(name, value(), needs.limits.given[name], arm, "")
 
 
 def measure_findings(
@@ -167,28 +162,22 @@ def measure_findings(
             for samples in (_SAMPLES, _SAMPLES // _FEWER)
         )
         for metric in metrics:
-            value = float(metric.value(fine, {}))
-            if Need.REACHABLE_SET in metric.needs:
-                error = _error_of(metric.name, known())
+            value, name = float(metric.value(fine, {})), metric.name
+            if Need.REACHABLE_SET in metric.needs:  # of which 0 stands for no error that is known
+                size = known().volume if name == "multiplicity" else 1.0
+                own = "multiplicity" if name == "multiple_volume" else name.removeprefix("exact_")
+                error = getattr(known(), f"{own}_error", 0.0) / size
             else:
                 error = abs(value - float(metric.value(coarse, {})))
-            yield _measure(metric.name, metric.unit, value, error, *needs.measures[metric.name])
-
-
-def _error_of(metric: str, reached: ReachableSet) -> float:
-    """Error of a metric of the reachable set, 0 where none is known."""
-    size = reached.volume if metric == "multiplicity" else 1.0
-    own = "multiplicity" if metric == "multiple_volume" else metric.removeprefix("exact_")
-    return getattr(reached, f"{own}_error", 0.0) / size
+            error = float(np.nan_to_num(error))
+            yield _measure(name, metric.unit, value, error, needs.measures[name])
 
 
 def _measure(
-    name: str, unit: str, value: float, error: float, low: float | None, high: float | None
+    name: str, unit: str, value: float, error: float, ends: tuple[float | None, float | None]
 ) -> Finding:
-    ends = [("at least", low, 1.0), ("at most", high, -1.0)]
     texts, margin, excess = [], np.inf, 0.0
-    error = float(np.nan_to_num(error))
-    for words, end, sign in ends:
+    for words, end, sign in zip(("at least", "at most"), ends, (1.0, -1.0), strict=True):
         if end is not None:
             texts.append(f"{words} {end:.6g} {unit}".removesuffix(" 1"))
             own, size = sign * (value - end), abs(end) or 1.0
@@ -200,8 +189,3 @@ def _measure(
     shown = quantity(value, "" if unit == "1" else unit, error)
     text = f"{shown}, {' and '.join(texts) or 'anything allowed'}"
     return Finding(name, "measure", verdict_of(margin, error), excess, text)
-
-
-def places_text(count: int, of: int) -> str:
-    """The words "4 of 5 places"."""
-    return counted(of, "place") if count == of else f"{count:,} of {counted(of, 'place')}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -90,8 +90,8 @@ class PoseRules:
 
     def judged(self, gamma: Array) -> Judged:
         """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""
-        value, error = np.zeros((len(gamma), len(self))), np.zeros((len(gamma), len(self)))
-        if not len(self) or not len(gamma):
+        value, error = np.zeros((2, len(gamma), len(self)))
+        if not value.size:
             return Judged(value, value, error)
         for block in parallel.blocks(len(gamma), _BLOCK):
             k = len(self.keeps)
@@ -112,7 +112,9 @@ class PoseRules:
         left: dict[int, Index] = {}
         for column, keep in enumerate(self.keeps):
             if keep.of == "tip":
-                value[:, column] = _tips_missed(keep, self.rod.tips(gamma))
+                tips = self.rod.tips(gamma)
+                missed = keep.missed(np.nan_to_num(tips))
+                value[:, column] = np.where(np.isnan(tips).any(axis=1), np.nan, missed)
             else:
                 left[column] = np.arange(len(gamma))
         for parts in levels:
@@ -235,13 +237,6 @@ def _widest(arm: Manipulator, z: Array) -> Array:
     return radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
 
 
-def _tips_missed(keep: Keep, tips: Array) -> Array:
-    """Distances by which tips miss a region [m], NaN where there is none, shape (n,)."""
-    missed = keep.missed(np.where(np.isnan(tips), 0.0, tips))
-    missed[np.isnan(tips).any(axis=1)] = np.nan
-    return missed
-
-
 class Posed(NamedTuple):
     """The pose chosen for each place, under one payload."""
 
@@ -257,14 +252,14 @@ class Posed(NamedTuple):
     """Of the values of regions between stations [m], shape (place, rule)."""
 
 
-Chooser = Callable[[PoseRules, Array, Array], Posed]
-"""Poses under rules for places, each with the distance to which it must be reached."""
-
-
 def solved(
-    rules: PoseRules, places: Array, within: Array, step: Progress, choose: Chooser
+    rules: PoseRules, places: Array, within: Array, step: Progress, *, quick: bool = False
 ) -> Posed:
-    """The poses at places, in blocks."""
+    """The poses at places, each with the distance to which it must be reached; in blocks.
+
+    From all solutions of the inverse, or `quick` ones from a few descents.
+    """
+    choose = _descended if quick else _chosen
     count, inputs, k = len(places), rules.arm.inputs, len(rules)
     shapes = ((), (inputs,), (), (3,), (k,), (k,), (k,))
     room = Posed(*(np.zeros((count, *shape)) for shape in shapes))
@@ -275,8 +270,7 @@ def solved(
     return room
 
 
-def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
-    """Poses at places from all solutions of the inverse."""
+def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
     arm = rules.arm
     try:
         with no_warnings():
@@ -286,23 +280,19 @@ def chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
         if error.name != "loads":
             raise
         return _without_equilibrium(rules, places)
-    best = _best(rules, solutions)
-    broken = (best.excess.sum(axis=1) > 0.0) & (solutions.statuses == Status.REACHED)
-    if (as_tip_map(arm).box.dimension > 3) and 0 < broken.sum() <= _MOST_TRIED:
-        rows = np.flatnonzero(broken)
+    best, reached = _best(rules, solutions), solutions.statuses == Status.REACHED
+    rows = np.flatnonzero((best.excess.sum(axis=1) > 0.0) & reached)
+    if (as_tip_map(arm).box.dimension > 3) and 0 < len(rows) <= _MOST_TRIED:
         with no_warnings():
-            family = solve_inverse(
-                prepared_map(arm, TOL, cells=_CELLS), places[rows], family=_FAMILY
-            )
+            family = solve_inverse(prepared, places[rows], family=_FAMILY)
         for all_places, some in zip(best, _best(rules, family), strict=True):
             all_places[rows] = some
     # A place that is reached to the error of the tips is reached.
-    reached = solutions.statuses == Status.REACHED
     gaps = np.where(reached, np.minimum(best.gaps, TOL * arm.length), best.gaps)
     return best._replace(gaps=gaps)
 
 
-def descended(rules: PoseRules, places: Array, within: Array) -> Posed:
+def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     """Poses at the ends of descents from the samples whose tips are nearest to each place."""
     from scipy.spatial import KDTree
 

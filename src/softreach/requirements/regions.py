@@ -33,6 +33,8 @@ from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
 Triple = tuple[float, float, float]
+Ends = tuple[Array, Array]
+"""Least and largest of something."""
 
 _STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
 """1/g, 1/g² and 1/g³ with g⁴ = g + 1: steps of a sequence that fills the cube evenly."""
@@ -99,9 +101,7 @@ class Region(ABC):
                 raise NotPossible(f"{self} is too thin to draw places from it")
         return np.concatenate(kept)[:n]
 
-    def section_distances(
-        self, center: Array, tangent: Array, radius: Array
-    ) -> tuple[Array, Array]:
+    def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         """Least and largest distance of the points of circular sections, negative inside.
 
         Exact for half-spaces and for spheres; of boxes the largest is exact by faces. Otherwise a
@@ -133,13 +133,12 @@ class Box(Region):
     """Upper corner [m]."""
 
     def __post_init__(self) -> None:
-        low, high = (_triple(name, getattr(self, name)) for name in ("low", "high"))
-        for axis, start, end in zip("xyz", low, high, strict=True):
+        for name in ("low", "high"):
+            object.__setattr__(self, name, _triple(name, getattr(self, name)))
+        for axis, start, end in zip("xyz", self.low, self.high, strict=True):
             if not start < end:
                 allowed = f"below high = {end:g} m, so that the box is not empty"
                 raise InvalidInput(f"low along {axis}", start, allowed)
-        object.__setattr__(self, "low", low)
-        object.__setattr__(self, "high", high)
 
     @property
     def volume(self) -> float:
@@ -154,10 +153,7 @@ class Box(Region):
         beyond = np.maximum(self.low - x, x - self.high)
         return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
 
-    def section_distances(
-        self, center: Array, tangent: Array, radius: Array
-    ) -> tuple[Array, Array]:
-        """As `Region.section_distances`; the least by faces where they tell more than a ball."""
+    def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         reach = radius[..., None] * np.sqrt(np.maximum(1.0 - tangent**2, 0.0))
         beyond = np.maximum(self.low - center, center - self.high)
         ball = self._distances(center) - radius
@@ -198,9 +194,7 @@ class Sphere(Region):
     def distance(self, points: ArrayLike) -> Array:
         return np.linalg.norm(as_points("points", points) - self.center, axis=1) - self.radius
 
-    def section_distances(
-        self, center: Array, tangent: Array, radius: Array
-    ) -> tuple[Array, Array]:
+    def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         apart = center - self.center
         height = (apart * tangent).sum(axis=-1)
         across = np.sqrt(np.maximum((apart**2).sum(axis=-1) - height**2, 0.0))
@@ -241,11 +235,8 @@ class HalfSpace(Region):
     def distance(self, points: ArrayLike) -> Array:
         return (as_points("points", points) - self.point) @ np.array(self.normal)
 
-    def section_distances(
-        self, center: Array, tangent: Array, radius: Array
-    ) -> tuple[Array, Array]:
-        distance = (center - self.point) @ np.array(self.normal)
-        along = tangent @ np.array(self.normal)
+    def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
+        distance, along = self._distances(center), tangent @ np.array(self.normal)
         reach = radius * np.sqrt(np.maximum(1.0 - along**2, 0.0))
         return distance - reach, distance + reach
 
@@ -253,7 +244,7 @@ class HalfSpace(Region):
         """A square of the plane, about as large as what else is drawn [m]."""
         middle, half = around.mean(axis=0), 0.5 * float(np.ptp(around, axis=0).max())
         normal = np.array(self.normal)
-        foot = middle - ((middle - self.point) @ normal) * normal
+        foot = middle - self.distance(middle[None]) * normal
         first = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
         first /= np.linalg.norm(first)
         second = np.cross(normal, first)

@@ -174,8 +174,31 @@ class Requirements:
         raise InvalidDesign(faults, source)
 
     def to_toml(self) -> str:
-        """The text of a file, from which `from_toml` makes the same."""
-        return _written(self)
+        """The text of a file in m and kg, from which `from_toml` makes the same."""
+        head = {"version": 1} | ({"payloads_kg": self.payloads} if self.payloads else {})
+        blocks = [["# softreach requirements", *_lines(head)]]
+        for target in self.targets:
+            lines = ["[[reach]]", *_lines({"name": target.name})]
+            if target.places is not None:
+                rows = (f"  {value_text(row)}," for row in target.points.tolist())
+                lines += ["places_m = [", *rows, "]"]
+            elif target.region is not None:
+                lines += [_region_line(target.region), *_lines({"share": target.share})]
+            blocks.append(lines + _lines({"within_m": target.within} if target.within else {}))
+        for keep in sorted(self.keeps, key=lambda keep: not keep.inside):
+            words = {"of": keep.of, "when": keep.when}
+            words |= {"clearance_m": keep.clearance} if keep.clearance else {}
+            start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
+            blocks.append([*start, _region_line(keep.region), *_lines(words)])
+        if limits := self.limits.given:
+            keys = (f"{name}_{LIMIT_UNITS[name].lower()}".rstrip("_") for name in limits)
+            blocks.append(["[limits]", *_lines(dict(zip(keys, limits.values(), strict=True)))])
+        blocks += [["[measures]"]] if self.measures else []
+        for name, ends in self.measures.items():
+            pairs = zip(("at_least", "at_most"), ends, strict=True)
+            table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
+            blocks[-1].append(f"{key_text(name)} = {table}")
+        return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a TOML file.
@@ -454,34 +477,6 @@ def _keys(name: str, unit: str) -> dict[str, str]:
     units = {each.lower(): each for each in unit_names(unit) if each.isascii()} if unit else {}
     units |= {"over_length": "L"} if unit == "m" else {}
     return {name: ""} | {f"{name}_{suffix}": symbol for suffix, symbol in units.items()}
-
-
-def _written(needs: Requirements) -> str:
-    """The text of a file; lengths in m, masses in kg."""
-    head = {"version": 1} | ({"payloads_kg": needs.payloads} if needs.payloads else {})
-    blocks = [["# softreach requirements", *_lines(head)]]
-    for target in needs.targets:
-        lines = ["[[reach]]", *_lines({"name": target.name})]
-        if target.places is not None:
-            rows = (f"  {value_text(row)}," for row in target.points.tolist())
-            lines += ["places_m = [", *rows, "]"]
-        elif target.region is not None:
-            lines += [_region_line(target.region), *_lines({"share": target.share})]
-        blocks.append(lines + _lines({"within_m": target.within} if target.within else {}))
-    for keep in sorted(needs.keeps, key=lambda keep: not keep.inside):
-        words = {"of": keep.of, "when": keep.when}
-        words |= {"clearance_m": keep.clearance} if keep.clearance else {}
-        start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
-        blocks.append([*start, _region_line(keep.region), *_lines(words)])
-    if limits := needs.limits.given:
-        keys = (f"{name}_{LIMIT_UNITS[name].lower()}".rstrip("_") for name in limits)
-        blocks.append(["[limits]", *_lines(dict(zip(keys, limits.values(), strict=True)))])
-    blocks += [["[measures]"]] if needs.measures else []
-    for name, ends in needs.measures.items():
-        pairs = zip(("at_least", "at_most"), ends, strict=True)
-        table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
-        blocks[-1].append(f"{key_text(name)} = {table}")
-    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
 def _lines(values: Mapping[str, Any]) -> list[str]:

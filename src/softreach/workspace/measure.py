@@ -35,7 +35,7 @@ class Estimate(NamedTuple):
     """A number and how far off it may be."""
 
     value: float
-    error: float
+    error: float = np.nan
 
 
 def extrapolated(fine: float, coarse: float, share: float = 1.0) -> Estimate:
