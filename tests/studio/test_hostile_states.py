@@ -13,12 +13,18 @@ from softreach.arm.parameters import changed
 from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
 from softreach.studio.captions import size_text
-from softreach.studio.files import cloud_file, figure_file, page_file, state_from, surface_file
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.colors import sample_values
 from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
 from softreach.studio.state import Slice, StudioState
+from softreach.studio.tabs.export import (
+    cloud_file,
+    figure_file,
+    page_file,
+    state_from,
+    surface_file,
+)
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())

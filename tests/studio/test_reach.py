@@ -27,7 +27,6 @@ from softreach.studio.reach import (
     reached,
     shown_samples,
     stages,
-    unstable_samples,
 )
 from softreach.studio.scene.camera import is_behind, picked_point
 from softreach.studio.scene.colors import (
@@ -37,11 +36,13 @@ from softreach.studio.scene.colors import (
     sample_values,
     surface_colors,
 )
+from softreach.studio.scene.scene import Scene
 from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
-from softreach.studio.state import Slice, StudioState, solvable_rod
+from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.studio.tabs.design import base_field, gravity_name, load_field, other_loads
 from softreach.studio.work import Dropped, affordable_level
 from softreach.support.errors import InvalidDesign, InvalidInput
+from tests.studio.test_scene import Meshes
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -382,9 +383,10 @@ def test_unstable_samples_are_those_of_the_cloud_that_are_shown(torn):
     """Random activations are hardly ever as symmetric as one that is unstable: some are marked."""
     status = np.where(np.arange(torn.samples) % 7 == 0, TipStatus.UNSTABLE, torn.status)
     marked = replace(torn, cloud=schema.with_status(torn.cloud, status.astype(np.int8)))
-    shown = shown_samples(marked, 9)
-    unstable = unstable_samples(marked, 9)
-    assert 0 < unstable.sum() == (status[shown] == TipStatus.UNSTABLE).sum()
+    meshes, shown = Meshes(), shown_samples(marked, 12)
+    Scene(meshes).draw_cloud(marked, Appearance(level=12, cloud=True))
+    drawn = len(meshes.added["/unstable"].points)
+    assert 0 < drawn == (status[shown] == TipStatus.UNSTABLE).sum()
     text = "".join(str(part) for part in legend_text(marked, free=False))
     assert f"unstable: {100 * (status == TipStatus.UNSTABLE).mean():.2g} % of the samples" in text
 

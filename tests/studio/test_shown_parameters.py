@@ -110,6 +110,14 @@ def test_sliders_end_where_the_design_ends_and_not_before(design):
                     changed(arm, {control.name: beyond * control.scale})
 
 
+def test_ends_are_those_of_the_design_when_they_are_looked_for_near_others(trunk):
+    ends = slider_ends(trunk)
+    for taper in (0.02, 0.036, 0.05):
+        arm = changed(trunk, {"taper": taper})
+        ends = slider_ends(arm, ends)
+        assert ends == slider_ends(arm)
+
+
 def test_refusals_use_the_words_of_the_panel(trunk):
     """No name of a file, and no symbol that the page does not show."""
     shown = slider_parameters(trunk)
@@ -324,7 +332,7 @@ def test_nothing_is_applied_before_enter(page):
 
 def test_a_refused_value_stays_in_its_field_beside_the_reason(page):
     fields, _, _, form, text, line = field(page)
-    other = fields.number("thickness", attribute("appearance.slice.thickness"), "hint")
+    other = fields.typed("thickness", attribute("appearance.slice.thickness"), "hint")
     *_, other_form, other_text, other_line = page.widgets
     typed(text, form, "5000")
     assert (page.updates, text.value) == (0, "5000")
@@ -384,7 +392,7 @@ def test_a_menu_offers_what_the_design_has(page):
 def test_fields_follow_a_design_that_others_change(page):
     fields = Fields(page)
     at = Attribute(lambda state: state.design.length, lambda state, value: state)
-    bound = fields.number("L [m]", at, "hint")
+    bound = fields.typed("L [m]", at, "hint")
     longer = changed(page.state.design, {"length": 1.2})
     page.update(lambda state: state.replace(design=longer), by_widget=True)
     fields.show()

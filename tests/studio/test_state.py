@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -143,50 +144,50 @@ STEPS = [START, tapered(START, 0.01), posed(tapered(START, 0.01), -0.5), tapered
 def test_steps_back_and_forth_lead_through_every_state():
     history, state, seen = walked(STEPS), STEPS[-1], []
     for _ in STEPS[1:]:
-        history, state = history.back(state)
+        history, state = history.step(state, back=True)
         seen.append(state)
     assert seen == STEPS[-2::-1]
     for following in STEPS[1:]:
-        history, state = history.forth(state)
+        history, state = history.step(state, back=False)
         assert state == following
 
 
-@pytest.mark.parametrize("step", ["back", "forth"])
-def test_where_there_is_nothing_to_go_to_the_state_stays(step):
-    assert getattr(History(), step)(START) == (History(), START)
+@pytest.mark.parametrize("back", [True, False])
+def test_where_there_is_nothing_to_go_to_the_state_stays(back):
+    assert History().step(START, back=back) == (History(), START)
 
 
 def test_a_change_after_a_step_back_forgets_what_was_undone():
-    history, state = walked(STEPS).back(STEPS[-1])
+    history, state = walked(STEPS).step(STEPS[-1], back=True)
     history = history.after(state, posed(state, -0.1), goes_on=True)
     assert history.future == ()
-    assert history.back(posed(state, -0.1))[1] == state
+    assert history.step(posed(state, -0.1), back=True)[1] == state
 
 
 def test_changes_of_one_kind_in_short_order_are_one_step():
     states = [START, *(tapered(START, 0.001 * k) for k in range(1, 6))]
     history = walked(states, times=[0.1 * k for k in range(5)])
-    assert history.back(states[-1])[1] == START
+    assert history.step(states[-1], back=True)[1] == START
 
 
 def test_a_change_that_does_not_go_on_is_a_step_of_its_own():
     one, two = tapered(START, 0.01), tapered(START, 0.02)
     history = History().after(START, one, goes_on=True)
-    assert history.after(one, two, goes_on=False).back(two)[1] == one
-    assert history.after(one, two, goes_on=True).back(two)[1] == START
-    assert history.at_rest().after(one, two, goes_on=True).back(two)[1] == one
+    assert history.after(one, two, goes_on=False).step(two, back=True)[1] == one
+    assert history.after(one, two, goes_on=True).step(two, back=True)[1] == START
+    assert replace(history, kind="").after(one, two, goes_on=True).step(two, back=True)[1] == one
 
 
 def test_changes_of_different_kinds_are_steps_of_their_own():
     states = [START, tapered(START, 0.01), posed(tapered(START, 0.01), -0.5)]
     history = walked(states, times=[0.0, 0.1])
-    assert history.back(states[-1])[1] == states[1]
+    assert history.step(states[-1], back=True)[1] == states[1]
 
 
 def test_the_view_is_not_undone():
     looked = tapered(START, 0.01).showing(color="manipulability")
     history = walked([START, tapered(START, 0.01), looked])
-    back = history.back(looked)[1]
+    back = history.step(looked, back=True)[1]
     assert back.design == START.design
     assert back.appearance == looked.appearance
 

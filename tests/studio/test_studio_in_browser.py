@@ -2,69 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import tomllib
-
-import numpy as np
 import pytest
 
-import softreach as sr
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.studio import Quality, StudioState
+from softreach.studio import Quality
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
 from softreach.studio.work import all_cores
 from tests.studio.conftest import SMALL
-
-
-@pytest.mark.large
-def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
-    tab.open("Move")
-    tab.choose("mouse", "sets the target")
-    tab.wait(lambda: tab.session.state.appearance.mouse == "target", "the mouse is for the target")
-    tab.click_at(tab.session.found.reach.cloud.tip.values[100] / tab.session.state.design.length)
-    tab.wait(lambda: tab.session.found.answer is not None, "a target is solved for")
-    tab.settle()
-    state, cloud = tab.session.state, tab.session.found.reach.cloud
-    target = np.array(state.target)
-    nearest = np.linalg.norm(cloud.tip.values - target, axis=1).argmin()
-    known = sr.tip_positions(state.design, cloud.activation.values[[nearest]])[0]
-    np.testing.assert_array_equal(target, known)
-    tip = sr.tip_positions(state.design, [state.activation])[0]
-    assert np.linalg.norm(tip - target) < 1e-6 * state.design.length
-    tab.page.get_by_text("activation").filter(has_text="to ").first.wait_for()
-
-    tab.open("Move")
-    answer = tab.session.found.answer
-    assert tab.page.get_by_role("button", name="\N{CHECK MARK}").count() == 1
-    ghosts = [tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer))]
-    assert all(ghosts)
-    tab.session.aim(np.array([0.0, 0.0, 1.5]))
-    tab.settle()
-    assert len(tab.session.found.answer) == 0
-    tab.page.get_by_text("out of reach").wait_for()
-    tab.page.get_by_text("m away").wait_for()
-
-
-@pytest.mark.large
-def test_a_state_is_saved_and_loaded(tab, tmp_path):
-    tab.open("Export")
-    kept = tab.session.state
-    file = tab.save("Save this work", tmp_path)
-    assert json.loads(file.read_text())["softreach_studio"] == 4
-    tab.choose("data", "design (.toml)")
-    design = tab.save("Save data", tmp_path)
-    assert tomllib.loads(design.read_text())["profile"]["length_m"] == 1.0
-    tab.session.update(
-        lambda s: StudioState(design=sr.designs.minimal_trunk(1.0)).showing(level=12)
-    )
-    tab.settle()
-    tab.upload("Load state or design", file)
-    tab.wait(lambda: tab.session.state.design == kept.design, "the design is back")
-    tab.settle()
-    assert tab.session.state.replace(camera=None) == kept.replace(camera=None)
-    assert tab.session.found.reach.arm == kept.design
 
 
 def test_nothing_leaves_the_machine_and_no_panel_of_viser_is_seen(tab, studio):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import suppress
-from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
+from softreach.studio.scene.camera import UPRIGHT
 from softreach.studio.serve import (
     LOOPBACK,
     close_sockets,
@@ -22,7 +22,6 @@ from softreach.studio.serve import (
 )
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
-from softreach.studio.state import Camera, vector
 from softreach.studio.tabs import JOBS, furnish
 from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import SoftreachError
@@ -30,11 +29,8 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-    from softreach.arm.manipulator import Manipulator
-
-__all__ = ["Studio"]
-
-_CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
+_LOOK_AT, _AWAY = np.array([0.0, 0.0, 0.28]), np.array([2.1, -3.85, 1.17])
+"""What a new tab looks at, seen from the base, and its camera, seen from there [L]."""
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 _PATIENCE = 3.0  # [s] for tabs that are closed
 
@@ -72,9 +68,10 @@ class Studio:
         self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
         self.server = start_server(host, port, token)
-        camera = start.state.camera or _camera_beside(start.state.design)
-        self.server.initial_camera.position = camera.position
-        self.server.initial_camera.look_at = camera.look_at
+        arm, camera = start.state.design, start.state.camera
+        look_at = arm.base.to_world(arm.length * _LOOK_AT) / arm.length
+        self.server.initial_camera.position = camera.position if camera else look_at + _AWAY
+        self.server.initial_camera.look_at = camera.look_at if camera else look_at
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
 
@@ -103,12 +100,7 @@ class Studio:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def _compiling(self, running: bool) -> None:
@@ -132,11 +124,11 @@ class Studio:
         if left is not None:
             session.take_up(left)
         furnish(session)
-        session.camera.on_move(lambda: session.follow("camera"))
+        client.camera.on_update(lambda _: session.follow("camera"))
         session.begin()
         if left is None and self.start.state.camera is not None:
             session.look_as(self.start.state.camera)
-        elif session.camera.is_upright and (left is None or left.camera is None):
+        elif session.camera.aspect < UPRIGHT and (left is None or left.camera is None):
             session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
@@ -161,9 +153,3 @@ def load_libraries() -> None:
 
     with suppress(SoftreachError):  # whoever draws a figure says so
         pyplot()
-
-
-def _camera_beside(arm: Manipulator) -> Camera:
-    look_at = arm.base.to_world(arm.length * np.array(_CAMERA.look_at)) / arm.length
-    position = look_at + np.subtract(_CAMERA.position, _CAMERA.look_at)
-    return Camera(position=vector(position), look_at=vector(look_at))

@@ -13,16 +13,16 @@ from dataclasses import replace
 from operator import attrgetter, is_
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from softreach.studio.found import Found
+from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part
 from softreach.studio.state import StudioState
 from softreach.studio.widgets import (
     Line,
     SliderField,
+    TextKind,
     TypedField,
     number_kind,
     unit_in,
-    vector_kind,
 )
 from softreach.support.errors import SoftreachError
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 Change = Callable[[StudioState], StudioState]
 Options = Callable[[StudioState], Mapping[Any, str]]
+Kind = Callable[[str, Callable[[], float]], TextKind]
+"""What is typed, by its unit and by L [m], which may be typed as one."""
 Shown = Callable[[StudioState, Found], Any]
 """Something of the state and of what is known."""
 
@@ -74,23 +76,16 @@ class Fields:
         self.message: Line | None = None
         """Where refusals of widgets stand that have no line of their own; else above all tabs."""
         self.words = words
-        self._followers: list[_Follower] = []
+        self._followers: list[Callable[[], None]] = []
         self._bindings: list[_Binding] = []
-        self._groups: list[_Group] = []
         self._widgets: list[Any] = []
         self._depth = 0
         self._refused: Any = None
 
     def show(self) -> None:
         """Show again what has changed."""
-        session = self.session
-        for follower in self._followers:
-            now = follower.read(session)
-            if not all(map(is_, now, follower.known)):
-                follower.known = now
-                follower.show(session.state, session.found)
-        for group in self._groups:
-            group.fields.show()
+        for follow in self._followers:
+            follow()
 
     def remove(self) -> None:
         """Take all widgets away."""
@@ -99,7 +94,16 @@ class Fields:
 
     def follow(self, *paths: str, show: Callable[[StudioState, Found], object]) -> None:
         """Call this at first, and whenever what stands at one of these paths is another object."""
-        self._followers.append(_Follower(paths, show))
+        read, known = attrgetter("client", *map(in_session, paths)), (object(),)
+
+        def follow() -> None:
+            nonlocal known
+            now = read(self.session)
+            if not all(map(is_, now, known)):
+                known = now
+                show(self.session.state, self.session.found)
+
+        self._followers.append(follow)
 
     def say(self, *parts: Part) -> None:
         """Text that stays."""
@@ -115,21 +119,6 @@ class Fields:
         """Something of `markup` that follows."""
         line = self.kept(Line(self.gui))
         self.follow(*paths, show=lambda state, found: line.show(content(state, found)))
-
-    def picture(self, container: Any, *paths: str, image: Shown) -> None:
-        """A picture at the end of a container, once there is one."""
-        widget = None
-
-        def show(state: StudioState, found: Found) -> None:
-            nonlocal widget
-            pixels = image(state, found)
-            if pixels is not None and widget is not None:
-                widget.image = pixels
-            elif pixels is not None:
-                with container:
-                    widget = self.gui.add_image(pixels, format="png")
-
-        self.follow(*paths, show=show)
 
     @contextmanager
     def folder(
@@ -154,9 +143,18 @@ class Fields:
 
         By default that is whenever what stands at one of the paths is another object.
         """
-        group = _Group(lambda: Fields(self.session, words), container, build)
-        self._groups.append(group)
-        self.follow(*paths, show=lambda state, found: group.fit(key(state, found)))
+        fields, known = Fields(self.session), object()
+
+        def fit(state: StudioState, found: Found) -> None:
+            nonlocal fields, known
+            if (now := key(state, found)) != known:
+                fields.remove()
+                fields, known = Fields(self.session, words), now
+                with container:
+                    build(fields, now)
+
+        self.follow(*paths, show=fit)
+        self._followers.append(lambda: fields.show())
 
     def checkbox(self, label: str, at: Attribute, hint: str) -> Any:
         """Add a check box."""
@@ -180,15 +178,10 @@ class Fields:
         kind = number_kind(unit_in(label), self._length)
         return self.bind(SliderField(self.gui, label, ends, step, self._read(at), hint, kind), at)
 
-    def number(self, label: str, at: Attribute, hint: str) -> TypedField:
-        """Add a field for a number."""
-        kind = number_kind(unit_in(label), self._length)
-        return self.bind(TypedField(self.gui, label, self._read(at), hint, kind), at)
-
-    def vector(self, label: str, at: Attribute, hint: str) -> TypedField:
-        """Add a field for three numbers."""
-        kind = vector_kind(unit_in(label), self._length)
-        return self.bind(TypedField(self.gui, label, self._read(at), hint, kind), at)
+    def typed(self, label: str, at: Attribute, hint: str, kind: Kind = number_kind) -> TypedField:
+        """Add a field for a number, or for what else is typed."""
+        of_unit = kind(unit_in(label), self._length)
+        return self.bind(TypedField(self.gui, label, self._read(at), hint, of_unit), at)
 
     def steps(
         self,
@@ -300,41 +293,11 @@ class Fields:
                 widget.visible = wanted
 
         if shown:
-            at = shown if callable(shown) else _value(shown)
+            at = (
+                shown if callable(shown) else lambda *_: attrgetter(in_session(shown))(self.session)
+            )
             self.follow("state", "found", show=follow)
         return self.kept(widget)
-
-
-def _value(path: str) -> Shown:
-    read = attrgetter(path.removeprefix("found."))
-    of_found = path.startswith("found.")
-    return lambda state, found: read(found if of_found else state)
-
-
-class _Follower:
-    def __init__(self, paths: Sequence[str], show: Callable[[StudioState, Found], object]) -> None:
-        roots = ("found", "state", "tab")
-        full = [path if path.split(".")[0] in roots else f"state.{path}" for path in paths]
-        self.read = attrgetter("client", *(path.removeprefix("tab.") for path in full))
-        self.known: Sequence[Any] = (object(), *paths)
-        self.show = show
-
-
-class _Group:
-    """Fields that are made anew for each key."""
-
-    def __init__(
-        self, make: Callable[[], Fields], container: Any, build: Callable[[Fields, Any], object]
-    ) -> None:
-        self.fields, self._key = make(), object()
-        self._make, self._container, self._build = make, container, build
-
-    def fit(self, key: Any) -> None:
-        if key != self._key:
-            self.fields.remove()
-            self.fields, self._key = self._make(), key
-            with self._container:
-                self._build(self.fields, key)
 
 
 class _Binding:

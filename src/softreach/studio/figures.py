@@ -1,4 +1,4 @@
-"""Figures in panels: a section of the reachable set, volumes over a parameter, a path's inputs."""
+"""Figures in panels: a section of the reachable set, and volumes over a parameter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
 from softreach.geometry.surface import plane_cut
-from softreach.inverse.path import PathStatus
 from softreach.picture.projection import View, plane_of
 from softreach.plot.sets import plot_slice
 from softreach.studio.reach import Quality, Reach, exact_set
@@ -21,10 +20,8 @@ from softreach.studio.shown_parameters import ShownParameter, slider_parameters
 from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.work import Budget, OverBudget, all_cores, check_wanted
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -35,7 +32,6 @@ _LINE, _HERE = "#2f6db5", "#d9731a"
 _INK = "#7d848b"  # legible on white and on black
 _WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
 _VALUES = 9  # of the parameter, beside that of the design
-_MOST_CURVES = 8  # of a path: more are not told apart
 _SECONDS = 10.0  # [s] for each volume
 
 
@@ -43,10 +39,8 @@ class Picture(NamedTuple):
     """Picture of a design."""
 
     arm: Manipulator
-    image: NDArray[np.uint8]
-    """RGBA on a transparent ground, shape (rows, columns, 4)."""
-    text: str
-    """Its content in words."""
+    image: NDArray[np.uint8]  # RGBA on a transparent ground, shape (rows, columns, 4)
+    text: str  # its content in words
 
 
 def _axes(height: float) -> Axes:
@@ -64,7 +58,7 @@ def _pixels(ax: Axes) -> NDArray[np.uint8]:
     ax.spines[:].set_edgecolor(_INK)
     for text in figure.findobj(Text):
         text.set_color(_INK)
-    for paper in (figure.patch, ax.patch, *(key.get_frame() for key in [ax.get_legend()] if key)):
+    for paper in (figure.patch, ax.patch):
         paper.set_alpha(0.0)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
@@ -220,25 +214,3 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
     with all_cores:
         solvable_rod(design)
         return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
-
-
-# The activations along a path of the tip.
-
-
-def track_picture(track: xr.Dataset, arm: Manipulator) -> Picture:
-    """Activations of up to eight inputs over the way that the tip follows its path.
-
-    Args:
-        track: Result of `track_path`.
-        arm: The design.
-    """
-    followed = track.status.values == PathStatus.FOLLOWED
-    steps = np.linalg.norm(np.diff(track.position.values[followed], axis=0), axis=1)
-    way = np.concatenate([[0.0], np.cumsum(steps)]) / arm.length
-    ax = _axes(2.4)
-    for k, name in enumerate(track["bundle"].values[:_MOST_CURVES]):
-        values = track.activation.values[followed, k]
-        ax.plot(way, values, color=bundle_color(k), label=str(name))
-    ax.set(xlabel="way / L", ylabel="activation")
-    ax.legend()
-    return Picture(arm, _pixels(ax), "activations along the path")

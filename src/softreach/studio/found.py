@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,14 +68,23 @@ class Found:
         """True while a drag of the tip is under way."""
         return self.pull is not None and not self.pull.rests
 
-    def without(self, pull: Pull) -> Found:
-        """Without a drag that has ended; another may have begun meanwhile."""
-        return replace(self, pull=None, lag=None) if self.pull is pull else self
-
     def complete_reach(self, design: Manipulator) -> Reach | None:
         """Reach of a design, once it is fine."""
         reach = self.reach
         return reach if reach is not None and reach.fine and reach.arm == design else None
+
+
+class Known(NamedTuple):
+    """All that decides what a tab does: its state, and what was found out of it."""
+
+    state: StudioState
+    found: Found
+
+
+def in_session(path: str) -> str:
+    """Place of "design" of a state, "found.tip" of what is known or "tab.busy" in a session."""
+    root, _, rest = path.partition(".")
+    return rest if root == "tab" else path if root in ("found", "state") else f"state.{path}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +115,8 @@ class Bench:
 
     def fits(self, arm: Manipulator) -> bool:
         """True of an arm with the inputs and the markers of the one that the data were read for."""
-        return _columns(arm) == _columns(self.arm)
+        columns = lambda arm: (arm.input_names, arm.input_units, [m.name for m in arm.markers])
+        return columns(arm) == columns(self.arm)
 
     def posed(self, state: StudioState) -> StudioState:
         """The state with the inputs of the pose, as far as its bounds go."""
@@ -116,10 +126,6 @@ class Bench:
         """The calibrated arm; None without a fit that began with this design."""
         result = self.result
         return result.arm if result is not None and result.start == design else None
-
-
-def _columns(arm: Manipulator) -> tuple[object, ...]:
-    return arm.input_names, arm.input_units, [marker.name for marker in arm.markers]
 
 
 @dataclass(frozen=True, eq=False)

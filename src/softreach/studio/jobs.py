@@ -5,16 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
-from operator import attrgetter, is_
+from functools import cached_property, partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
-from softreach.studio.found import Found
+from softreach.studio.found import Found, Known, in_session
 from softreach.studio.reach import Reach, count_activations, shown_samples, stages, uncounted
 from softreach.studio.scene.camera import is_behind
 from softreach.studio.scene.colors import shown_color
@@ -23,7 +22,7 @@ from softreach.studio.serve import theme
 from softreach.studio.shown_parameters import slider_ends
 from softreach.studio.slopes import volume_slopes
 from softreach.studio.state import StudioState, solvable_rod
-from softreach.studio.work import OverBudget, StaleCheck
+from softreach.studio.work import OverBudget, StaleCheck, rest
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -86,81 +85,57 @@ class Job:
     """What the reader is shown meanwhile."""
 
     @cached_property
-    def _getters(self) -> tuple[attrgetter[Any], attrgetter[Any]]:
-        paths = self.depends_on.split()
-        known = [path.removeprefix("found.") for path in paths if path.startswith("found.")]
-        seen = [path for path in paths if not path.startswith("found.")]
-        same = "__class__", "__class__"  # of two attributes and more there is a tuple
-        return attrgetter(*same, *seen), attrgetter(*same, *known)
+    def _deciding(self) -> Callable[[Known], tuple[Any, ...]]:
+        return attrgetter("__class__", *map(in_session, self.depends_on.split()))
 
-    def _is_wanted(self, state: StudioState, found: Found) -> bool:
-        owner = found if self.wanted.startswith("found.") else state
-        return not self.wanted or bool(attrgetter(self.wanted.removeprefix("found."))(owner))
+    def is_wanted(self, known: Known) -> bool:
+        """True if its result is of use."""
+        return not self.wanted or bool(attrgetter(in_session(self.wanted))(known))
 
-    def is_stale(self, old: tuple[StudioState, Found], new: tuple[StudioState, Found]) -> bool:
+    def is_stale(self, old: Known, new: Known) -> bool:
         """True if a change decides another result: of what is known, any other object."""
-        (before, known), (after, now) = old, new
-        was, wanted = self._is_wanted(*old), self._is_wanted(*new)
+        was, wanted = self.is_wanted(old), self.is_wanted(new)
         if not (was and wanted):
             return was != wanted
-        of_state, of_found = self._getters
-        if not all(map(is_, of_found(known), of_found(now))):
-            return True
-        return before is not after and of_state(before) != of_state(after)
+        return not all(map(_same, self._deciding(old), self._deciding(new)))
 
 
-def what_follows(
-    jobs: Iterable[Job],
-    old: tuple[StudioState, Found] | None,
-    new: tuple[StudioState, Found],
-) -> list[Job]:
-    """The jobs whose results a change makes stale; all that depend on anything if all is new."""
-    following = [job for job in jobs if job.depends_on]
-    return following if old is None else [job for job in following if job.is_stale(old, new)]
+def _same(before: Any, now: Any) -> bool:
+    return before is now or (not isinstance(now, np.ndarray) and bool(before == now))
 
 
-def forgotten(job: Job) -> dict[str, Any]:
-    """Fields of `Found` after the job has failed."""
-    nothing = Found()
-    return {name: getattr(nothing, name) for name in job.makes.split()}
+def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job]:
+    """The jobs whose results a change makes stale; if all is new, those that are of use."""
+    is_due = lambda job: job.is_wanted(new) if old is None else job.is_stale(old, new)
+    return [job for job in jobs if job.depends_on and is_due(job)]
 
 
 # The reach of the design
 
 
 def _compute_reach(given: Given) -> Results:
-    state, check = given.state, given.check
-    if _is_complete(given.found.reach, state):
-        return
+    state, check, level = given.state, given.check, given.state.appearance.level
+    if (known := given.found.complete_reach(state.design)) is not None:
+        enough = max(known.samples, known.wanted) >= 1 << level
+        if enough or known.cloud.attrs.get("sampler") != "sobol":
+            return
     try:
-        level = state.appearance.level
         for reach in stages(state.design, level, given.quality, check, given.report):
-            if shows_cloud(reach, state.appearance):
-                _count(reach, given)
+            _count_shown(reach, given)
             yield Learned({"reach": reach, "refusal": ""})
+        return
     except InvalidInput as error:
-        yield _withdrawn(str(error))
+        refusal = str(error)
     except OverBudget as error:
-        yield _withdrawn(f"Not computed: the cloud needs {error}.")
+        refusal = f"Not computed: the cloud needs {error}."
     except MemoryError:
-        yield _withdrawn("Not computed: there is not enough free memory.")
-
-
-def _withdrawn(refusal: str) -> Learned:
-    return Learned({"reach": None, "key": None, "slopes": None, "refusal": refusal})
-
-
-def _is_complete(known: Reach | None, state: StudioState) -> bool:
-    if known is None or not known.fine or known.arm != state.design:
-        return False
-    enough = max(known.samples, known.wanted) >= 1 << state.appearance.level
-    return enough or known.cloud.attrs.get("sampler") != "sobol"
+        refusal = "Not computed: there is not enough free memory."
+    yield Learned({"reach": None, "key": None, "slopes": None, "refusal": refusal})
 
 
 def _color_cloud(given: Given) -> Results:
-    reach = given.found.reach
-    if reach is not None and shows_cloud(reach, given.state.appearance):
-        _count(reach, given)
+    if given.found.reach is not None:
+        _count_shown(given.found.reach, given)
     yield Learned()
 
 
@@ -176,39 +151,17 @@ def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
 
 def draw_axes(given: Given) -> None:
     """The box with numbers around what is drawn."""
-    found, loaded = given.found, given.state.design.loads is not None
-    if found.reach is not None:
-        given.scene.draw_axes(found.reach, found.free if loaded else None)
+    if given.found.reach is not None:
+        given.scene.draw_axes(given.found.reach, given.found.free)
 
 
-_CLOUD = "/cloud /unstable"
-
-COMPUTE_REACH = Job(
-    "reach",
-    "design appearance.level",
-    _compute_reach,
-    _draw_cloud,
-    makes="reach key slopes",
-    draws=_CLOUD,
-    at_once=False,
-)
-"""Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next."""
-
-DRAW_CLOUD = Job(
-    "cloud",
-    "appearance.level appearance.color appearance.slice appearance.cloud appearance.surface",
-    _color_cloud,
-    _draw_cloud,
-    draws=_CLOUD,
-    at_once=False,
-    doing="coloring the points",
-)
-"""Points in their colors, and the axes around them."""
+_SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
 
 
 def _color_surface(given: Given) -> Results:
     reach, look = given.found.reach, given.state.appearance
     if reach is not None and look.surface and reach.has_surface:
+        rest(given.check, 0.0 if reach.fine else _SOON)
         given.report("computing the surface")
         if look.cloud:
             reach.sheets  # noqa: B018  slow the first time
@@ -225,17 +178,9 @@ def _draw_surface(given: Given) -> Mapping[str, Any] | None:
     return None if key is None else {"key": key}
 
 
-DRAW_SURFACE = Job(
-    "surface",
-    "found.reach appearance.surface appearance.slice appearance.cloud "
-    "appearance.color appearance.dark",
-    _color_surface,
-    _draw_surface,
-    wanted="appearance.surface",
-    draws="/surface",
-    at_once=False,
-)
-"""The exact boundary."""
+def _count_shown(reach: Reach, given: Given) -> None:
+    if shows_cloud(reach, given.state.appearance):
+        _count(reach, given)
 
 
 def _count(reach: Reach, given: Given) -> None:
@@ -261,25 +206,11 @@ def _differentiate(given: Given) -> Results:
         yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
-DIFFERENTIATE_VOLUME = Job("slopes", "design found.reach", _differentiate, makes="slopes")
-"""Ends of the sliders, and slopes of the volume by them, once nobody drags."""
-
-
 def _cut(given: Given) -> Results:
     reach = given.found.complete_reach(given.state.design)
     if reach is not None:
         given.report("cutting the reachable set")
         yield Learned({"section": section_picture(reach, given.state.appearance.slice)})
-
-
-DRAW_SECTION = Job(
-    "section",
-    "found.reach appearance.slice.axis appearance.slice.center",
-    _cut,
-    wanted="appearance.section",
-    makes="section",
-)
-"""Picture of the section by the plane of the slice."""
 
 
 def _sweep(given: Given) -> Results:
@@ -289,22 +220,12 @@ def _sweep(given: Given) -> Results:
             yield Learned({"sweep": picture})
 
 
-SWEEP_VOLUME = Job(
-    "sweep",
-    "design appearance.swept",
-    _sweep,
-    wanted="appearance.sweep",
-    makes="sweep",
-)
-"""Volumes of designs that differ in one parameter."""
-
-
-# The arm, and what stands beside it
+# The arm
 
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
-_LEVEL = 16
+_LEVEL = 16  # of the cloud of another design
 
 
 def _draw_arm(given: Given) -> Mapping[str, Any]:
@@ -328,12 +249,6 @@ def _draw_arm(given: Given) -> Mapping[str, Any]:
     return known | {"posture": TipStatus.UNDECIDED if lost else status}
 
 
-DRAW_ARM = Job(
-    "arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture", draws="/arm"
-)
-"""The arm in its activation."""
-
-
 def _wait(given: Given) -> Results:
     time.sleep(_PAUSE)
     while given.camera.keep_width():
@@ -355,89 +270,94 @@ def _look(given: Given) -> None:
     scene.see_through_arm(found.sample is not None or hides)
 
 
-FOLLOW_CAMERA = Job(
-    "camera",
-    "appearance.half appearance.arm appearance.handle found.tip found.sample found.is_dragged",
-    _wait,
-    _look,
-)
-"""Cuts away the half of a cloud that hides the arm, and turns the axes to the camera."""
-
-SET_THEME = Job(
-    "theme",
-    "appearance.dark",
-    draw=lambda given: theme(given.client.gui, dark=given.state.appearance.dark),
-)
-"""Turns the light of the page on or off."""
+# The reach of another design: the one that is kept, or the present one without its loads
 
 
-def _compute_free(given: Given) -> Results:
-    free = None if given.state.design.loads is None else given.state.unloaded
-    small = replace(given.quality, fine_level=given.quality.coarse_level)
-    for reach in _reaches(free, given.found.free, given._replace(quality=small)):
-        yield Learned({"free": reach})
+def _compute_beside(given: Given, name: str) -> Results:
+    """Its reach, unless that is known; where the designs agree it is that of the present one."""
+    design, known = getattr(given.state, name), getattr(given.found, name)
+    if known is not None and known.fine and known.arm == design:
+        return
+    present = None if design is None else given.found.complete_reach(design)
+    if design is None or present is not None:
+        yield Learned({name: present})
+        return
+    level = min(_LEVEL, given.quality.coarse_level)
+    quality = replace(given.quality, fine_level=level)  # of its cloud nothing but the set is shown
+    for reach in stages(design, level, quality, given.check):
+        yield Learned({name: reach})
 
 
-def _draw_free(given: Given) -> None:
-    given.scene.draw_beside("/free", given.found.free, given.state.appearance.slice)
+def _draw_beside(given: Given, name: str) -> None:
+    given.scene.draw_beside(f"/{name}", getattr(given.found, name), given.state.appearance.slice)
     draw_axes(given)
 
 
-DRAW_FREE = Job(
-    "free",
-    "unloaded appearance.slice",
-    _compute_free,
-    _draw_free,
-    wanted="design.loads",
-    makes="free",
-    draws="/free",
-)
-"""The reach of a loaded arm without its loads, faint behind the loaded one."""
+def _beside(name: str) -> Job:
+    compute, draw = partial(_compute_beside, name=name), partial(_draw_beside, name=name)
+    follows = f"{name} appearance.slice"
+    return Job(name, follows, compute, draw, wanted=name, makes=name, draws=f"/{name}")
 
 
-def _compute_reference(given: Given) -> Results:
-    for reach in _reaches(given.state.reference, given.found.reference, given):
-        yield Learned({"reference": reach})
-
-
-DRAW_REFERENCE = Job(
-    "reference",
-    "reference appearance.slice",
-    _compute_reference,
-    lambda g: g.scene.draw_beside("/reference", g.found.reference, g.state.appearance.slice),
-    wanted="reference",
-    makes="reference",
-    draws="/reference",
-)
-"""The boundary of the design that is kept."""
-
-
-def _reaches(
-    design: Manipulator | None, known: Reach | None, given: Given
-) -> Iterator[Reach | None]:
-    """The reach of another design, unless it is known; that of the present one, if they agree."""
-    if design is None:
-        yield None
-    elif known is not None and known.fine and known.arm == design:
-        return
-    elif (now := given.found.complete_reach(design)) is not None:
-        yield now
-    else:
-        level = min(_LEVEL, given.quality.coarse_level)
-        yield from stages(design, level, given.quality, given.check)
-
+_CLOUD = "/cloud /unstable"
 
 SCENE_JOBS = (
-    COMPUTE_REACH,
-    DIFFERENTIATE_VOLUME,
-    DRAW_CLOUD,
-    DRAW_SURFACE,
-    DRAW_SECTION,
-    SWEEP_VOLUME,
-    DRAW_ARM,
-    FOLLOW_CAMERA,
-    SET_THEME,
-    DRAW_FREE,
-    DRAW_REFERENCE,
+    # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
+    Job(
+        "reach",
+        "design appearance.level",
+        _compute_reach,
+        _draw_cloud,
+        makes="reach key slopes",
+        draws=_CLOUD,
+        at_once=False,
+    ),
+    # Ends of the sliders, and slopes of the volume by them, once nobody drags
+    Job("slopes", "design found.reach", _differentiate, makes="slopes"),
+    Job(
+        "cloud",
+        "appearance.level appearance.color appearance.slice appearance.cloud appearance.surface",
+        _color_cloud,
+        _draw_cloud,
+        draws=_CLOUD,
+        at_once=False,
+        doing="coloring the points",
+    ),
+    # The exact boundary
+    Job(
+        "surface",
+        "found.reach appearance.surface appearance.slice appearance.cloud "
+        "appearance.color appearance.dark",
+        _color_surface,
+        _draw_surface,
+        wanted="appearance.surface",
+        draws="/surface",
+        at_once=False,
+    ),
+    Job(
+        "section",
+        "found.reach appearance.slice.axis appearance.slice.center",
+        _cut,
+        wanted="appearance.section",
+        makes="section",
+    ),
+    Job("sweep", "design appearance.swept", _sweep, wanted="appearance.sweep", makes="sweep"),
+    Job(
+        "arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture", draws="/arm"
+    ),
+    # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
+    Job(
+        "camera",
+        "appearance.half appearance.arm appearance.handle found.tip found.sample found.is_dragged",
+        _wait,
+        _look,
+    ),
+    Job(
+        "theme",
+        "appearance.dark",
+        draw=lambda given: theme(given.client.gui, dark=given.state.appearance.dark),
+    ),
+    _beside("free"),
+    _beside("reference"),
 )
 """What follows in every tab from its design and its looks."""

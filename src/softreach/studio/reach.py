@@ -60,11 +60,9 @@ class Size(NamedTuple):
     """Size of a reachable set."""
 
     name: str
-    value: float
-    """[m^power]."""
+    value: float  # [m^power]
     error: float
-    power: int
-    """3 for a volume, 2 for an area, 1 for a length, 0 for a point."""
+    power: int  # 3 for a volume, 2 for an area, 1 for a length, 0 for a point
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,17 +70,12 @@ class Reach:
     """A cloud and the exact set behind it."""
 
     arm: Manipulator
-    """The design."""
     cloud: xr.Dataset
-    exact: ReachableSet | None
-    """None while it is not known, and where there is none."""
+    exact: ReachableSet | None  # None while it is not known, and where there is none
     fine: bool
-    refusal: str = ""
-    """Reason why there is no exact set."""
-    notes: tuple[str, ...] = ()
-    """Parts that are left out or coarser than wanted, and why."""
-    wanted: int = 0
-    """Number of samples wanted; there are fewer where each costs much."""
+    refusal: str = ""  # reason why there is no exact set
+    notes: tuple[str, ...] = ()  # parts that are left out or coarser than wanted, and why
+    wanted: int = 0  # number of samples; there are fewer where each costs much
     order: NDArray[np.int64] | None = field(default=None, repr=False)
     """An order whose prefixes are even subsamples, where the cloud's own is not."""
 
@@ -101,9 +94,9 @@ class Reach:
         """Volume, area or length of what can be reached; None while it is not known."""
         if self.exact is None:
             return None
-        power = self.exact.dimension
-        if not (word := ("", "curve_length", "area", "volume")[power]):
+        if not (power := self.exact.dimension):
             return Size("point", 0.0, 0.0, 0)
+        word = ("curve_length", "area", "volume")[power - 1]
         value, error = (float(getattr(self.exact, word + part)) for part in ("", "_error"))
         return Size(word.removeprefix("curve_"), value, error, power)
 
@@ -192,11 +185,6 @@ def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int
     return KDTree(tips).query(points, count)[1].reshape(len(points), count)
 
 
-def unstable_samples(reach: Reach, level: int) -> NDArray[np.bool_]:
-    """Mask of the unstable ones among the samples that are shown."""
-    return reach.status[shown_samples(reach, level)] == TipStatus.UNSTABLE
-
-
 def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
     """Tips that a picture of 2^level points shows [L], shape (n, 3)."""
     return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
@@ -281,9 +269,10 @@ class _Work:
             if error.name != "memory":
                 return replace(reach, exact=None, refusal=str(error))  # never at rest
             needed = "needs more memory than is free"  # so many bundles that no search fits
-        except (OverBudget, MemoryError) as error:
-            is_counted = isinstance(error, OverBudget)
-            needed = f"needs {error if is_counted else 'more memory than is free'}"
+        except OverBudget as error:
+            needed = f"needs {error}"
+        except MemoryError:
+            needed = "needs more memory than is free"
         else:
             return replace(reach, exact=exact, refusal="")
         needed = f"to {100 * accuracy:g} % it {needed}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.found import Found, Pull
-from softreach.studio.jobs import Given, Job, Learned, forgotten, what_follows
+from softreach.studio.found import Found, Known
+from softreach.studio.jobs import Given, Job, Learned, what_follows
 from softreach.studio.reach import cloud_points, shown_samples
-from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
+from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.start import KeptWork, Start
@@ -25,8 +25,6 @@ from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
-
-__all__ = ["Session"]
 
 Array = NDArray[np.float64]
 
@@ -53,18 +51,14 @@ class Session:
         self.lock = threading.RLock()
         """Held while the state changes, and while that is shown."""
         self.history = History()
-        self.is_touched = False
-        """True once there is anything to keep."""
+        self.is_touched = False  # true once there is anything to keep
         self.state: StudioState = start.state
         self.found = Found(reach=start.reach)
         self.panels: list[Callable[[], None]] = []
         """Each shows again what has changed."""
-        self.revision = 0
-        """Number of changes that widgets have to follow, whatever they hold."""
-        self.note, self.doing = "", ""
-        """Texts for the reader, the second on the work that is being done."""
-        self.canceled = False
-        """True if the reader stopped what was being computed of this state."""
+        self.revision = 0  # number of changes that widgets have to follow, whatever they hold
+        self.note, self.doing = "", ""  # for the reader, the second on the work that is being done
+        self.canceled = False  # true if the reader stopped what was being computed of this state
         self.compiling, self.compiled = False, 0
         """Whether kernels are being compiled, and how many were since the studio was started."""
         kept = () if work is None else (self._keeping(),)
@@ -111,7 +105,7 @@ class Session:
     def _become(
         self, state: StudioState, history: History, note: str = "", *, by_widget: bool = False
     ) -> None:
-        old = self.state, self.found
+        old = Known(self.state, self.found)
         self.state, self.history, self.note = state, history, note
         self.revision += not by_widget
         self.canceled = False
@@ -121,7 +115,7 @@ class Session:
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
         with self.lock:
-            history, state = (self.history.back if back else self.history.forth)(self.state)
+            history, state = self.history.step(self.state, back=back)
             stays = state is self.state
             note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
             self._become(state, history, note)
@@ -153,7 +147,7 @@ class Session:
     def end_step(self) -> None:
         """Make the next change a step of its own for who undoes it."""
         with self.lock:
-            self.history = self.history.at_rest()
+            self.history = replace(self.history, kind="")
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""
@@ -166,7 +160,7 @@ class Session:
         if not found:
             return
         with self.lock:
-            old = self.state, self.found
+            old = Known(self.state, self.found)
             self.found = found(self.found) if callable(found) else replace(self.found, **found)
             self._follow_change(old)
         if not quiet:
@@ -191,16 +185,6 @@ class Session:
             self.doing = doing
             self.show()
 
-    @contextmanager
-    def working(self, doing: str) -> Iterator[None]:
-        """Say what is being done inside the block."""
-        self.report(doing)
-        try:
-            yield
-        finally:
-            self.report("")
-            return_memory_soon()
-
     def fail(self, error: Exception) -> None:
         """Show an error; one that is not ours is a bug and goes to the log too."""
         ours = isinstance(error, SoftreachError | OSError)
@@ -213,9 +197,17 @@ class Session:
             )
         self.say(text if len(text) <= _LONGEST_NOTE else f"{text[:_LONGEST_NOTE]} ...")
 
-    def send(self, name: str, content: bytes) -> None:
-        """Have the browser save a file."""
-        self.client.send_file_download(name, content, save_immediately=True)
+    def send(self, name: str, content: Callable[[], bytes]) -> None:
+        """Have the browser save a file, which may take a while to make."""
+        self.report(f"writing {name}")
+        try:
+            data = content()
+        finally:
+            self.report("")
+            return_memory_soon()
+        self.client.send_file_download(name, data, save_immediately=True)
+        size = f"{len(data) / 1e6:.1f} MB" if len(data) >= 1e5 else f"{len(data) / 1e3:.1f} kB"
+        self.say(f"{name} is written: {size}.")
 
     # The scene
 
@@ -243,7 +235,7 @@ class Session:
 
     def look_as(self, camera: Camera) -> None:
         """Look from a camera that was saved; from its side, if that was in a window of a phone."""
-        if not self.camera.fits(camera):
+        if (self.camera.aspect < UPRIGHT) != ((camera.aspect or 1.0) < UPRIGHT):
             toward = np.subtract(camera.position, camera.look_at)
             camera = framing(*self.scene.axes.corners, toward, self.camera.aspect)
         self.camera.look_from(camera)
@@ -257,13 +249,6 @@ class Session:
         self.learn({"takes_nearest": True})
         self.update(lambda state: state.replace(target=vector(np.asarray(target))))
         self.follow("inverse")  # also where the target is the one before
-
-    def drag_to(self, phase: str, wanted: Array) -> None:
-        """Follow a drag of the tip to a place [L]; returns at once. Only the latest is followed.
-
-        The phase is "start", "update" or "end".
-        """
-        self.learn({"pull": Pull(wanted, rests=phase == "end")}, quiet=True)
 
     # Jobs
 
@@ -294,8 +279,8 @@ class Session:
         for name in names:
             self._workers[name].submit(lambda check, job=self._jobs[name]: self._do(job, check))
 
-    def _follow_change(self, old: tuple[StudioState, Found] | None) -> None:
-        new = self.state, self.found
+    def _follow_change(self, old: Known | None) -> None:
+        new = Known(self.state, self.found)
         self.follow(*(job.name for job in what_follows(self._jobs.values(), old, new)))
 
     def _do(self, job: Job, check: StaleCheck) -> None:
@@ -307,14 +292,20 @@ class Session:
         try:
             for learned in job.compute(self._given(check)):
                 check()
-                self._take(job, learned, check)
+                self.learn(learned.found, quiet=True)
+                if learned.change is not None:
+                    self.update(learned.change, goes_on=True)
+                if learned.ends_step:
+                    self.end_step()
+                self._draw(job, check)
                 is_drawn = True
             if not is_drawn:
                 self._draw(job, check)
         except Dropped:
             raise
         except Exception:
-            self.learn(forgotten(job))
+            nothing = Found()
+            self.learn({name: getattr(nothing, name) for name in job.makes.split()})
             self.scene.remove(*job.draws.split())
             raise
         finally:
@@ -324,14 +315,6 @@ class Session:
     def _given(self, check: StaleCheck) -> Given:
         page = self.client, self.scene, self.camera
         return Given(self.state, self.found, self.quality, check, self.report, *page)
-
-    def _take(self, job: Job, learned: Learned, check: StaleCheck) -> None:
-        self.learn(learned.found, quiet=True)
-        if learned.change is not None:
-            self.update(learned.change, goes_on=True)
-        if learned.ends_step:
-            self.end_step()
-        self._draw(job, check)
 
     def _draw(self, job: Job, check: StaleCheck) -> None:
         with self.client.atomic() if job.at_once else nullcontext():

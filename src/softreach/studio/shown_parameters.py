@@ -115,9 +115,12 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
     What the design leaves open, such as a modulus that cancels, has none; all that actuators and
     profiles outside softreach declare has one, but for a zero of unknown size.
     """
-    known = known_parameters(arm)
-    own = {name for name, parameter in known.items() if _is_own(arm, parameter)}
-    units = {"rad": _DEGREES, "m": (arm.length_unit.name, arm.length_unit.size), "Pa": _KPA}
+    known, arm_parts = known_parameters(arm), parts_of(arm)
+    own = {  # what a kind of part outside softreach declares
+        name
+        for name, each in known.items()
+        if each.part is not None and each.number.field in own_fields(type(arm_parts[each.part]))
+    }
     shown = []
     for owner in dict.fromkeys(parameter.owner for parameter in known.values()):
         fields = (*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE)
@@ -127,26 +130,19 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
             is_own = parameter.name in own
             offered = is_own or _is_offered(arm, known, parameter)
             if offered and not math.isnan(parameter.value(arm)):
-                fixed = None if is_own else _fixed(arm, parameter)
-                slider = fixed or _around_value(arm, parameter, units)
-                shown += [_on_slider(arm, parameter, units, slider)] if slider else []
-    return tuple(shown)
+                shown.append(_on_slider(arm, parameter, is_own=is_own))
+    return tuple(slider for slider in shown if slider is not None)
 
 
-def _on_slider(
-    arm: Manipulator, parameter: Parameter, units: _Units, slider: _Slider
-) -> ShownParameter:
+def _on_slider(arm: Manipulator, parameter: Parameter, *, is_own: bool) -> ShownParameter | None:
+    units = {"rad": _DEGREES, "m": (arm.length_unit.name, arm.length_unit.size), "Pa": _KPA}
+    slider = None if is_own else _fixed(arm, parameter)
+    if (slider := slider or _around_value(arm, parameter, units)) is None:
+        return None
     more = f"{parameter.meaning}{_MORE.get(parameter.field, '')} (parameter {parameter.name})"
     shown, (label, low, high, step) = _shown(arm, parameter, units, parameter.symbol, ""), slider
     label, hint = label.replace("{owner}", parameter.owner), f"{shown.label}: {more}"
     return shown._replace(label=label, hint=hint, low=low, high=high, step=step)
-
-
-def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
-    """True if a kind of part outside softreach declares it."""
-    if parameter.part is None:
-        return False
-    return parameter.number.field in own_fields(type(parts_of(arm)[parameter.part]))
 
 
 def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
@@ -211,7 +207,9 @@ def slider_ends(
 ) -> dict[str, Ends]:
     """Ends of the sliders of a design: as far as each alone can go, to three digits.
 
-    They are looked for near those of a design before; the check is called often, and may raise.
+    Making an arm to see whether it exists costs a millisecond. So an end is looked for near that of
+    a design before, and a slider that ended at its own limit does so again; whoever meets a refusal
+    there asks without a design before. The check is called often, and may raise.
     """
     known, before = known_parameters(arm), before or {}
 
@@ -224,27 +222,34 @@ def slider_ends(
                 return False
             return True
 
-        near = before.get(slider.name, slider.limits)[which]
-        return _last(slider.shown, slider.limits[which], near, exists)
+        limit = slider.limits[which]
+        near = before[slider.name][which] if slider.name in before else None
+        return limit if near == limit else _last(slider.shown, limit, near, exists)
 
     return {each.name: (end(each, 0), end(each, 1)) for each in slider_parameters(arm)}
 
 
-def _last(start: float, limit: float, near: float, exists: Callable[[float], bool]) -> float:
+def _last(start: float, limit: float, near: float | None, exists: Callable[[float], bool]) -> float:
     """The last value from a start toward a limit that exists, rounded to three digits inward."""
-    if exists(limit):
-        return limit
     inside, outside = start, limit
-    digits = max(0, 2 - math.floor(math.log10(abs(near)))) if near else 0
-    for tried in (near, near + math.copysign(10.0**-digits, limit - start)):
-        if near != limit and min(inside, outside) < tried < max(inside, outside):
-            inside, outside = (tried, outside) if exists(tried) else (inside, tried)
+    if near is not None:
+        step = 10.0 ** -_decimals(near)
+        for tried in (near + math.copysign(step, limit - start), near):
+            if min(inside, outside) < tried < max(inside, outside):
+                inside, outside = (tried, outside) if exists(tried) else (inside, tried)
+    if outside == limit and exists(limit):
+        return limit
     for _ in range(0 if inside == near else _HALVINGS):
         middle = (inside + outside) / 2
         inside, outside = (middle, outside) if exists(middle) else (inside, middle)
-    digits = max(0, 2 - math.floor(math.log10(abs(inside)))) if inside else 0
-    rounded = (math.floor if limit > start else math.ceil)(inside * 10**digits) / 10**digits
+    power = 10 ** _decimals(inside)
+    rounded = (math.floor if limit > start else math.ceil)(inside * power) / power
     return start if (rounded - start) * (limit - start) < 0 else rounded
+
+
+def _decimals(value: float) -> int:
+    """Digits after the point that a value of three digits has."""
+    return max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
 
 
 # Parts
@@ -273,11 +278,8 @@ _BODY_LABELS = {
 def body_numbers(arm: Manipulator) -> list[ShownParameter]:
     """The parameters of the body that have no slider, in the words of those that have one."""
     slid = {slider.name for slider in slider_parameters(arm)}
-    return [
-        number._replace(label=_BODY_LABELS.get(number.name, number.label))
-        for number in part_parameters(arm, _BODY)
-        if number.name not in slid
-    ]
+    rest = (number for number in part_parameters(arm, _BODY) if number.name not in slid)
+    return [each._replace(label=_BODY_LABELS.get(each.name, each.label)) for each in rest]
 
 
 def parts(arm: Manipulator) -> dict[str, Part]:

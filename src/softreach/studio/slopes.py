@@ -26,20 +26,17 @@ _FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
 class Slope(NamedTuple):
-    """∂V/∂p for one slider."""
+    """∂V/∂p for one slider, and its error [m³ per unit of the slider]."""
 
     value: float
-    """[m³] per unit of the slider."""
     error: float
-    """Its error, likewise."""
 
 
 class VolumeSlopes(NamedTuple):
     """Slopes of all sliders of a design."""
 
     arm: Manipulator
-    volume: float
-    """[m³]."""
+    volume: float  # [m³]
     slopes: Mapping[str, Slope]
     """By names of parameters; none where there is no volume, or loads tear the set."""
 
@@ -54,13 +51,9 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
     """
     arm, solid, known = reach.arm, reach.exact, parameters(reach.arm)
     found = VolumeSlopes(arm, reach.volume, {})
-    if (
-        solid is None
-        or solid.dimension < 3
-        or solid.lost_share
-        or solid.is_torn
-        or not solid.volume > 0
-    ):
+    if solid is None or solid.dimension < 3 or not solid.volume > 0:
+        return found
+    if solid.lost_share or solid.is_torn:
         return found  # what remains are differences between neighbors, which take minutes
     sliders = slider_parameters(arm)
     scale = {each.name: each.scale for each in sliders if not known[each.name].whole}
@@ -77,11 +70,8 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
         except (OverBudget, MemoryError):
             break
         else:
-            rows = zip(names, gradient.volume, gradient.volume_error, strict=True)
-            slopes |= {
-                name: Slope(float(value) * scale[name], float(error) * scale[name])
-                for name, value, error in rows
-            }
+            for name, *row in zip(names, gradient.volume, gradient.volume_error, strict=True):
+                slopes[name] = Slope(*(float(value) * scale[name] for value in row))
     return found._replace(slopes=slopes)
 
 

@@ -11,9 +11,8 @@ from os import PathLike
 from pathlib import Path
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.files import LARGEST
 from softreach.studio.reach import Quality, Reach, reached
-from softreach.studio.state import StudioState
+from softreach.studio.state import LARGEST, StudioState
 from softreach.support.errors import SoftreachError
 from softreach.support.files.atomic import replacing
 from softreach.support.files.text import read_text
@@ -78,10 +77,8 @@ class KeptWork:
     def __init__(self, folder: Path, *, goes_on: bool = True) -> None:
         """Read what there is in a folder, made when first written to, if work goes on with it."""
         self._path, self._writing = folder / "latest.json", threading.Lock()
-        self.complaint = ""
-        """Reason why something could not be read or written; one line."""
-        self.latest: StudioState | None = None
-        """The state that was kept last."""
+        self.complaint = ""  # reason why something could not be read or written; one line
+        self.latest: StudioState | None = None  # the state that was kept last
         try:
             if goes_on and self._path.exists():
                 self.latest = StudioState.from_json(read_text("file", self._path, LARGEST))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -15,7 +16,6 @@ import numpy as np
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.requirements import Requirements
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import as_floats
@@ -23,6 +23,7 @@ from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.toml import tables_of
 
 TOL = 1e-5  # [L], the largest tip error: far below a pixel
+LARGEST = 2_000_000  # bytes of a file that a person opens
 
 
 def rod_of(arm: Manipulator) -> TipMap:
@@ -96,7 +97,7 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
             it are not sent with it, and files of this machine are not for whoever has the page.
         InvalidInput: It lists more places than can be shown.
     """
-    if faults := [Fault(path, None, _allowed(path)) for path in _files_in(text)]:
+    if faults := list(_foreign_files(text)):
         raise InvalidDesign(faults, source)
     needs = Requirements.from_toml(text, length=length, source=source)
     if (count := len(needs.places)) > _MOST_PLACES:
@@ -105,24 +106,18 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
     return needs
 
 
-def _allowed(path: str) -> str:
-    instead = "places_m" if path.endswith("file") else "a table of vertices_m and faces"
-    return f"names another file, which is not sent along: write {instead} instead"
-
-
-def _files_in(text: str) -> list[str]:
-    """Where a text of tables names other files."""
-    try:
+def _foreign_files(text: str) -> Iterator[Fault]:
+    """Every place where a text of tables names another file."""
+    document: Mapping[str, Any] = {}
+    with suppress(ValueError):  # which the reader refuses
         document = tables_of(text)
-    except ValueError:
-        return []  # which the reader refuses
-    return [
-        f"{key}[{k}].{name}"
-        for key, tables in document.items()
-        for k, table in enumerate(tables if isinstance(tables, list) else ())
-        for name in ("file", "mesh")
-        if isinstance(table, dict) and isinstance(table.get(name), str)
-    ]
+    kinds = {"file": "places_m", "mesh": "a table of vertices_m and faces"}
+    for key, tables in document.items():
+        for k, table in enumerate(tables if isinstance(tables, list) else ()):
+            for name, instead in kinds.items():
+                if isinstance(table, dict) and isinstance(table.get(name), str):
+                    why = f"names another file, which is not sent along: write {instead} instead"
+                    yield Fault(f"{key}[{k}].{name}", None, why)
 
 
 VERSION = 4
@@ -252,27 +247,28 @@ class StudioState:
     activation: tuple[float, ...] = ()
     """Of each bundle in its unit, within the bounds; rest, or what is nearest to it, by default."""
     appearance: Appearance = field(default_factory=Appearance)
-    target: Vector | None = None
-    """Place where the tip should go [m]."""
-    reference: Manipulator | None = None
-    """A design that is kept, to be compared with this one."""
+    target: Vector | None = None  # place where the tip should go [m]
+    reference: Manipulator | None = None  # a design that is kept, to be compared with this one
     camera: Camera | None = None
-    path: TipPath | None = None
-    """Path that the tip follows."""
-    needs: str = ""
-    """Requirements of the design, as TOML; "" for none."""
+    path: TipPath | None = None  # that the tip follows
+    needs: str = ""  # requirements of the design, as TOML; "" for none
 
     def __post_init__(self) -> None:
         if self.reference is not None:
             rod_of(self.reference)
         requirements_of(self.needs)
-        within = _within(rod_of(self.design).box, self.activation)
-        object.__setattr__(self, "activation", within)
+        box = rod_of(self.design).box
+        values = np.zeros(box.bundles)
+        count = min(len(self.activation), box.bundles)
+        values[:count] = np.asarray(self.activation, float)[:count]
+        if not np.isfinite(values).all():
+            raise InvalidInput("activation", tuple(self.activation), "finite numbers")
+        object.__setattr__(self, "activation", tuple(box.clip(values).tolist()))
 
-    @property
-    def unloaded(self) -> Manipulator:
-        """The design without loads."""
-        return self.design.replace(loads=None)
+    @cached_property
+    def free(self) -> Manipulator | None:
+        """A loaded design without its loads; None for one that has none."""
+        return None if self.design.loads is None else self.design.replace(loads=None)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed; activations are moved into the bounds."""
@@ -352,16 +348,6 @@ def _check_number(name: str, value: object, low: float, high: float) -> None:
         raise InvalidInput(name, value, f"{low:g} to {high:g}")
 
 
-def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...]:
-    """As many activations as there are bundles, each within its bounds."""
-    values = np.zeros(box.bundles)
-    count = min(len(activation), box.bundles)
-    values[:count] = np.asarray(activation, float)[:count]
-    if not np.isfinite(values).all():
-        raise InvalidInput("activation", tuple(activation), "finite numbers")
-    return tuple(box.clip(values).tolist())
-
-
 # History: states before and states undone, as values, so that going back is exact. Looks are no
 # part of it: whoever goes back to an earlier design keeps the view.
 
@@ -397,7 +383,9 @@ class History:
                 if that was of the same kind, and a moment ago.
             clock: The time [s].
         """
-        kind = _kind(old, new)
+        differ = [name for name in (*_SETTINGS, *_POSE) if getattr(old, name) != getattr(new, name)]
+        settings = [name for name in differ if name in _SETTINGS]
+        kind = " ".join(settings) or ("pose" if differ else "")  # bounds may have moved activations
         if not kind:
             return self
         now = clock()
@@ -405,30 +393,15 @@ class History:
         past = self.past if same else (*self.past, old)[-_LONGEST:]
         return History(past=past, kind=kind, at=now)
 
-    def at_rest(self) -> History:
-        """The same, of which the latest step is over: the next change is another."""
-        return replace(self, kind="")
+    def step(self, present: StudioState, *, back: bool) -> tuple[History, StudioState]:
+        """The state before the latest step, or the one undone last, seen as the present one is.
 
-    def back(self, present: StudioState) -> tuple[History, StudioState]:
-        """The state before the latest step, seen as now; the present one if there was none."""
-        if not self.past:
+        Where there is none, both stay as they are.
+        """
+        left, behind = (self.past, self.future) if back else (self.future, self.past)
+        if not left:
             return self, present
-        history = History(past=self.past[:-1], future=(*self.future, present))
-        return history, _seen_as(present, self.past[-1])
-
-    def forth(self, present: StudioState) -> tuple[History, StudioState]:
-        """The state that was undone last, seen as now; the present one if there is none."""
-        if not self.future:
-            return self, present
-        history = History(past=(*self.past, present), future=self.future[:-1])
-        return history, _seen_as(present, self.future[-1])
-
-
-def _seen_as(view: StudioState, state: StudioState) -> StudioState:
-    return replace(state, appearance=view.appearance, camera=view.camera)
-
-
-def _kind(old: StudioState, new: StudioState) -> str:
-    differ = [name for name in (*_SETTINGS, *_POSE) if getattr(old, name) != getattr(new, name)]
-    settings = [name for name in differ if name in _SETTINGS]
-    return " ".join(settings) or ("pose" if differ else "")  # bounds may have moved activations
+        state = replace(left[-1], appearance=present.appearance, camera=present.camera)
+        ways = left[:-1], (*behind, present)
+        past, future = ways if back else ways[::-1]
+        return History(past=past, future=future), state

@@ -41,8 +41,6 @@ from softreach.support.quantity import quantity
 from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
 from softreach.workspace import ReachableSet, reachable_set
 
-__all__ = ["StaticPage", "write_static"]
-
 _MOST = 1000  # designs, which are some 150 MB
 _DETAIL = Detail(triangles=13_000, sides=24, stations=41)
 _FOLDER = "designs"
@@ -58,14 +56,10 @@ _NUMBERS = {
 class StaticPage(NamedTuple):
     """Files that were written."""
 
-    page: Path
-    """The one to open."""
-    designs: int
-    """Designs with a file each."""
-    gaps: int
-    """Combinations without a reachable set."""
-    size: int
-    """Of all files [bytes]."""
+    page: Path  # the one to open
+    designs: int  # with a file each
+    gaps: int  # combinations without a reachable set
+    size: int  # of all files [bytes]
 
 
 def write_static(

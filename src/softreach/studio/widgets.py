@@ -71,7 +71,6 @@ class TextKind(NamedTuple):
     demand: str  # on a text, as in "must be a number"
     value: Callable[[str], Any]  # from a text; None if it is no such value
     text: Callable[[Any], str]  # from a value, as a person would type it
-    has_units: bool = False  # in a text, in whose place the value is shown once it is applied
 
 
 def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
@@ -82,26 +81,35 @@ def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
         length: L [m] of the arm, which is a unit of lengths.
     """
     demand = "a number" + _with_units(unit, length())
-    return TextKind(demand, lambda text: _number(text, unit, length()), "{:.12g}".format, True)
+    return TextKind(demand, lambda text: read_number(text, unit, length()), "{:.12g}".format)
 
 
 def vector_kind(unit: str, length: Callable[[], float]) -> TextKind:
     """Three of them, as `number_kind`."""
-
-    def value(text: str) -> tuple[float | None, ...] | None:
-        parts = tuple(_number(part, unit, length()) for part in _parts(text))
-        return None if len(parts) != 3 or None in parts else parts
-
     demand = "three numbers, such as 0, 0, -9.81" + _with_units(unit, length())
-    return TextKind(demand, value, lambda vector: ", ".join(f"{x:.12g}" for x in vector), True)
+    value = lambda text: numbers_in(text, 3, unit, length())
+    return TextKind(demand, value, lambda vector: ", ".join(f"{x:.12g}" for x in vector))
+
+
+def numbers_in(text: str, count: int, unit: str, length: float) -> tuple[float, ...] | None:
+    """So many numbers in a list, as `read_number`; None for anything else."""
+    read = [read_number(part, unit, length) for part in _parts(text)]
+    numbers = tuple(number for number in read if number is not None)
+    return numbers if len(read) == len(numbers) == count else None
 
 
 def _parts(text: str) -> list[str]:
     return text.split(next((mark for mark in ";," if mark in text), None))
 
 
-def _number(text: str, unit: str, length: float) -> float | None:
-    """The number that a text is in the unit of a field; None for anything else."""
+def read_number(text: str, unit: str, length: float) -> float | None:
+    """The number that a text is in a unit, or with another one behind it; None for anything else.
+
+    Args:
+        text: As it is typed.
+        unit: Of what has none, and of what is returned; "" for plain numbers.
+        length: L [m] of the arm, which is a unit of lengths.
+    """
     text, units = text.strip(), _units(unit, length)
     name = next((name for name in sorted(units, key=len)[::-1] if text.endswith(name)), "")
     number = number_of(text.removesuffix(name))
@@ -181,7 +189,7 @@ class TypedField:
             self._value = value
             self.warn("")
         self._apply(event)
-        if not self._is_refused and self._kind.has_units and None in map(number_of, _parts(text)):
+        if not self._is_refused and None in map(number_of, _parts(text)):  # it has units
             self._text.value = self._kind.text(self._value)
 
     def _apply(self, event: Any) -> None:

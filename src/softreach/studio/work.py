@@ -250,8 +250,7 @@ class CompilationWatch(event.Listener):
 
     def __init__(self, changed: Callable[[bool], None]) -> None:
         self._changed, self._running, self._lock = changed, 0, threading.Lock()
-        self.done = 0
-        """Number of times that all of it has ended: of the kernels of a studio, each once."""
+        self.done = 0  # times that all of it has ended: of the kernels of a studio, each once
         event.register(_KIND, self)
 
     @property

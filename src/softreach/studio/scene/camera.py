@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,9 +32,10 @@ VIEWS: dict[str, Array] = {
 }
 """Directions from the middle to the camera."""
 
+UPRIGHT = 0.6  # aspect below which a window is that of a phone
+
 _PATIENCE = 30.0  # [s] for a picture
 _LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
-_UPRIGHT = 0.6  # aspect below which a window is that of a phone
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
@@ -53,11 +53,11 @@ def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
         direction: From the middle of the box to the camera.
         aspect: Width of the picture over its height.
     """
-    room = _ROOM_UPRIGHT if aspect < _UPRIGHT else _ROOM
+    room = _ROOM_UPRIGHT if aspect < UPRIGHT else _ROOM
     middle, radius = (low + high) / 2, room * float(np.linalg.norm(high - low)) / 2
     distance = radius / _half_sine(aspect)
     toward = direction / np.linalg.norm(direction)
-    if aspect < _UPRIGHT:  # the sheet of a phone covers the lower half
+    if aspect < UPRIGHT:  # the sheet of a phone covers the lower half
         up = np.cross(toward, (-toward[1], toward[0], 0.0))
         middle = middle - 0.45 * distance * np.tan(FOV / 2) * up / np.linalg.norm(up)
     return Camera(position=vector(middle + distance * toward), look_at=vector(middle))
@@ -76,15 +76,6 @@ class TabCamera:
         self._latest: float | None = None
         self._since = 0.0
 
-    def on_move(self, moved: Callable[[], None]) -> None:
-        """Call this whenever the camera has moved."""
-        self._client.camera.on_update(lambda _: moved())
-
-    @property
-    def is_upright(self) -> bool:
-        """True if the window is that of a phone."""
-        return self.aspect < _UPRIGHT
-
     @property
     def aspect(self) -> float:
         """Width of the picture over its height."""
@@ -101,10 +92,6 @@ class TabCamera:
         camera = self._client.camera
         place = {"position": vector(camera.position), "look_at": vector(camera.look_at)}
         return Camera(**place, aspect=self.aspect)
-
-    def fits(self, camera: Camera) -> bool:
-        """True if the window is upright where that of a saved camera was, and else neither is."""
-        return self.is_upright == ((camera.aspect or 1.0) < _UPRIGHT)
 
     def look_from(self, camera: Camera) -> None:
         """Move it."""
@@ -177,16 +164,22 @@ class NumberedBox:
     def draw(self, *points: Array, arm: Manipulator) -> None:
         """Surround points [L], shapes (n, 3), with numbers in the unit of the arm."""
         with self._lock:
+            before = self._unit, self._scale, np.array(self._box).tolist()
             self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
             self._box = round_box(*(self._scale * each for each in points))
-            self._draw()
+            same = before == (self._unit, self._scale, np.array(self._box).tolist())
+            if not (same and self._is_drawn()):
+                self._draw()
 
     def turn(self, camera: Array, focal: float = np.inf) -> None:
         """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
         with self._lock:
             before, self._camera = self._side(), (camera, focal)
-            if self._api.get_handle_by_name("/axes/lines") is not None and self._side() != before:
+            if self._is_drawn() and self._side() != before:
                 self._draw()
+
+    def _is_drawn(self) -> bool:
+        return self._api.get_handle_by_name("/axes/lines") is not None
 
     def _side(self) -> object:
         return seen_from(self._scale * self._camera[0], *self._box, self._camera[1])

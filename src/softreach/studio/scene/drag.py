@@ -69,12 +69,13 @@ class DragBall:
         if (opacity := _CLEAR if clear else None) != ball.opacity:
             ball.opacity = opacity
 
-    def show_lag(self, wanted: Array | None, tip: Array | None, gap: str = "") -> None:
-        """A line from the tip to where it is dragged to [L], and how long it is; "" for none."""
-        if wanted is None or tip is None or not gap:
+    def show_lag(self, ends: tuple[Array, Array] | None, gap: str) -> None:
+        """A line between where the tip should be and is [L], and how long it is; "" for none."""
+        if ends is None or not gap:
             if self._api.get_handle_by_name("/lag") is not None:
                 self._api.remove_by_name("/lag")
             return
+        wanted, tip = ends
         line = np.stack([tip - wanted, np.zeros(3)])[None].astype(np.float32)
         self._api.add_icosphere("/lag", _POINTER, _LAG, cast_shadow=False, position=wanted)
         self._api.add_line_segments("/lag/line", line, _LAG, thickness=0.004)

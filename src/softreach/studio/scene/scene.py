@@ -15,7 +15,8 @@ from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.shading import vertex_normals
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.kinematics import configuration, rest_configuration
-from softreach.studio.reach import Reach, cloud_points, unstable_samples
+from softreach.rod.tip_map import TipStatus
+from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import NumberedBox, add_label, way_to
 from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
 from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
@@ -76,14 +77,6 @@ class _Arm(NamedTuple):
     radii: Array
 
 
-class _Dots(NamedTuple):
-    points: Array
-    colors: NDArray[np.uint8]
-    size: float
-    shape: Literal["circle", "diamond"]
-    kept: NDArray[np.bool_]
-
-
 class Scene:
     """One scene and what has been drawn into it."""
 
@@ -92,7 +85,7 @@ class Scene:
         self.pointing: Array = np.full(3, np.nan)
         """Direction d3 of the tip of the arm, as it is drawn."""
         self._arms: dict[str, _Arm] = {}
-        self._clouds: dict[str, _Dots] = {}
+        self._clouds: dict[str, tuple[NDArray[np.bool_], Any]] = {}
         self._lock = threading.RLock()
         self._ahead: Array | None = None
         self._base = np.zeros(3)
@@ -160,9 +153,9 @@ class Scene:
         if is_thin:  # it hides little, and the page draws no frame while it takes up another
             return
         with self._lock:
-            for path, dots in list(self._clouds.items()):
-                if not np.array_equal(dots.kept, self._kept(dots.points)):
-                    self._cut_dots(path, *dots[:-1])
+            for path, (kept, dots) in list(self._clouds.items()):
+                if not np.array_equal(kept, self._kept(dots[0])):
+                    self._cut_dots(path, *dots)
 
     def hidden(self, points: Array) -> NDArray[np.bool_]:
         """Mask of the points [L], shape (n, 3), that are cut away."""
@@ -183,7 +176,7 @@ class Scene:
     ) -> None:
         with self._lock:
             kept = self._kept(points)
-            self._clouds[path] = _Dots(points, colors, size, shape, kept)
+            self._clouds[path] = kept, (points, colors, size, shape)
             shown = colors[kept] if colors.ndim == 2 else colors
             self.dots(path, points[kept], shown, size, shape)
 
@@ -194,7 +187,8 @@ class Scene:
             return None
         points = cloud_points(reach, look.level)
         coloring = sample_colors(reach, look.level, look.color)
-        kept, unstable = in_slice(points, look.slice), unstable_samples(reach, look.level)
+        unstable = reach.status[shown_samples(reach, look.level)] == TipStatus.UNSTABLE
+        kept = in_slice(points, look.slice)
         stable, size = kept & ~unstable, _point_size(len(points))
         self._cut_dots("/cloud", points[stable], coloring.rgb[stable], size)
         marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
@@ -330,10 +324,8 @@ class Scene:
             ghost = path.startswith(("/ghosts", "/sample"))
             usual = [_GHOST] * len(meshes) if ghost else _opacities(arm, len(meshes))
             handles = [
-                self._mesh(f"{path}/{k}", vertices / length, faces, color, opacity)
-                for k, ((vertices, faces, color), opacity) in enumerate(
-                    zip(meshes, usual, strict=True)
-                )
+                self._mesh(f"{path}/{k}", vertices / length, faces, color, usual[k])
+                for k, (vertices, faces, color) in enumerate(meshes)
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
         markers = marker_points(arm.markers, shape) / length

@@ -87,16 +87,14 @@ def compared(kept: Candidate, now: Candidate) -> Comparison:
 
 def comparison_html(comparison: Comparison) -> str:
     """A row for each quantity: kept, now, and the change."""
-    rows = [[(text,) for text in _texts(row)] for row in comparison.rows]
+    rows = []
+    for row in comparison.rows:
+        values = zip((row.kept, row.now), row.errors, strict=True)
+        known = ["–" if value is None else _digits(value, error) for value, error in values]
+        rows.append([(text,) for text in (row.title, *known, _change_text(row))])
     others = "The designs differ in more than these numbers."
     more = "" if comparison.is_complete else markup.paragraph(others)
     return markup.table(["", "kept", "now", "change"], rows) + more
-
-
-def _texts(row: Row) -> tuple[str, str, str, str]:
-    values = zip((row.kept, row.now), row.errors, strict=True)
-    kept, now = ("–" if value is None else _digits(value, error) for value, error in values)
-    return row.title, kept, now, _change_text(row)
 
 
 def _change_text(row: Row) -> str:
@@ -148,7 +146,11 @@ def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) ->
         first, second = (
             _finite(each[name].shown) if name in each else None for each in (before, after)
         )
-        if not _same(first, second):
+        if first is None or second is None:
+            same = first is second
+        else:
+            same = math.isclose(first, second, rel_tol=_EQUAL)
+        if not same:
             rows[name] = Row((after.get(name) or before[name]).label, first, second)
     return rows
 
@@ -169,12 +171,6 @@ def _shape(arm: Manipulator) -> object:
     rings = tuple((ring.name, ring.material) for ring in arm.section.rings)
     parts = tuple((type(actuator), actuator.name) for actuator in arm.actuators)
     return type(arm.profile), rings, parts, arm.loads is None
-
-
-def _same(value: Value, other: Value) -> bool:
-    if value is None or other is None:
-        return value is other
-    return abs(value - other) <= _EQUAL * max(abs(value), abs(other))
 
 
 def _finite(value: float) -> Value:

@@ -29,7 +29,7 @@ from softreach.studio.shown_parameters import (
 )
 from softreach.studio.slopes import NO_BAR, slope_bars
 from softreach.studio.state import StudioState, rod_of, vector
-from softreach.studio.widgets import Line, SliderField, TextKind, TypedField
+from softreach.studio.widgets import Line, SliderField, TextKind, number_kind, vector_kind
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 
 # Sliders, numbers that have none, and named designs to start from
@@ -48,7 +48,11 @@ def design(panel: Fields) -> None:
         pass
     _numbers(panel, folder, body_numbers, _typed)
     names = {"": "this design"} | {name: name for name in designs.__all__}
-    panel.dropdown("start from", names, Attribute(_name, _named), _ABOUT_START)
+    named = Attribute(
+        lambda state: next((name for name, arm in _designs().items() if arm == state.design), ""),
+        lambda state, name: state.replace(design=_designs()[name]) if name else state,
+    )
+    panel.dropdown("start from", names, named, _ABOUT_START)
 
 
 def _numbers(
@@ -58,19 +62,22 @@ def _numbers(
     build: Callable[[Fields, Sequence[ShownParameter]], object],
 ) -> None:
     """Fields of parameters, made anew for a design that has others."""
-    arm = lambda: panel.session.state.design
-    panel.anew(
-        folder,
-        "design",
-        key=lambda state, _: [each[:2] for each in shown(state.design)],
-        build=lambda fields, _: build(fields, shown(arm())),
-        words=lambda error: refusal(error, shown(arm()), arm()),
-    )
+    session = panel.session
+    arm = lambda: session.state.design
+
+    def words(error: SoftreachError) -> str:
+        session.learn({"ends": {}})  # perhaps a slider does not end where it should
+        session.follow("slopes")
+        return refusal(error, shown(arm()), arm())
+
+    key = lambda state, _: [each[:2] for each in shown(state.design)]
+    remake = lambda fields, _: build(fields, shown(arm()))
+    panel.anew(folder, "design", key=key, build=remake, words=words)
 
 
 def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
     for each in numbers:
-        panel.number(each.label, of_design(each.read, each.write), each.hint)
+        panel.typed(each.label, of_design(each.read, each.write), each.hint)
 
 
 def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
@@ -91,10 +98,8 @@ def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
     def draw_bars(state: StudioState, found: Found) -> None:
         slopes, drawn = found.slopes, dict.fromkeys(bars, NO_BAR * _has_bars(state, found))
         if slopes is not None:
-            sliders = {
-                each.name: (each, rows[each.name].ends[1] - rows[each.name].ends[0])
-                for each in shown
-            }
+            ranges = {name: row.ends[1] - row.ends[0] for name, row in rows.items()}
+            sliders = {each.name: (each, ranges[each.name]) for each in shown}
             drawn |= slope_bars(slopes, sliders, old=slopes.arm != state.design)
         for name, line in bars.items():
             line.show(drawn[name])
@@ -112,14 +117,6 @@ def _has_bars(state: StudioState, found: Found) -> bool:
 @cache
 def _designs() -> dict[str, Manipulator]:
     return {name: getattr(designs, name)() for name in designs.__all__}
-
-
-def _name(state: StudioState) -> str:
-    return next((name for name, arm in _designs().items() if arm == state.design), "")
-
-
-def _named(state: StudioState, name: str) -> StudioState:
-    return state.replace(design=_designs()[name]) if name else state
 
 
 # Rings and actuators
@@ -154,9 +151,12 @@ def arm_parts(panel: Fields) -> None:
             offer.warn(_OFFER.format(kind=kind.value) if made_of.visible else "")
             if not made_of.visible:
                 matter = made_of.value if lacking else ""
-                panel.apply(lambda state: _with_part(state, kind.value, matter))
+                new = lambda state: _with_part(state.design, kind.value, matter)
+                panel.apply(lambda state: state.replace(design=new(state)))
             if session.state.design != arm:
-                session.learn({"part": _place_of_new(session.state.design, kind.value)})
+                known, is_ring = _listed(session.state.design).values(), kind.value == _NEW_RING
+                like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
+                session.learn({"part": like[-1]})
 
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
         offer = Line(panel.gui)
@@ -176,32 +176,28 @@ def arm_parts(panel: Fields) -> None:
     panel.anew(folder, "design", "found.part", key=_chosen, build=build, words=words)
 
 
-def _with_part(state: StudioState, kind: str, matter: str) -> StudioState:
-    arm = edits.with_material(state.design, matter) if matter else state.design
-    new = edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
-    return state.replace(design=new)
-
-
-def _place_of_new(arm: Manipulator, kind: str) -> int:
-    """Number of a part that was just added, in the list of parts."""
-    known = [part for label, part in parts(arm).items() if label != "body"]
-    rings = [k for k, part in enumerate(known) if part.ring is not None]
-    return rings[-1] if kind == _NEW_RING else len(known) - 1
+def _with_part(arm: Manipulator, kind: str, matter: str = "") -> Manipulator:
+    arm = edits.with_material(arm, matter) if matter else arm
+    return edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
 
 
 def _lacks_material(arm: Manipulator, kind: str) -> bool:
     try:
-        _ = kind == _NEW_RING or edits.with_actuator(arm, kind)
+        _with_part(arm, kind)
     except InvalidDesign as error:
-        return any(
-            fault.value is None and fault.path.endswith("young_modulus") for fault in error.faults
-        )
+        lacking = [fault.path for fault in error.faults if fault.value is None]
+        return any(path.endswith("young_modulus") for path in lacking)
     return False
+
+
+def _listed(arm: Manipulator) -> dict[str, Part]:
+    """The parts that are edited here, by their labels."""
+    return {label: part for label, part in parts(arm).items() if label != "body"}
 
 
 def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, object]:
     """The parts by their labels, the label of the chosen one, and names of its numbers."""
-    known = {label: part for label, part in parts(state.design).items() if label != "body"}
+    known = _listed(state.design)
     label = [*known][min(found.part, len(known) - 1)]
     return known, label, [each.name for each in part_parameters(state.design, known[label])]
 
@@ -216,15 +212,20 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     )
     hint = "The part whose numbers are below"
     panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
-    own = part.ring is not None or bool(part.actuator)
+    own = (ring := part.ring) is not None or bool(part.actuator)
+    if ring is not None:
+        renamed = lambda arm, name: edits.with_changed_ring(arm, ring, name=name)
+        without = lambda arm: edits.without_ring(arm, ring)
+    else:
+        renamed = lambda arm, name: edits.with_changed_actuator(arm, part.actuator, name=name)
+        without = lambda arm: edits.without_actuator(arm, part.actuator)
     if own:
-        at = of_design(lambda _: part.name, lambda arm, name: _renamed(arm, part, name))
-        hint = "What tables and files call it"
-        panel.bind(TypedField(panel.gui, "name", part.name, hint, _NAME), at)
+        at = of_design(lambda _: part.name, renamed)
+        panel.typed("name", at, "What tables and files call it", lambda *_: _NAME)
     _add_matter(panel, part)
     _typed(panel, part_parameters(session.state.design, part))
     if own:
-        remove = lambda state: state.replace(design=_without(state.design, part))
+        remove = lambda state: state.replace(design=without(state.design))
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
 
 
@@ -242,9 +243,11 @@ def _add_matter(panel: Fields, part: Part) -> None:
         _material(panel, "core", _AS_INNERMOST, of_design(core, edits.with_core))
     if part.home is not None and len(arm.section.rings) > 1:
         rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}
+        name = part.actuator
+        homes = lambda arm: {one.actuator: one.home or 0 for one in parts(arm).values()}
         at = of_design(
-            lambda arm: arm.section.rings.index(arm.section.ring(_home(arm, part))),
-            lambda arm, ring: edits.with_changed_actuator(arm, part.actuator, ring=ring),
+            lambda arm: arm.section.rings.index(arm.section.ring(homes(arm)[name])),
+            lambda arm, ring: edits.with_changed_actuator(arm, name, ring=ring),
         )
         panel.dropdown("in ring", rings, at, "The ring that it lies in")
 
@@ -253,22 +256,6 @@ def _material(panel: Fields, label: str, none: str, at: Attribute) -> None:
     names = {"": none} | {name: name for name in material_names()}
     known = at._replace(read=lambda state: name if (name := at.read(state)) in names else "")
     panel.dropdown(label, names, known, _ABOUT_MATERIAL)
-
-
-def _home(arm: Manipulator, part: Part) -> int | str:
-    return next(one.home or 0 for one in parts(arm).values() if one.actuator == part.actuator)
-
-
-def _renamed(arm: Manipulator, part: Part, name: str) -> Manipulator:
-    if part.ring is not None:
-        return edits.with_changed_ring(arm, part.ring, name=name)
-    return edits.with_changed_actuator(arm, part.actuator, name=name)
-
-
-def _without(arm: Manipulator, part: Part) -> Manipulator:
-    if part.ring is not None:
-        return edits.without_ring(arm, part.ring)
-    return edits.without_actuator(arm, part.actuator)
 
 
 # Base and loads
@@ -309,26 +296,22 @@ def loads(panel: Fields) -> None:
         falls = "Which way things fall in the world; the base says how the arm stands in it"
         panel.dropdown("gravity", names, fall, falls)
         for name, (label, unit, _, hint) in _LOADS.items():
-            add = panel.number if name == "payload" else panel.vector
-            add(f"{label} [{unit}]", load_field(name), hint)
+            kind = number_kind if name == "payload" else vector_kind
+            panel.typed(f"{label} [{unit}]", load_field(name), hint, kind)
         panel.message = panel.kept(Line(panel.gui))
-        panel.change(
-            "Take all loads off",
-            lambda state: state.replace(design=state.design.replace(loads=None)),
+        about, off = (
             "Gravity, payload and all forces",
-            "design.loads",
-            **GRAY,
+            lambda s: s.replace(design=s.free or s.design),
         )
+        panel.change("Take all loads off", off, about, "design.loads", **GRAY)
         follows = "design", "found.tip", "found.pointing", "found.posture"
+        rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+        panel.text(*follows, content=rests)
+        more = lambda s, _: ", ".join(other_loads(s.design))
         panel.text(
-            *follows, content=lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+            "design",
+            content=lambda *k: [f"From the design file act too: {more(*k)}."] * bool(more(*k)),
         )
-
-        def others(state: StudioState, _: Found) -> list[str]:
-            more = ", ".join(other_loads(state.design))
-            return [f"From the design file act too: {more}."] if more else []
-
-        panel.text("design", content=others)
 
 
 def _base(panel: Fields) -> None:
@@ -339,9 +322,9 @@ def _base(panel: Fields) -> None:
     )
     panel.dropdown("base", _WAYS, points, way)
     where = "r(0): where the arm is clamped, as x, y, z in the world"
-    panel.vector("base at [mm]", base_field("position"), where)
+    panel.typed("base at [mm]", base_field("position"), where, vector_kind)
     turn = "ψ: turn of the base about the way the arm points"
-    panel.number("turn [deg]", base_field("turn"), turn)
+    panel.typed("turn [deg]", base_field("turn"), turn)
 
 
 def other_loads(arm: Manipulator) -> list[str]:

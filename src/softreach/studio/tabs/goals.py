@@ -18,14 +18,13 @@ from softreach.requirements import Box, Check, Finding, Keep, Limits, Requiremen
 from softreach.requirements.checks import quick_check
 from softreach.studio import markup
 from softreach.studio.fields import GRAY, Attribute, Fields
-from softreach.studio.files import LARGEST
 from softreach.studio.found import Bench, Found, Sample
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.scene import VERDICTS
 from softreach.studio.session import Session
-from softreach.studio.state import StudioState, needs_of_text, requirements_of
-from softreach.studio.widgets import number_of
+from softreach.studio.state import LARGEST, StudioState, needs_of_text, requirements_of
+from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
 from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
 from softreach.support.files.text import text_of
@@ -77,12 +76,17 @@ def needs(panel: Fields) -> None:
                 part.options = (*parts, _ALL)
                 part.value = part.options[0]
 
+        def remove() -> None:
+            needs = requirements_of(session.state.needs)
+            parts = needs_parts(needs, session.state.design.length_unit)
+            _keep(session, parts[part.value]() if part.value in parts else Requirements())
+
         panel.follow("design", "needs", show=offer)
-        panel.button("Remove", lambda: _remove_need(session, part.value), one, "needs")
+        panel.button("Remove", remove, one, "needs")
         read = lambda file: read_needs(session, file.name, file.content)
         about = "Requirements as softreach check and softreach search read them"
         panel.upload("Load needs (TOML)", read, about, **GRAY)
-        save = lambda: session.send("needs.toml", session.state.needs.encode())
+        save = lambda: session.send("needs.toml", session.state.needs.encode)
         about = "The needs as a file for softreach check and softreach search"
         panel.button("Save needs (TOML)", save, about, "needs", **GRAY)
 
@@ -142,27 +146,28 @@ def add_need(session: Session, kind: str, text: str) -> None:
         InvalidInput: The text has other numbers than this kind of need.
     """
     state, needs = session.state, requirements_of(session.state.needs)
-    size, empty = state.design.length_unit.size, not text.strip()
+    (unit, size), empty = state.design.length_unit, not text.strip()
+    numbers = lambda count, unit=unit: _numbers(text, count, unit, state.design.length)
     if kind == "place to reach" and empty:
         if session.found.tip is None:
             raise InvalidInput("tip", "nowhere", "in equilibrium, or type a place")
         add_place(session, session.found.tip * state.design.length)
     elif kind == "place to reach":
-        add_place(session, [size * x for x in _numbers(text, 3)])
+        add_place(session, [size * x for x in numbers(3)])
     elif kind == "place at the target":
         if state.target is None:
             raise InvalidInput("target", "none", "set in the tab Move")
         add_place(session, state.target)
     elif kind == "payload":
-        payload = _numbers(text, 1)[0] / 1e3
+        payload = numbers(1, "g")[0] / 1e3
         _keep(session, needs.replace(payloads=(*needs.payloads, payload)))
     elif kind == "most shortening":
-        _keep(session, _limited(needs, shortening=_numbers(text, 1)[0] / 100.0))
+        _keep(session, _limited(needs, shortening=numbers(1, "%")[0] / 100.0))
     else:
         inside = kind == "box to stay inside"
         corners = np.array(session.scene.axes.corners) * state.design.length
         if not (inside and empty):
-            corners = size * np.array(_numbers(text, 6)).reshape(2, 3)
+            corners = size * np.array(numbers(6)).reshape(2, 3)
         low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         keep = Keep(Box(tuple(low), tuple(high)), inside, name=_unused("box", needs.keeps))
         _keep(session, needs.replace(keeps=(*needs.keeps, keep)))
@@ -193,12 +198,6 @@ def _keep(session: Session, needs: Requirements) -> None:
     session.update(lambda state: state.replace(needs=text))
 
 
-def _remove_need(session: Session, part: str) -> None:
-    needs = requirements_of(session.state.needs)
-    parts = needs_parts(needs, session.state.design.length_unit)
-    _keep(session, parts[part]() if part in parts else Requirements())
-
-
 def needs_parts(needs: Requirements, unit: LengthUnit) -> dict[str, Callable[[], Requirements]]:
     """Every part in words -> the requirements without it."""
 
@@ -208,9 +207,7 @@ def needs_parts(needs: Requirements, unit: LengthUnit) -> dict[str, Callable[[],
 
     parts: dict[str, Callable[[], Requirements]] = {}
     for target in needs.targets:
-        where = ""
-        if len(target.points) == 1:
-            where = f" ({', '.join(f'{x / unit.size:.4g}' for x in target.points[0])}) {unit.name}"
+        where = f" {unit.place(target.points[0])}" if len(target.points) == 1 else ""
         parts[target.name + where] = without("targets", target)
     for keep in needs.keeps:
         parts[f"{keep.name}, to {keep.kind.replace('_', ' ')}"] = without("keeps", keep)
@@ -235,11 +232,10 @@ def _unused(kind: str, parts: Sequence[Target | Keep]) -> str:
     return next(name for k in range(1, len(names) + 2) if (name := f"{kind} {k}") not in names)
 
 
-def _numbers(text: str, count: int) -> list[float]:
-    """So many numbers that a text lists; anything else is refused."""
-    parts = text.replace(";", ",").replace(",", " ").split()
-    numbers = [number for part in parts if (number := number_of(part)) is not None]
-    if not len(parts) == len(numbers) == count:
+def _numbers(text: str, count: int, unit: str, length: float) -> tuple[float, ...]:
+    """So many numbers that a text lists, in a unit; anything else is refused."""
+    numbers = numbers_in(text, count, unit, length)
+    if numbers is None:
         words = {1: "a number", 3: "three numbers, such as 0.2, 0, 0.7", 6: "six numbers"}
         raise InvalidInput("numbers", repr(text), words[count])
     return numbers
@@ -274,15 +270,8 @@ def measured(panel: Fields) -> None:
         )
         panel.text("found.bench", content=lambda _, found: _bench_text(found.bench))
         with panel.folder("samples", "found.bench"):
-            panel.steps(
-                "sample",
-                "found.bench",
-                at=lambda _, found: (
-                    (found.bench.number, len(found.bench.data) - 1) if found.bench else (0, 1)
-                ),
-                move=lambda number: _step_to(session, number),
-                hint=_ABOUT_SAMPLE,
-            )
+            move = lambda number: _step_to(session, number)
+            panel.steps("sample", "found.bench", at=_at_sample, move=move, hint=_ABOUT_SAMPLE)
             follows = "design", "found.bench", "found.sample"
             panel.text(*follows, content=lambda state, found: [_residuals_text(state, found)])
             for name, label in _FREE.items():
@@ -292,6 +281,10 @@ def measured(panel: Fields) -> None:
             about = "Makes the calibrated arm the design; can be undone"
             fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
             panel.button("Apply", lambda: _apply(session), about, fitted)
+
+
+def _at_sample(_: StudioState, found: Found) -> tuple[int, int]:
+    return (found.bench.number, len(found.bench.data) - 1) if found.bench else (0, 1)
 
 
 def _is_free(name: str) -> Attribute:
@@ -406,18 +399,6 @@ def _check(given: Given) -> Results:
     yield Learned({"check": made})
 
 
-CHECK_NEEDS = Job(
-    "needs",
-    "design needs",
-    _check,
-    lambda given: given.scene.draw_needs(given.found.check),
-    wanted="needs",
-    makes="check",
-    draws="/needs",
-)
-"""The design against its needs."""
-
-
 def _predict(given: Given) -> Results:
     """Markers of the pose, while the arm has its inputs."""
     bench, design = given.found.bench, given.state.design
@@ -445,18 +426,6 @@ def _draw_sample(given: Given) -> None:
         scene.draw_arm(sample.arm, same, "/sample/arm", design.length)
 
 
-DRAW_SAMPLE = Job(
-    "sample",
-    "design activation found.bench",
-    _predict,
-    _draw_sample,
-    wanted="found.bench",
-    makes="sample",
-    draws="/sample",
-)
-"""Measured and predicted markers of a pose, while the arm has its inputs."""
-
-
 def _fit(given: Given) -> Results:
     bench, steps = given.found.bench, count(1)
     if bench is None:
@@ -472,7 +441,24 @@ def _fit(given: Given) -> Results:
     yield Learned({"bench": replace(bench, result=result)})
 
 
-FIT_ARM = Job("fit", "", _fit, doing="calibrating")
-"""Fits free numbers of the design to all poses."""
-
-JOBS = (CHECK_NEEDS, DRAW_SAMPLE, FIT_ARM)
+JOBS = (
+    Job(
+        "needs",
+        "design needs",
+        _check,
+        lambda given: given.scene.draw_needs(given.found.check),
+        wanted="needs",
+        makes="check",
+        draws="/needs",
+    ),
+    Job(
+        "sample",
+        "design activation found.bench",
+        _predict,
+        _draw_sample,
+        wanted="found.bench",
+        makes="sample",
+        draws="/sample",
+    ),
+    Job("fit", "", _fit, doing="calibrating"),
+)

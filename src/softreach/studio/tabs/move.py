@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,14 +19,13 @@ from softreach.inverse.request import positions_in
 from softreach.schema import activation_symbols
 from softreach.studio.captions import place_text, tip_text
 from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
-from softreach.studio.figures import track_picture
-from softreach.studio.files import LARGEST
-from softreach.studio.found import Found, Lag
+from softreach.studio.found import Found, Lag, Pull
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.scene.scene import MOST_BUNDLES
 from softreach.studio.session import Session
 from softreach.studio.state import (
+    LARGEST,
     MOST_POINTS,
     MOUSE,
     StudioState,
@@ -57,8 +57,13 @@ _DRAG_HINT = (
 def drag(panel: Fields) -> None:
     """Use of the mouse in the scene, and the ball on the tip that it may drag."""
     session = panel.session
+
+    def follow(phase: str, wanted: np.ndarray) -> None:
+        """Only the latest order is followed."""
+        session.learn({"pull": Pull(wanted, rests=phase == "end")}, quiet=True)
+
     eye = lambda: np.array(session.camera.actual().position)
-    ball = DragBall(session.client.scene, session.drag_to, eye)
+    ball = DragBall(session.client.scene, follow, eye)
     about = "Use of the mouse in the scene, which it turns besides; a click is on a reached place"
     panel.dropdown("mouse", MOUSE, attribute("appearance.mouse"), about)
 
@@ -69,10 +74,8 @@ def drag(panel: Fields) -> None:
         radius = float(arm.profile.radius(arm.length)) / arm.length
         clear = state.path is not None
         ball.move(found.tip if grasped else None, radius, dark=look.dark, clear=clear)
-        if lag is None:
-            ball.show_lag(None, None)
-        else:
-            ball.show_lag(lag.wanted, lag.dragged.tip / arm.length, _gap(state, found))
+        ends = None if lag is None else (lag.wanted, lag.dragged.tip / arm.length)
+        ball.show_lag(ends, _gap(state, found))
 
     def text(state: StudioState, found: Found) -> list[str]:
         gap = _gap(state, found)
@@ -110,23 +113,20 @@ def activation(panel: Fields) -> None:
 
 
 def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
+    def write(bundle: int, state: StudioState, value: float) -> StudioState:
+        before = state.activation
+        return state.replace(activation=(*before[:bundle], value, *before[bundle + 1 :]))
+
     for bundle, (label, low, high) in enumerate(ends[:_MOST]):
         room = 1e-6 * max(1.0, abs(low))
         upper = max(high, low + room)  # a slider needs room; the state keeps to the bounds
         hint = f"{label}: activation of a bundle, from {low:g} to {upper:g}; 0 is at rest"
         step = 10.0 ** (math.floor(math.log10(upper - low)) - 3)  # round
-        panel.slider(label, (low, upper), step, _activation(bundle), hint)
+        at = Attribute(lambda state, k=bundle: state.activation[k], partial(write, bundle))
+        panel.slider(label, (low, upper), step, at, hint)
     if (hidden := len(ends) - _MOST) > 0:
         drawn = "" if len(ends) <= MOST_BUNDLES else "; no bundle is drawn"
         panel.say(f"{hidden} more bundles have no slider here{drawn}.")
-
-
-def _activation(bundle: int) -> Attribute:
-    def write(state: StudioState, value: float) -> StudioState:
-        before = state.activation
-        return state.replace(activation=(*before[:bundle], value, *before[bundle + 1 :]))
-
-    return Attribute(lambda state: state.activation[bundle], write)
 
 
 def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
@@ -170,13 +170,8 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
     some = lambda _, found: found.answer is not None and len(found.answer) > 0
     with panel.folder("activations that reach it", some) as solutions:
         panel.anew(solutions, "found.answer", build=_solutions)
-    panel.change(
-        "Clear the target",
-        lambda state: state.replace(target=None),
-        "Takes target and solutions away",
-        "target",
-        **GRAY,
-    )
+    about, off = "Takes target and solutions away", lambda state: state.replace(target=None)
+    panel.change("Clear the target", off, about, "target", **GRAY)
 
 
 def _solutions(panel: Fields, _: object) -> None:
@@ -188,8 +183,10 @@ def _solutions(panel: Fields, _: object) -> None:
         button = panel.button(text, act, "Moves the arm to this solution")
 
         def mark(state: StudioState, _: Found, row: Any = row, button: Any = button) -> None:
+            scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
+            is_here = len(scales) == len(row)  # else it is of a design before
+            is_here = is_here and bool((np.abs(row - state.activation) <= _NEAR * scales).all())
             label = button.label.removeprefix(_HERE)
-            is_here = _is_near(row, state)
             button.color, button.label = "green" * is_here or None, _HERE * is_here + label
 
         panel.follow("design", "activation", show=mark)
@@ -199,13 +196,6 @@ def take(session: Session, activation: Any) -> None:
     """Move the arm to a solution."""
     there = tuple(activation.tolist())
     session.update(lambda state: state.replace(activation=there))
-
-
-def _is_near(activation: Any, state: StudioState) -> bool:
-    scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
-    if len(scales) != len(activation):  # of a design before
-        return False
-    return bool((np.abs(activation - state.activation) <= _NEAR * scales).all())
 
 
 def _answer_text(answer: Solution | None, state: StudioState) -> str:
@@ -239,37 +229,29 @@ def path(panel: Fields) -> None:
         panel.say(f"{about}: load one, or click it.")
         read = lambda file: _read_path(session, file)
         panel.upload("Load a path (CSV)", read, "columns x, y, z [m]", mime_type=".csv,text/csv")
-        panel.change(
-            "Remove the path",
-            lambda state: state.replace(path=None),
-            "and what was found along it",
-            "path",
-            **GRAY,
-        )
+        about, off = "and what was found along it", lambda state: state.replace(path=None)
+        panel.change("Remove the path", off, about, "path", **GRAY)
         panel.text("design", "path", "found.track", content=_path_text)
         with panel.folder("along it", lambda state, found: _followed(state, found) > 0):
             plays = {"Play": lambda: session.follow("play"), "Stop": lambda: session.stop("play")}
             panel.choices("", plays, "the arm along the path, from the point that is chosen")
-            panel.steps(
-                "point",
-                "path",
-                "found.track",
-                at=lambda s, found: (s.path.at if s.path else 0, max(_followed(s, found) - 1, 0)),
-                move=lambda point: _step_to(session, point),
-                hint="point of the path where the arm is",
-            )
-            with panel.folder("activations along the path") as graph:
-                pass
-            panel.picture(graph, "found.track", image=_timeline)
-            panel.button("Save the path (CSV)", lambda: _save(session), "with its activations")
+            at = lambda s, found: (s.path.at if s.path else 0, max(_followed(s, found) - 1, 0))
+            move = lambda point: _step_to(session, point)
+            hint = "point of the path where the arm is"
+            panel.steps("point", "path", "found.track", at=at, move=move, hint=hint)
+
+            def save() -> None:
+                if (track := _track(session.state, session.found)) is not None:
+                    session.send("path.csv", path_csv(track).encode)
+
+            panel.button("Save the path (CSV)", save, "with its activations")
 
 
 def _track(state: StudioState, found: Found) -> xr.Dataset | None:
     """What was found along the path that there is now."""
     track, path = found.track, state.path
-    return (
-        track if track is not None and path and track.sizes["point"] == len(path.points) else None
-    )
+    fits = track is not None and path is not None and track.sizes["point"] == len(path.points)
+    return track if fits else None
 
 
 def _followed(state: StudioState, found: Found) -> int:
@@ -302,11 +284,6 @@ def end_text(track: xr.Dataset, arm: Manipulator) -> str:
     return f"{count} of {points} points are followed, {way} of path: there {reason}."
 
 
-def _timeline(state: StudioState, found: Found) -> Any:
-    track, count = _track(state, found), _followed(state, found)
-    return None if track is None or count < 2 else track_picture(track, state.design).image
-
-
 def extend_path(session: Session, point: np.ndarray) -> None:
     """Lead the path straight on to a place [m]; the first begins at the tip."""
     state, path = session.state, session.state.path
@@ -331,12 +308,6 @@ def _step_to(session: Session, point: int) -> None:
     track = _track(session.state, session.found)
     if track is not None:
         session.update(lambda state: at_point(state, track.activation.values, point))
-
-
-def _save(session: Session) -> None:
-    track = _track(session.state, session.found)
-    if track is not None:
-        session.send("path.csv", path_csv(track).encode())
 
 
 def _tip(state: StudioState) -> np.ndarray:
@@ -386,18 +357,6 @@ def _draw_answer(given: Given) -> None:
     scene.draw_ghosts(design, shapes)
 
 
-SOLVE_INVERSE = Job(
-    "inverse",
-    "design target",
-    _solve,
-    _draw_answer,
-    wanted="target",
-    makes="answer takes_nearest",
-    draws="/ghosts /target /gap",
-)
-"""The activations that reach the target, and their shapes."""
-
-
 def _follow_tip(given: Given) -> Results:
     """Follow the latest place that a drag passes; where it rests, that is the target."""
     state, pull, drag = given.state, given.found.pull, given.found.drag
@@ -422,12 +381,9 @@ def _follow_tip(given: Given) -> Results:
 
         yield Learned(known, moved)
     if pull.rests:
-        rested = lambda now: now.without(pull)
+        # another drag may have begun meanwhile
+        rested = lambda now: replace(now, pull=None, lag=None) if now.pull is pull else now
         yield Learned(rested, ends_step=True)
-
-
-DRAG_TIP = Job("drag", "found.pull", _follow_tip, makes="pull lag")
-"""The arm follows its dragged tip on its branch; where that rests, every branch is looked for."""
 
 
 def _follow(given: Given) -> Results:
@@ -454,19 +410,6 @@ def _draw_path(given: Given) -> None:
     given.scene.draw_path(points / length, done / length)
 
 
-FOLLOW_PATH = Job(
-    "path",
-    "design path.points path.start",
-    _follow,
-    _draw_path,
-    wanted="path",
-    makes="track",
-    draws="/path",
-    doing="following the path",
-)
-"""The activations along the path, and where the branch ends."""
-
-
 def _play(given: Given) -> Results:
     track, path = given.found.track, given.state.path
     if track is None or path is None:
@@ -477,10 +420,6 @@ def _play(given: Given) -> Results:
         given.check()
         yield Learned(change=lambda now, k=point: at_point(now, activations, k))
         time.sleep(_STEP)
-
-
-PLAY_PATH = Job("play", "", _play)
-"""Moves the arm along the path."""
 
 
 def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioState:
@@ -497,4 +436,28 @@ def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioS
     return state.replace(path=path, activation=tuple(there.tolist()))
 
 
-JOBS = (SOLVE_INVERSE, DRAG_TIP, FOLLOW_PATH, PLAY_PATH)
+JOBS = (
+    # The activations that reach the target, and their shapes
+    Job(
+        "inverse",
+        "design target",
+        _solve,
+        _draw_answer,
+        wanted="target",
+        makes="answer takes_nearest",
+        draws="/ghosts /target /gap",
+    ),
+    # The arm follows its dragged tip on its branch; where that rests, every branch is looked for
+    Job("drag", "found.pull", _follow_tip, makes="pull lag"),
+    Job(
+        "path",
+        "design path.points path.start",
+        _follow,
+        _draw_path,
+        wanted="path",
+        makes="track",
+        draws="/path",
+        doing="following the path",
+    ),
+    Job("play", "", _play),
+)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from operator import attrgetter
+from typing import Any
+
+import numpy as np
 
 from softreach.studio import markup
 from softreach.studio.captions import legend_text, loaded_share, reach_text
@@ -12,7 +16,7 @@ from softreach.studio.figures import Picture, swept_parameter
 from softreach.studio.found import Found
 from softreach.studio.markup import Part, Strong
 from softreach.studio.scene.camera import VIEWS
-from softreach.studio.scene.colors import color_names, key_html
+from softreach.studio.scene.colors import color_names, key_html, shown_color
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
@@ -34,12 +38,8 @@ def status(panel: Fields) -> None:
     session = panel.session
     known = "found.reach", "found.free", "found.check", "found.key", "found.refusal"
     panel.html("design", *known, *_WORK, content=lambda _, found: _numbers(session, found))
-    cancel = panel.button(
-        _CANCEL,
-        lambda: (session.cancel if session.busy else session.resume)(),
-        _ABOUT_CANCEL,
-        visible=False,
-    )
+    act = lambda: (session.cancel if session.busy else session.resume)()
+    cancel = panel.button(_CANCEL, act, _ABOUT_CANCEL, visible=False)
 
     def offer(_: StudioState, found: Found) -> None:
         lacking = is_behind(session) and not found.refusal
@@ -50,16 +50,14 @@ def status(panel: Fields) -> None:
             cancel.visible = not cancel.visible
 
     panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
-    toast = None
+    toast: Any = None
 
     def note(_: StudioState, __: Found) -> None:
         nonlocal toast
         if toast is not None:
             toast.remove()
-        toast = session.note and session.client.add_notification(
-            "", session.note, auto_close_seconds=_NOTE_SECONDS
-        )
-        toast = toast or None
+        say = partial(session.client.add_notification, auto_close_seconds=_NOTE_SECONDS)
+        toast = say("", session.note) if session.note else None
 
     panel.follow("tab.note", show=note)
     actions = {
@@ -128,12 +126,13 @@ _TOGGLES = {
 
 def view(panel: Fields) -> None:
     """Fields of the appearance."""
-    panel.dropdown(
-        "color by",
-        lambda state: color_names(state.design),
-        Attribute(_color, lambda state, name: state.showing(color=name)),
-        "What the color of a point says; the key is above the tabs",
+    offered = lambda state: color_names(state.design)
+    color = Attribute(
+        lambda state: shown_color(state.design, state.appearance.color),
+        lambda state, name: state.showing(color=name),
     )
+    about = "What the color of a point says; the key is above the tabs"
+    panel.dropdown("color by", offered, color, about)
     with panel.folder("show"):
         for name, (label, hint) in _TOGGLES.items():
             panel.checkbox(label, attribute(f"appearance.{name}"), hint)
@@ -158,12 +157,6 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     panel.slider(unit.label("center"), ends, 0.01 * over, at, "Middle of the slab along the axis")
 
 
-def _color(state: StudioState) -> str:
-    """The color that is shown: a design may have none of the one that is asked for."""
-    color = state.appearance.color
-    return color if color in color_names(state.design) else "rgb"
-
-
 # Plots beside the scene
 
 _HINT = (
@@ -182,7 +175,7 @@ _PLOTS = {
     ),
 }
 _WIDTH = 380  # pixels
-_COMPUTING = "computing ..."
+_NOTHING = np.zeros((1, 1, 4), np.uint8)
 
 
 def plots(panel: Fields) -> None:
@@ -191,7 +184,12 @@ def plots(panel: Fields) -> None:
     for name, (label, hint) in _PLOTS.items():
         panel.checkbox(label, attribute(f"appearance.{name}"), hint)
     about = "What changes in the plot of V against a parameter"
-    panel.dropdown("parameter", _offered, Attribute(_swept, _sweeping), about)
+    offered = lambda state: {s.name: s.label for s in slider_parameters(state.design)} or {"": ""}
+    swept = Attribute(
+        lambda state: one.name if (one := swept_parameter(state)) is not None else "",
+        lambda state, name: state.showing(sweep=True, swept=name),
+    )
+    panel.dropdown("parameter", offered, swept, about)
     window = panel.gui.add_panel(visible=False)
 
     def place(state: StudioState, _: Found) -> None:
@@ -212,26 +210,18 @@ def _figure(panel: Fields, name: str) -> None:
     """A folder with a picture and a line on it."""
     known: Callable[[Found], Picture | None] = attrgetter(name)
 
+    def draw(_: StudioState, found: Found) -> None:
+        if (picture := known(found)) is not None:
+            image.image, image.visible = picture.image, True
+
     def text(state: StudioState, found: Found) -> tuple[str, ...]:
         picture = known(found)
         if picture is None:
-            return (_COMPUTING,)
+            return ("computing ...",)
         old = picture.arm != state.design
         return (picture.text, " · of the design before, computing ..." if old else "")
 
-    with panel.folder(_PLOTS[name][0], f"appearance.{name}") as folder:  # image before its text
-        panel.picture(folder, f"found.{name}", image=lambda _, f: (p := known(f)) and p.image)
+    with panel.folder(_PLOTS[name][0], f"appearance.{name}"):
+        image = panel.gui.add_image(_NOTHING, format="png", visible=False)
+        panel.follow(f"found.{name}", show=draw)
         panel.text("design", f"found.{name}", content=text)
-
-
-def _offered(state: StudioState) -> dict[str, str]:
-    return {slider.name: slider.label for slider in slider_parameters(state.design)} or {"": ""}
-
-
-def _swept(state: StudioState) -> str:
-    parameter = swept_parameter(state)
-    return "" if parameter is None else parameter.name
-
-
-def _sweeping(state: StudioState, name: str) -> StudioState:
-    return state.showing(sweep=True, swept=name)
