@@ -224,10 +224,17 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[tuple[str, A
 
 
 def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, Any]:
-    """Names of the bundles, of all or of some, and the unit of each if they differ."""
+    """Names of the bundles, of all or of some; units if they differ, symbols if units tell none."""
+    names = list(arm.input_names if names is None else names)
     units = _units(arm, names)
-    each = {} if len(set(units)) == 1 else {"unit": ("bundle", list(units))}
-    return {"bundle": list(arm.input_names if names is None else names), **each}
+    of_name = dict(zip(arm.input_names, input_symbols(arm), strict=True))
+    symbols = tuple(of_name[name] for name in names)
+    coordinates: dict[str, Any] = {"bundle": names}
+    if len(set(units)) > 1:
+        coordinates["unit"] = ("bundle", list(units))
+    if symbols != _symbols_of(units):
+        coordinates["symbol"] = ("bundle", list(symbols))
+    return coordinates
 
 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
@@ -238,9 +245,21 @@ def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
 _SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}
 
 
-def activation_symbols(units: Iterable[str]) -> tuple[str, ...]:
-    """Symbols of activations of these units: γ, the tension τ, the pressure P, q in m."""
+def _symbols_of(units: Iterable[str]) -> tuple[str, ...]:
     return tuple(_SYMBOLS.get(unit, "a") for unit in units)
+
+
+def input_symbols(arm: Manipulator) -> tuple[str, ...]:
+    """The symbol of each input: that of the bundle's actuator, or that of the drive's unit."""
+    alone = (arm.bundle_actuators[k].symbol for k in arm.undriven)
+    return (*_symbols_of(drive.unit for drive in arm.drives), *alone)
+
+
+def activation_symbols(activation: xr.DataArray) -> tuple[str, ...]:
+    """The symbol of each bundle of a cloud; those of its units if it names none."""
+    if "symbol" in activation.coords:
+        return tuple(map(str, activation["symbol"].values))
+    return _symbols_of(activation_units(activation))
 
 
 def activation_units(activation: xr.DataArray) -> tuple[str, ...]:

@@ -66,7 +66,8 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     status = {"status": cloud.coords["status"]} if "status" in cloud.coords else {}
     result = xr.Dataset(coords=status, attrs=cloud.attrs)
     result["manipulability"] = ("sample", measure, {"units": unit, "long_name": "√det(J Jᵀ)"})
-    result["condition"] = ("sample", condition, {"units": "1", "long_name": "condition of J"})
+    about = {"units": "1", "long_name": "condition of J", "scale": "log"}
+    result["condition"] = ("sample", condition, about)
     if tip_map.box.bundles == 3:
         result["orientation"] = ("sample", sign, {"units": "1", "long_name": "sign of det J"})
     return result

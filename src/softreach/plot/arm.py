@@ -21,7 +21,7 @@ from softreach.plot.style import (
     a_result,
     figure_style,
     legend_above,
-    pyplot,
+    new_figure,
     some_bundles,
 )
 from softreach.rod.kinematics import rest_configuration
@@ -199,9 +199,10 @@ def plot_designs(
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
     with figure_style():
         heights = [2.6, *[width / len(panels)] * len(stations)]
-        shape = {"height_ratios": heights, "layout": "constrained", "squeeze": False}
+        shape = {"height_ratios": heights, "squeeze": False}
         size = (width, sum(heights) + 0.1)
-        figure, axes = pyplot().subplots(len(heights), len(panels), figsize=size, **shape)
+        figure = new_figure(figsize=size, layout="constrained")
+        axes = figure.subplots(len(heights), len(panels), **shape)
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
             drawn, shown = panel.bundles, length * box

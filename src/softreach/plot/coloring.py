@@ -107,14 +107,15 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
 def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring:
     activation = bundle_activations(cloud)
     names, units = bundle_names(cloud), activation_units(activation)
-    symbols, magnitude = activation_symbols(units), np.abs(activation.values)
+    symbols, magnitude = activation_symbols(activation), np.abs(activation.values)
     if color is None:
         color = "rgb" if len(names) <= _MIXED else "strongest"
     if not isinstance(color, str | int | np.integer) or isinstance(color, bool):
         return _given(color, len(activation))
-    if color in ("strongest", "effort") and color not in names:
-        of_all = _strongest if color == "strongest" else _effort
-        return of_all(magnitude, names, units)
+    if color == "strongest" and color not in names:
+        return _strongest(_comparable(magnitude, units), names, symbols)
+    if color == "effort" and color not in names:
+        return _effort(magnitude, symbols)
     if color == "rgb":
         key = BundleKey(names, activation_colors(np.eye(len(names))), symbols)
         return Coloring(activation_colors(_comparable(magnitude, units)), key)
@@ -136,23 +137,21 @@ def _comparable(activation: Array, units: Sequence[str]) -> Array:
     return activation / np.where(largest > 0, largest, 1.0)
 
 
-def _strongest(magnitude: Array, names: tuple[str, ...], units: Sequence[str]) -> Coloring:
-    shares = _comparable(magnitude, units)
+def _strongest(shares: Array, names: tuple[str, ...], symbols: tuple[str, ...]) -> Coloring:
     known = np.isfinite(shares).all(axis=1) & np.any(shares > 0.0, axis=1)
     colors = np.array([bundle_color(k) for k in range(len(names))])
     table = np.vstack([np.rint(255 * colors), np.full(3, _MISSING)]).astype(np.uint8)
     which = np.where(known, np.argmax(np.where(known[:, None], shares, 0.0), axis=1), len(names))
-    key = BundleKey(names, table[:-1], activation_symbols(units), title="strongest bundle:")
+    key = BundleKey(names, table[:-1], symbols, title="strongest bundle:")
     return Coloring(table[which], key)
 
 
-def _effort(magnitude: Array, names: tuple[str, ...], units: Sequence[str]) -> Coloring:
+def _effort(magnitude: Array, symbols: tuple[str, ...]) -> Coloring:
     """Mean of |γ| over the largest of the cloud, of all bundles that act somewhere."""
     largest = np.asarray(np.nanmax(magnitude, axis=0, initial=0.0))
     acts = largest > 0.0
     share = (magnitude[:, acts] / largest[acts]).sum(axis=1) / max(np.count_nonzero(acts), 1)
-    (symbol, *others) = sorted(set(activation_symbols(units)))
-    symbol = "a" if others else symbol
+    symbol = "a" if len(set(symbols)) > 1 else symbols[0]
     return Coloring(*_scalar(share, f"effort: mean |{symbol}| / max |{symbol}| [-]", 0.0))
 
 

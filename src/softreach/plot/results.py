@@ -11,7 +11,15 @@ from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, 
 from softreach.plot.axes import bounding_box, draw_box, view_extent
 from softreach.plot.coloring import COLORMAP
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import a_result, figure_style, legend_above, pyplot, remark, write_note
+from softreach.plot.style import (
+    a_result,
+    figure_style,
+    legend_above,
+    new_figure,
+    pyplot,
+    remark,
+    write_note,
+)
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import BEST, MET, MISSED
 from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
@@ -59,7 +67,7 @@ def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = N
     rows = math.ceil(len(inputs) / _COLUMNS)
     with figure_style():
         heights = [_SPACE, *[_ROW * rows] * (rows > 0)]
-        figure = pyplot().figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
+        figure = new_figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
         parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         grid = parts[0].add_gridspec(2, 2, width_ratios=[1.25, 1.0])
         _draw_places(parts[0].add_subplot(grid[:, 0]), shown, view)
@@ -191,7 +199,7 @@ def plot_search(search: Any, *, unit: Unit = None) -> Figure:
     shown = _Designs(data, unit_for(length, name if unit is None else unit))
     goals, below = data.sizes["objective"], _ENDS + _LINE * data.sizes["parameter"]
     with figure_style():
-        figure = pyplot().figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
+        figure = new_figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
         grid = figure.add_gridspec(2, 2, height_ratios=[_ABOVE, below], width_ratios=[1.6, 1.0])
         beside = goals == 1 or bool(goals and (~shown.feasible & ~shown.final).any())
         draw = (_draw_missed, _draw_progress, _draw_front, _draw_objectives)[min(goals, 3)]

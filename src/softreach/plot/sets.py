@@ -23,7 +23,8 @@ from softreach.plot.style import (
     a_surface,
     as_axes,
     figure_style,
-    pyplot,
+    label_logarithms,
+    new_figure,
     small_axes,
 )
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number
@@ -119,6 +120,7 @@ def plot_volume_curve(
             if value is not None:
                 ax.axhline(float(counted.of(value, 3)), color="0.3", lw=0.8, ls=style, label=name)
         ax.set(xscale="log", xlabel=counted.label("radius α"), ylim=(0, None))
+        label_logarithms(ax.xaxis, radii)
         ax.set_ylabel(counted.label("V", 3))
         ax.legend(loc="lower right")
     return ax
@@ -163,7 +165,8 @@ def plot_slice(
     with figure_style(ax):
         ax = small_axes(3.4, 4.2) if ax is None else ax
         highest = _draw(ax, layer, view, counted)
-        ax.set_title(f"{axis} = {counted.of(at):.3g} {counted.name}")
+        place = at if abs(at) > 1e-6 * half else 0.0  # no -0, nor what rounding left of 0
+        ax.set_title(f"{axis} = {counted.of(place):.3g} {counted.name}")
         if key:
             below = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 4.5}
             _draw_key(ax, highest, "count" in layer, **below)
@@ -192,7 +195,8 @@ def plot_slices(
     if point.shape != (3,):
         raise InvalidInput("at.shape", point.shape, "a point (x, y, z) [m]")
     with figure_style():
-        figure, axes = pyplot().subplots(1, 3, figsize=_ROW, layout="constrained")
+        figure = new_figure(figsize=_ROW, layout="constrained")
+        axes = figure.subplots(1, 3)
         for ax, view, place in zip(axes, ("side", "front", "top"), point.tolist(), strict=True):
             plot_slice(grid, ax=ax, view=view, at=place, unit=unit, key=False)
         highest = max(int(ax.images[0].get_array().max()) for ax in axes)

@@ -24,12 +24,12 @@ from softreach.plot.axes import bounding_box, view_extent
 from softreach.plot.clouds import drawn_tips, plot_cloud, point_size
 from softreach.plot.coloring import bundle_activations, bundle_names, color_samples, draw_figure_key
 from softreach.plot.lengths import Unit, unit_of
-from softreach.plot.statistics import plot_curvature
-from softreach.plot.style import DPI, PAGE, as_box, figure_style, place_panels, pyplot
+from softreach.plot.statistics import SIDES, plot_curvature
+from softreach.plot.style import DPI, PAGE, as_box, figure_style, new_figure, place_panels
 from softreach.schema import a_cloud, is_stable
 from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_mapping
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput, warn
 from softreach.support.palette import STEEL, activation_colors
 
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
+_KEY = 0.45  # inches above a sheet for its colors
 _VIEW = "oblique"  # of sheets
 _METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
 
@@ -71,7 +72,16 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         ax = plot_curvature({label: curvature_statistics(x) for label, x in those.items()})
         ax.set_title(across.text(last), fontsize=9)
         yield "curvature", ax
-    yield "hulls", plot_hull_sheet(atlas, panels=panels)
+    hulls = plot_hull_sheet(atlas, panels=panels)
+    _frame_compared(hulls)
+    yield "hulls", hulls
+
+
+def _frame_compared(hulls: Figure) -> None:
+    """Frame the two designs that figure 3c compares, the ends of the last column, in its colors."""
+    rows, columns = hulls.axes[0].get_gridspec().get_geometry()
+    for row, color in zip((rows - 1, 0), SIDES, strict=True):
+        hulls.axes[(row + 1) * columns - 1].spines[:].set(color=color, linewidth=1.6)
 
 
 def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
@@ -97,7 +107,7 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
         buffer.draw_points(tips, colors, max(1.0, pixels), view=_VIEW)
         return buffer
 
-    return _sheet(atlas, panels, box, image)
+    return _sheet(atlas, panels, box, image, keyed=True)
 
 
 def plot_hull_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
@@ -192,7 +202,7 @@ def plot_opposite_sides(
         tips = (drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values())
         around = bounding_box(*tips)
     with figure_style():
-        figure = pyplot().figure(figsize=(PAGE, 2 * PAGE / len(clouds) + 0.5))
+        figure = new_figure(figsize=(PAGE, 2 * PAGE / len(clouds) + 0.5))
         panels = figure.subplots(2, len(clouds), squeeze=False)
         figure.subplots_adjust(0.085, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
         for k, (title, cloud) in enumerate(clouds.items()):
@@ -211,6 +221,8 @@ def _sheet(
     panels: int,
     box: Array,
     image: Callable[[xr.Dataset, Extent, int], ZBuffer],
+    *,
+    keyed: bool = False,
 ) -> Figure:
     """A sheet of images of clouds; the threads read and draw them, the caller places them."""
     picked = _thinned(atlas, as_integer("panels", panels, 1))
@@ -219,9 +231,11 @@ def _sheet(
         extent = panel_extent(box, _VIEW)
         wide, high = extent.size.tolist()
         columns, rows = [wide] * len(across.values), [high] * len(up.values)
-        figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, _TOP))
+        top = _KEY if keyed else _TOP
+        figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
         grid = grid[::-1]  # row 0 at the bottom
         _label_sheet(figure, grid, across, up)
+        _name_axes(figure, (across, up), atlas, top)
         across_each = max(16, round(grid[0, 0].get_position().width * PAGE * DPI))
 
         def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
@@ -234,6 +248,9 @@ def _sheet(
                 ax.imshow(rgba, extent=extent, interpolation="none", aspect="auto")
             ax.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
         _draw_scale(figure, grid[0, 0])
+        if keyed and (cloud := _first_cloud(picked)) is not None:
+            key = color_samples(cloud, "rgb").key
+            draw_figure_key(figure, key, top / figure.get_size_inches()[1])
     return figure
 
 
@@ -245,10 +262,21 @@ def _label_sheet(figure: Figure, grid: NDArray[Any], across: SheetAxis, up: Shee
         ax.set_xlabel(f"{value:.4g}", labelpad=3)
     for ax, value in zip(grid[:, 0], up.values, strict=True):
         ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
+
+
+def _name_axes(
+    figure: Figure, axes: tuple[SheetAxis, SheetAxis], atlas: xr.Dataset, top: float
+) -> None:
+    """Symbols of both parameters, and how many of their values are shown."""
     width, height = figure.get_size_inches()
-    middle = (_LEFT + width - _RIGHT) / 2 / width, (_BOTTOM + height - _TOP) / 2 / height
-    figure.text(middle[0], 0.12 / height, across.label, ha="center", fontsize=9)
-    figure.text(0.1 / width, middle[1], up.label, va="center", rotation=90, fontsize=9)
+    middle = (_LEFT + width - _RIGHT) / 2 / width, (_BOTTOM + height - top) / 2 / height
+    sizes = zip(axes, (len(axis.values) for axis in axes), atlas["status"].shape, strict=True)
+    across, up = (
+        axis.label if shown == size else f"{axis.label}, {shown} of {size} values"
+        for axis, shown, size in sizes
+    )
+    figure.text(middle[0], 0.12 / height, across, ha="center", fontsize=9)
+    figure.text(0.1 / width, middle[1], up, va="center", rotation=90, fontsize=9)
 
 
 def _draw_scale(figure: Figure, panel: Axes) -> None:
@@ -272,10 +300,21 @@ def _draw_scale(figure: Figure, panel: Axes) -> None:
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
-    """As many designs along each parameter as there are panels, the ends among them."""
+    """As many designs along each parameter as there are panels at most, the ends among them."""
     sizes = {str(dim): atlas.sizes[dim] for dim in atlas["status"].dims}
-    ends = {dim: np.linspace(0, size - 1, min(size, panels)) for dim, size in sizes.items()}
-    return atlas.isel({dim: np.unique(np.rint(at).astype(int)) for dim, at in ends.items()})
+    return atlas.isel({dim: _evenly(size, panels) for dim, size in sizes.items()})
+
+
+def _evenly(size: int, most: int) -> Index:
+    """Numbers from 0 to size - 1, both among them; at equal steps if that leaves half of `most`."""
+    shown = min(size, most)
+    steps = (n for n in range(shown, shown // 2, -1) if n > 1 and (size - 1) % (n - 1) == 0)
+    return np.rint(np.linspace(0, size - 1, next(steps, shown))).astype(int)
+
+
+def _first_cloud(atlas: xr.Dataset) -> xr.Dataset | None:
+    places = np.ndindex(atlas["status"].shape)
+    return next((cloud for at in places if (cloud := _cloud_at(atlas, *at)) is not None), None)
 
 
 def _cloud_at(atlas: xr.Dataset, column: int, row: int) -> xr.Dataset | None:

@@ -26,8 +26,8 @@ from softreach.plot.style import (
     PAGE,
     as_axes,
     figure_style,
+    new_figure,
     place_panels,
-    pyplot,
     small_axes,
     write_note,
 )
@@ -54,7 +54,7 @@ _LABEL = "mean activation distance D̄"
 _BINS = 60
 _AROUND, _GAPS = (0.75, 0.1, 0.4, 0.55), (0.12, 0.95)  # of panels [inch]
 _a_distance = partial(as_dataset, kind="DataArray")
-_COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
+SIDES = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
 _SYMBOLS = {"bending": "κ", "torsion": "u₃", "extension": "ζ"}
 _COARSE = 64  # bins of a distribution of curvature
 
@@ -122,8 +122,8 @@ def plot_distance_histograms(distances: Mapping[str, xr.DataArray]) -> Figure:
     if not distances:
         raise InvalidInput("distances", "none", "at least one")
     with figure_style():
-        shape = {"figsize": (PAGE, 0.37 * PAGE), "layout": "constrained", "squeeze": False}
-        figure, grid = pyplot().subplots(1, len(distances), sharex=True, **shape)
+        figure = new_figure(figsize=(PAGE, 0.37 * PAGE), layout="constrained")
+        grid = figure.subplots(1, len(distances), sharex=True, squeeze=False)
         edges = np.linspace(0.0, largest_distance(distances.values()), _BINS + 1)
         for ax, (title, distance) in zip(grid[0], distances.items(), strict=True):
             _draw_histogram(ax, distance.values, edges)
@@ -249,13 +249,13 @@ def plot_curvature(
     with figure_style(ax):
         ax = small_axes() if ax is None else ax
         sides = (-1, 1) if len(statistics) == 2 else (0,)
-        for (label, data), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
+        for (label, data), side, color in zip(statistics.items(), sides, SIDES, strict=False):
             scale = units[label].size if per_length else 1.0
             _draw_side(ax, data, quantity, side, color, label, scale)
         ax.set(xlabel=counted.label("station Z"), ylabel=symbol)
         digits = ".2g" if counted.relative else ".4g"
         ax.set_xticks(range(len(places)), [f"{place:{digits}}" for place in places])
-        ax.legend(loc="upper left")
+        ax.legend(loc="upper left", title="width: share of samples / its largest")
     return ax
 
 

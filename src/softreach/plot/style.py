@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from functools import cache
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,7 @@ from softreach.support.files.formats import PAGES, PICTURES, format_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 
@@ -69,6 +71,8 @@ def pyplot() -> Any:
     """
     try:
         from matplotlib import pyplot as plt
+
+        _load_backend(plt)
     except ModuleNotFoundError as error:
         raise MissingExtra(("matplotlib", "plot")) from error
     except ValueError as error:  # of a backend that does not exist
@@ -78,9 +82,24 @@ def pyplot() -> Any:
     return plt
 
 
+@cache
+def _load_backend(plt: Any) -> None:
+    """Load the backend, whose settings the end of a style's context would undo later."""
+    if not plt.get_fignums():
+        plt.switch_backend(plt.get_backend())
+
+
 def figure_style(ax: Axes | None = None) -> AbstractContextManager[None]:
     """Our defaults for a new figure; the caller's axes keep theirs. Text is what it says."""
     return pyplot().rc_context(_TEXT if ax is not None else _RC | _TEXT)
+
+
+def new_figure(**options: Any) -> Figure:
+    """A figure to be returned: a notebook shows what a cell returns, and not a second time."""
+    figure = pyplot().figure(**options)
+    if "inline" in pyplot().get_backend():
+        pyplot().close(figure)
+    return figure
 
 
 def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
@@ -108,7 +127,7 @@ def place_panels(
     scale = (width - left - right - beside * (len(columns) - 1)) / sum(columns)
     wide, high = scale * sum(columns), scale * sum(rows)
     height = bottom + high + between * (len(rows) - 1) + top
-    figure = pyplot().figure(figsize=(width, height))
+    figure = new_figure(figsize=(width, height))
     grid = figure.add_gridspec(
         len(rows),
         len(columns),
@@ -201,9 +220,19 @@ def some_bundles(arm: Manipulator, value: Any) -> list[int]:
 def as_axes(ax: Any) -> Any:
     """Axes of matplotlib, which need not be loaded to know them, or None."""
     known = hasattr(ax, "imshow") and hasattr(ax, "get_figure") and not isinstance(ax, type)
-    if ax is None or known:
+    if ax is None or (known and ax.name != "3d"):
         return ax
-    raise InvalidInput("ax", as_given(ax), "axes of matplotlib, or None")
+    raise InvalidInput("ax", as_given(ax), "axes of matplotlib in two dimensions, or None")
+
+
+def label_logarithms(axis: Axis, values: Array) -> None:
+    """Label a logarithmic axis, with 1, 2 and 5 on it where values span few decades."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    few = float(np.max(values)) < 100 * float(np.min(values))
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def as_box(name: str, value: Any) -> Array:

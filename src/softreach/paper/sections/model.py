@@ -59,7 +59,7 @@ def _asymmetry(arm: Manipulator, seed: int) -> float:
 
 def _draw(arm: Manipulator, notes: Notebook) -> None:
     words = "A helical fiber of the tapered arm, and its cross-section at the base and halfway."
-    helix = [DesignPanel("back", arm, "back", [1])]
+    helix = [DesignPanel("Ω = 108°, left", arm, "left", [1])]
     figure = plot_designs(helix, stations_over_length=(0.0, 0.5), width=1.8)
     notes.draw("1b", "figure_1b_fiber", words, figure)
     words = "The three architectures alone, each above its bundle's place in the cross-section."

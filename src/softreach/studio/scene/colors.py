@@ -14,7 +14,7 @@ from softreach.picture.page import ColorScale
 from softreach.plot.coloring import POWERS, BundleKey, Coloring, ScalarKey, color_samples
 from softreach.plot.figure_3d import page_keys
 from softreach.rod.tip_map import has_tip
-from softreach.schema import activation_symbols
+from softreach.schema import input_symbols
 from softreach.studio import markup
 from softreach.studio.reach import (
     Reach,
@@ -45,7 +45,7 @@ def color_names(arm: Manipulator) -> dict[str, str]:
     names = {"effort": "effort: mean |γ| / max |γ|", "rgb": "all activations (RGB)"}
     if arm.inputs > 3:  # mixtures of more lights cannot be told apart
         names["strongest"] = "strongest bundle"
-    labels = zip(activation_symbols(arm.input_units), box.names, strict=True)
+    labels = zip(input_symbols(arm), box.names, strict=True)
     names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
     names["manipulability"] = "manipulability"
     names["activation distance"] = "activation distance D̄"

@@ -16,7 +16,7 @@ from softreach.export.clouds import path_csv
 from softreach.inverse.drag import Drag
 from softreach.inverse.path import PathStatus, track_path
 from softreach.inverse.request import positions_in
-from softreach.schema import activation_symbols
+from softreach.schema import input_symbols
 from softreach.studio.captions import place_text, tip_text
 from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
 from softreach.studio.found import Found, Lag, Pull
@@ -131,7 +131,7 @@ def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
 
 def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
     """Label and bounds of every bundle."""
-    symbols, units = activation_symbols(arm.input_units), arm.input_units
+    symbols, units = input_symbols(arm), arm.input_units
     kinds = [_KINDS.get(unit) for unit in units]
     labels = [
         (f"{kind} of {name}" if kind else f"{symbol} {name}") + (unit != "1") * f" [{unit}]"
