@@ -12,6 +12,7 @@ class Magnets(Actuator):
     """Magnets at p = distance (cos angle, sin angle) that pull with so many newtons per ampere."""
 
     unit = "A"
+    symbol = "I"
     is_force = True  # it loads the sections, and does not change how long matter is at rest
     default_name = "magnets"
     validity = "While neighbors stay as far apart as at rest: for small strains."

@@ -19,11 +19,13 @@ from softreach.plot import (
     plot_distance_histograms,
     plot_redundancy,
     plot_slab,
+    plot_slice,
     plot_views,
     plot_volume_curve,
     save_figure,
 )
 from softreach.plot.coloring import BundleKey, ScalarKey, color_samples
+from softreach.plot.sheets import evenly
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import activation_colors, bundle_color
 from tests.test_redundancy import made_up
@@ -44,6 +46,14 @@ def four():
 @pytest.fixture(scope="module")
 def bent(trunk):
     return sr.configuration(trunk, [-1.2, -0.3, -0.8], stations=31)
+
+
+@pytest.mark.parametrize(
+    ("size", "places"),
+    [(16, [0, 3, 6, 9, 12, 15]), (7, range(7)), (14, [0, 2, 4, 6, 9, 11, 13]), (1, [0])],
+)
+def test_a_sheet_of_seven_shows_the_ends_and_takes_equal_steps_where_it_can(size, places):
+    assert evenly(size, 7).tolist() == [*places]
 
 
 class TestColors:
@@ -78,6 +88,14 @@ class TestColors:
         assert isinstance(key, BundleKey)
         assert key.names == ("left", "right", "longitudinal")
         np.testing.assert_array_equal(key.colors, 255 * np.eye(3))
+
+    def test_a_cloud_names_the_symbols_of_actuators_that_units_do_not_tell(self, trunk):
+        first, *others = trunk.actuators
+        own = type("Heated", (type(first),), {"symbol": "ΔT", "default_name": "heated"})
+        arm = trunk.replace(actuators=(own(**vars(first)), *others))
+        cloud = sr.compute_cloud(arm, n=10)
+        assert color_samples(cloud, "rgb").key.labels[0] == "|ΔT| left"
+        assert "symbol" not in sr.compute_cloud(trunk, n=10).coords
 
     def test_the_strongest_bundle_gives_its_color_in_pictures_of_the_arm(self, four):
         coloring, magnitude = color_samples(four, "strongest"), np.abs(four.activation.values)
@@ -225,6 +243,26 @@ def test_sectors_stand_where_the_bundles_are_at_that_station(share):
         assert wedge.r == pytest.approx(float(arm.profile.radius(share * arm.length)) / arm.length)
         assert wedge.width == pytest.approx(0.25 * wedge.r)
         assert wedge.get_facecolor()[:3] == bundle_color(k)
+
+
+def test_axes_of_three_dimensions_are_refused():
+    ax = plt.figure().add_subplot(projection="3d")
+    with pytest.raises(InvalidInput, match="two dimensions"):
+        plot_volume_curve({"a": [1.0, 2.0]}, [0.1, 0.2], ax=ax)
+
+
+def test_a_plane_through_the_origin_is_at_zero_without_a_sign(trunk):
+    grid = sr.reachable_set(trunk, accuracy=0.1).grid
+    assert plot_slice(grid, at=-1e-12).get_title() == "y = 0 L"
+
+
+def test_a_notebook_keeps_no_figure_that_its_cell_shows(trunk, cloud, monkeypatch):
+    plt.close("all")
+    monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
+    plot_views(cloud, trunk)
+    assert plt.get_fignums() == []
+    plot_slab(cloud)  # its axes show nothing by themselves
+    assert len(plt.get_fignums()) == 1
 
 
 def test_designs_and_their_sections_share_one_scale():

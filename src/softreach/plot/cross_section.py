@@ -70,8 +70,8 @@ def plot_cross_section(
     arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
     half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
     if legend is None:  # where colors alone leave open what is what
-        shapes, courses = arm.outline(0.0).shape, arm.fiber_directions
-        plain = set(shapes) == {"sector"} and set(courses) == {"along"}
+        courses = {actuator.fiber_direction for actuator in arm.actuators}
+        plain = set(arm.outline(0.0).shape) == {"sector"} and courses == {"along"}
         legend = not plain or len(_section_materials(arm.section)) > 1
     legend = as_flag("legend", legend)
     if not 0 <= z <= arm.length:

@@ -302,10 +302,10 @@ def _draw_scale(figure: Figure, panel: Axes) -> None:
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
     """As many designs along each parameter as there are panels at most, the ends among them."""
     sizes = {str(dim): atlas.sizes[dim] for dim in atlas["status"].dims}
-    return atlas.isel({dim: _evenly(size, panels) for dim, size in sizes.items()})
+    return atlas.isel({dim: evenly(size, panels) for dim, size in sizes.items()})
 
 
-def _evenly(size: int, most: int) -> Index:
+def evenly(size: int, most: int) -> Index:
     """Numbers from 0 to size - 1, both among them; at equal steps if that leaves half of `most`."""
     shown = min(size, most)
     steps = (n for n in range(shown, shown // 2, -1) if n > 1 and (size - 1) % (n - 1) == 0)
