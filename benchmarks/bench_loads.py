@@ -11,6 +11,7 @@ import math
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -207,7 +208,9 @@ def _posture_row(taper: float, load_number: float, base: str, n: int) -> Row:
 def _error(loaded: LoadedRod, gamma: np.ndarray, found: sr.rod.Equilibria) -> float:
     """Largest tip error [L], where the arm is not about to lose its stability."""
     settled = has_tip(found.status) & (np.abs(found.margin) > MARGIN)
-    finer = loaded.solver.halved().near(gamma[settled], found.of(settled))
+    finer = replace(loaded.solver, steps=2 * loaded.solver.steps).near(
+        gamma[settled], found.of(settled)
+    )
     apart = np.linalg.norm(finer.tips - found.tips[settled], axis=1)
     return float(np.nanmax(apart)) / loaded.length
 

@@ -153,10 +153,10 @@ def test_the_body_is_closed_and_keeps_its_volume_at_rest(trunk):
 
 
 def test_bands_are_closed_skins_of_their_thickness(trunk, bent):
-    for skin in bundle_surfaces(trunk, rest_configuration(trunk), thickness=0.1):
+    for skin in bundle_surfaces(trunk, rest_configuration(trunk)):
         mesh = solid(skin)
         assert mesh.is_watertight
-        section = np.radians(48) * 0.1  # of R2², about a mean radius of R2
+        section = np.radians(48) * 0.04  # of R2², about a mean radius of R2
         squares = np.mean(trunk.profile.radius(np.linspace(0, trunk.length, 2001)) ** 2)
         assert mesh.volume == pytest.approx(section * squares, rel=0.01)
     for skin in bundle_surfaces(trunk, bent):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.loaded.pushing_tip import PushingTip, TipResponse
 from softreach.support.arrays import Array, Mask
+from softreach.support.lazy import lazy
 
 _FIRST, _LONGEST, _SHORTEST = 0.05, 0.2, 1e-7  # largest change of an activation, of its range
 _AGAIN_FIRST = 0.01  # the same near the end
@@ -113,13 +114,13 @@ class Growth:
     @property
     def box(self) -> ActivationBox:
         """The activations within bounds."""
-        return self.pushing.box
+        return self.pushing.rod.box
 
-    @cached_property
+    @lazy
     def _begun(self) -> TipResponse:
         return self.pushing.respond(self.box.clip(self.start), 0.0)
 
-    @cached_property
+    @lazy
     def first(self) -> FixedTip | None:
         """The tip at its place without force; None if it is not there or not stable."""
         if not np.isfinite(self._begun.tip).all():
@@ -127,7 +128,7 @@ class Growth:
         fixed = self._corrected(self.box.clip(self.start), 0.0, 0.0, self._begun)
         return fixed if fixed and self._is_stable(fixed) else None
 
-    @cached_property
+    @lazy
     def unit(self) -> float:
         """A force that moves the tip by a fair part of the arm [N]."""
         return _UNIT * self.pushing.rod.length / float(np.linalg.norm(self._begun.retreat))

@@ -239,7 +239,7 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
     of_name = dict(zip(arm.input_names, arm.input_units, strict=True))
-    return tuple(of_name[name] for name in (arm.input_names if names is None else names))
+    return arm.input_units if names is None else tuple(of_name[name] for name in names)
 
 
 _SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}

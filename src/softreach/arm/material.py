@@ -42,6 +42,11 @@ class Material(Part):
     name: str = ""
     """Name in files and pictures."""
 
+    @property
+    def relative_modulus(self) -> float:
+        """E [Pa], or 1 where it cancels and was left out."""
+        return 1.0 if self.young_modulus is None else self.young_modulus
+
     def same_matter(self, other: Material) -> bool:
         """All but the names are equal."""
         return all(

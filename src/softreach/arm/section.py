@@ -85,11 +85,6 @@ class Ring(Part):
         """ρ, inner over outer radius of the ring itself [-]."""
         return self.inner_ratio / self.outer_ratio
 
-    @property
-    def modulus(self) -> float:
-        """E of its material [Pa], or 1 where it cancels and was left out."""
-        return _modulus(self.material)
-
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
         if not faults and self.inner_ratio >= self.outer_ratio:
@@ -260,9 +255,9 @@ class Section(Part):
     @lazy
     def _relative_stiffness(self) -> tuple[float, float, float]:
         """K0/R2² [Pa], K1/R2⁴ and K3/R2⁴ [Pa]."""
-        shear = self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
-        bending = np.pi / 4 * self._sum(_modulus, 4)
-        return np.pi * self._sum(_modulus, 2), bending, np.pi / 4 * shear
+        shear = self._sum(lambda each: each.relative_modulus / (1 + each.poisson_ratio), 4)
+        axial, bending = (self._sum(lambda each: each.relative_modulus, n) for n in (2, 4))
+        return np.pi * axial, np.pi / 4 * bending, np.pi / 4 * shear
 
     def mass_per_length(self, radius: ArrayLike) -> Array:
         """Σ ρ π (R2² - R1²) [kg/m] at R2 [m], that of the materials: theory (49).
@@ -318,10 +313,6 @@ class Section(Part):
             else:
                 merged.append(layer)
         return tuple(merged)
-
-
-def _modulus(material: Material) -> float:
-    return 1.0 if material.young_modulus is None else material.young_modulus
 
 
 def _missing(section: Section, field: str, unit: str, why: str) -> Iterator[Fault]:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
+_THICKNESS = 0.04  # of closed bands, in R2
 _SAME = 1e-9  # of the length, or of R2
 _CARD_STATIONS, _CARD_STEP = 41, np.pi / 27
 
@@ -185,13 +186,12 @@ def bundle_skins(
     return _skins(arm, _drawn_line(arm, shape), sector)
 
 
-def bundle_surfaces(arm: Body, shape: Shape, thickness: float = 0.04) -> list[Surface]:
+def bundle_surfaces(arm: Body, shape: Shape) -> list[Surface]:
     """Every bundle as a closed surface; bands are half sunk into the outside of their ring.
 
     Args:
         arm: The design.
         shape: As for `arm_surface`.
-        thickness: Of bands, in R2 [-].
 
     Raises:
         InvalidInput: Several configurations.
@@ -199,7 +199,7 @@ def bundle_surfaces(arm: Body, shape: Shape, thickness: float = 0.04) -> list[Su
 
     def sector(span: _Span) -> Surface:
         # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
-        upper, lower = (span.band(lift, np.pi / 32) for lift in (thickness / 2, -thickness / 2))
+        upper, lower = (span.band(lift, np.pi / 32) for lift in (_THICKNESS / 2, -_THICKNESS / 2))
         return ribbon_surface(upper, lower)
 
     return _skins(arm, _drawn_line(arm, shape), sector)

@@ -53,7 +53,6 @@ class Stations(NamedFloats):
         return dict.fromkeys(self, PLACE)
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
-        """Z [m]."""
         return (self[name],)
 
     def replace(self, **places: float) -> Stations:
@@ -133,7 +132,6 @@ class Span(Located):
         return start, self.end_over_length if self.end is None else end
 
     def place_faults(self, length: float) -> list[Fault]:
-        """Faults of ends that an arm of a length [m] does not have."""
         faults = super().place_faults(length)
         start, end = self.span(length)
         if faults or end - start >= _SHORTEST * length:

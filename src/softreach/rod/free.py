@@ -67,7 +67,6 @@ class ArmRod(TipMap):
 
     @lazy
     def box(self) -> ActivationBox:
-        """The activations within bounds."""
         return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
 
     @property
@@ -95,10 +94,7 @@ class ArmRod(TipMap):
         return max(self.tol / (1.0 + _LEVER * self.reach / self.length), SMALLEST_TOL)
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """Smallest ζ, or η, along the arm at activations (n, bundles), shape (n,).
-
-        And the largest angle by which a step turns the arm [rad], η |Uγ| R2 dS, shape (n,).
-        """
+        """A step turns the arm by η |Uγ| R2 dS."""
         table, profile = tables_at(self.arm, strain_stations(self.arm)), self.arm.profile
         step = profile.radius(table.stations) * (profile.slender_length / self.steps)
         least, most = np.empty((2, len(gamma)))
@@ -202,7 +198,7 @@ class FreeRod(ArmRod):
             status[:] = TipStatus.STABLE
 
     def farthest(self) -> float:
-        """No tip is farther from the base than this [m], the length of the longest arm."""
+        """The length of the longest arm [m]."""
         return self._linearization.longest_arm
 
     def linearization_error(self, half_widths: Array) -> float:

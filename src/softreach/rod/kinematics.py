@@ -175,11 +175,11 @@ def configuration(
     z, status = stations_along(tip_map, stations), np.empty(len(gamma), np.int8)
     nodes = quadrature(body_of(tip_map.arm))[0] if tip_map.arm.bundles else np.empty(0)
     strained = np.union1d(z, nodes)
-    *frames, curvature, extension = tip_map.shapes(gamma, z, strained, status)
+    position, directors, curvature, extension = tip_map.shapes(gamma, z, strained, status)
     at, on_lines = np.searchsorted(strained, z), np.searchsorted(strained, nodes)
     others = _lines(tip_map, gamma, curvature[:, on_lines], extension[:, on_lines])
     others["marker_position"] = _markers(tip_map, gamma)
-    shapes = Shapes(*frames, curvature[:, at], extension[:, at])
+    shapes = Shapes(position, directors, curvature[:, at], extension[:, at])
     dataset = shape_dataset(tip_map, gamma, z, shapes, **others)
     if tip_map.supports_unstable:
         dataset = schema.with_status(dataset, status)

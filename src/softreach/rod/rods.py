@@ -73,7 +73,6 @@ class ArmMap(TipMap):
 
     @lazy
     def box(self) -> ActivationBox:
-        """Bounds of x."""
         return self.inputs.box
 
     @lazy
@@ -90,7 +89,6 @@ class ArmMap(TipMap):
 
     @property
     def is_smooth(self) -> bool:
-        """True if tips depend smoothly on x within the bounds, on each branch."""
         driving = self.inputs.driving
         return self.rod.is_smooth and (driving is None or driving.is_smooth)
 
@@ -122,7 +120,6 @@ class ArmMap(TipMap):
         status: Status | None = None,
         directions: Array | None = None,
     ) -> None:
-        """Put tips, and what else is asked for, of inputs into place."""
         is_whole = self.unstable or not self.supports_unstable
         if is_whole and self.inputs.are_activations and self.pose.is_identity:
             others = {"twists": twists, "status": status, "directions": directions}

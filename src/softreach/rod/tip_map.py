@@ -125,13 +125,11 @@ class TipMap(ABC):
         shapes = self.shapes(activations, self.check_stations(stations), (), status)
         return Frames(shapes.position, shapes.directors)
 
-    def strains(
-        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
-    ) -> Strains:
-        """Curvature and extension at stations Z [m], in any order; `status` is put into place."""
+    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
+        """Curvature and extension at stations Z [m], in any order."""
         z = self.check_stations(stations, ascending=False)
         ascending, back = np.unique(z, return_inverse=True)
-        shapes = self.shapes(activations, (), ascending, status)
+        shapes = self.shapes(activations, (), ascending)
         if np.array_equal(z, ascending):
             return Strains(shapes.curvature, shapes.extension)
         return Strains(shapes.curvature[:, back], shapes.extension[:, back])

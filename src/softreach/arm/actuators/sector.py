@@ -66,7 +66,7 @@ class SectorActuator(PolarActuator):
         R2 and E are the outer radius and Young's modulus of the ring.
         """
         ring = section.ring(self.ring)
-        radius, scale = profile.radius(z) * ring.outer_ratio, np.pi * ring.modulus
+        radius, scale = profile.radius(z) * ring.outer_ratio, np.pi * ring.material.relative_modulus
         axial, bending, torsion = self.integrals(profile, ring, z)
         theta = self.angles(profile, ring, z)
         share, mean = self.extent / np.pi, 2.0 * np.sin(self.extent / 2.0) / np.pi

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.shooting import Equilibria, turn_between
@@ -57,11 +56,6 @@ class PushingTip:
     rod: LoadedRod
     direction: Array
     steps: int
-
-    @property
-    def box(self) -> ActivationBox:
-        """The activations within bounds."""
-        return self.rod.box
 
     @lazy
     def _tables(self) -> LoadTables:

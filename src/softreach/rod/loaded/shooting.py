@@ -44,7 +44,8 @@ class Equilibria(NamedTuple):
 
     def of(self, rows: slice | Mask | Index) -> Equilibria:
         """Some of them; a slice shares memory."""
-        return Equilibria(*(values[rows] for values in self))
+        tips, status, margin, frame = self
+        return Equilibria(tips[rows], status[rows], margin[rows], frame[rows])
 
     def put(self, rows: slice | Index, others: Equilibria) -> None:
         """Replace some of them."""
