@@ -150,13 +150,22 @@ def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """
     grid = tip_cells(cloud, cell)
     count = grid.count()
+    occupied = count[count > 0]
+    variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
     name = {"long_name": "tips per volume", "units": "m-3"}
     error = {"long_name": "standard error of density", "units": "m-3"}
     return cell_dataset(
         grid,
         density=(count / grid.volume, name),
         density_error=(np.sqrt(count) / grid.volume, error),
-    ).assign_attrs({**cloud.attrs, **_unevenness(count)})
+    ).assign_attrs(
+        {
+            **cloud.attrs,
+            "coefficient_of_variation": float(variation),
+            "chance": float(chance),
+            "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
+        }
+    )
 
 
 def redundancy_summary(
@@ -185,7 +194,7 @@ def redundancy_summary(
     values = distance.values[np.isfinite(distance.values)]
     stable = is_stable(cloud)[evaluated]
     mean = grid.mean(distance.values, evaluated)
-    known = np.isfinite(mean)
+    known, share = np.isfinite(mean), _share(values > threshold)
     heights = np.quantile(values, _SHARES) if len(values) else np.full(len(_SHARES), np.nan)
     return RedundancySummary(
         unit=distance.attrs.get("units", "1"),
@@ -195,8 +204,8 @@ def redundancy_summary(
         median_error=_median_error(values),
         quantiles=dict(zip(_SHARES, heights.tolist(), strict=True)),
         threshold=threshold,
-        redundant_points=_share(values > threshold),
-        redundant_points_error=_share_error(values > threshold),
+        redundant_points=share,
+        redundant_points_error=float(np.sqrt(share * (1.0 - share) / max(len(values), 1))),
         redundant_volume=_share(mean[known] > threshold),
         measured_volume=int(known.sum()) * grid.volume,
         occupied_volume=int(np.count_nonzero(grid.count())) * grid.volume,
@@ -290,23 +299,8 @@ def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
     return ends[:-1] + (place * np.diff(ends)).astype(np.intp)
 
 
-def _unevenness(count: Index) -> dict[str, float]:
-    occupied = count[count > 0]
-    variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
-    return {
-        "coefficient_of_variation": float(variation),
-        "chance": float(chance),
-        "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
-    }
-
-
 def _share(which: Mask) -> float:
     return float(which.mean()) if which.size else np.nan
-
-
-def _share_error(which: Mask) -> float:
-    share = _share(which)
-    return float(np.sqrt(share * (1.0 - share) / which.size)) if which.size else np.nan
 
 
 def _median_error(values: Array) -> float:

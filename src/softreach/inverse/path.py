@@ -87,7 +87,12 @@ def track_path(
         gamma = gamma / tip_map.measures[tip_map.box.free]
         first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
     else:
-        first = _best_start(tip_map, tracker, points[0], residual)
+        options = {"residual_over_length": residual, "from_rest": True}
+        (solution,) = solve_inverse(tip_map, points[:1], **options)
+        first = None
+        if len(solution):
+            best = solution.activations[solution.conditions.argmin()] / tip_map.measures
+            first = tracker.at(best[tip_map.box.free])
     followed, end = ([], None) if first is None else _followed(tracker, first, points)
     tolerances = {"tol": tip_map.tol, "residual_over_length": residual}
     return _dataset(tip_map, points, followed, end).assign_attrs(tolerances)
@@ -302,18 +307,6 @@ def _least_norm(slope: Array, moving: Mask) -> Array:
     return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)
 
 
-def _best_start(
-    tip_map: TipMap, tracker: Continuation, target: Array, residual: float
-) -> BranchPoint | None:
-    solution = solve_inverse(tip_map, target[None], residual_over_length=residual, from_rest=True)[
-        0
-    ]
-    if not len(solution):
-        return None
-    best = solution.activations[solution.conditions.argmin()] / tip_map.measures
-    return tracker.at(best[tip_map.box.free])
-
-
 def _followed(
     tracker: Continuation, first: BranchPoint, points: Array
 ) -> tuple[list[BranchPoint], BranchEnd]:
@@ -332,11 +325,8 @@ def _dataset(
 ) -> xr.Dataset:
     import xarray as xr
 
-    box, n, units = (
-        tip_map.box,
-        len(followed),
-        activation_attributes(tip_map.arm, tip_map.box.names),
-    )
+    box, n = tip_map.box, len(followed)
+    units = activation_attributes(tip_map.arm, box.names)
     outcome = PathStatus.NO_START if end is None else end.status
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED

@@ -20,7 +20,7 @@ from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
-from softreach.support.arrays import Array, as_directions, as_points, joined, rows
+from softreach.support.arrays import Array, Index, Mask, as_directions, as_points, joined, rows
 from softreach.support.errors import Range
 from softreach.workspace.search import CLOSELY, Nearest, nearest_tips
 
@@ -180,7 +180,7 @@ def _solutions(
     bounds: Array | None = None,
 ) -> Solutions:
     """Join roots, sorted by target, and the nearest points to targets without; some are roots."""
-    tip_map, count = prepared.tip_map, len(request.targets)
+    tip_map, whole, count = prepared.tip_map, prepared.whole, len(request.targets)
     missing = roots.missing(count)
     if bounds is None:
         bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
@@ -191,36 +191,47 @@ def _solutions(
     roots = rows(roots, np.lexsort((beside, roots.target))) if beside.any() else roots
     statuses = np.full(count, Status.REACHED, np.int8)
     statuses[missing[~hit]] = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
-    gamma = np.empty((count, tip_map.box.bundles))
-    gaps, proved_gaps = np.zeros((2, count))
-    reached, first = np.unique(roots.target, return_index=True)
-    gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
-    points = request.targets.copy()
-    off = gaps[reached] > request.residual
-    points[reached[off]] = roots.tip[first[off]]
-    points[missing], gamma[missing], gaps[missing] = closest.tips, closest.gamma, closest.distance
+    best, proved_gaps = _nearest_of_all(request, roots, missing, closest), np.zeros(count)
     proved_gaps[missing] = bounds
-    activations, known = prepared.whole.box.with_fixed(roots.gamma), as_tip_map(prepared.whole)
-    leans = np.zeros(len(activations), bool)
-    if isinstance(known.rod, LoadedRod):
-        leans = known.rod.leans(known.inputs.activations(activations))
+    activations = whole.box.with_fixed(roots.gamma)
     maps = [prepared, *prepared.sheets] if roots.sheet.any() else [prepared]
     return Solutions(
-        arm=prepared.whole.arm,
+        arm=whole.arm,
         tip_maps=tuple(all_inputs(each.whole) for each in maps),
-        frame=prepared.whole.frame,
-        bundles=prepared.whole.box.names,
+        frame=whole.frame,
+        bundles=whole.box.names,
         targets=request.targets,
         offsets=np.searchsorted(roots.target, np.arange(count + 1)),
         activations=activations,
         residuals=roots.residual,
         conditions=conditions(roots.slope),
         margins=tip_map.box.margin(roots.gamma),
-        leans=leans,
+        leans=_leans(whole, activations),
         sheets=roots.sheet,
         statuses=statuses,
-        nearest=points,
-        nearest_activations=prepared.whole.box.with_fixed(gamma),
-        gaps=gaps,
+        nearest=best.tips,
+        nearest_activations=whole.box.with_fixed(best.gamma),
+        gaps=best.distance,
         gap_bounds=proved_gaps,
     )
+
+
+def _leans(tip_map: TipMap, activations: Array) -> Mask:
+    known = as_tip_map(tip_map)
+    if isinstance(known.rod, LoadedRod):
+        return known.rod.leans(known.inputs.activations(activations))
+    return np.zeros(len(activations), bool)
+
+
+def _nearest_of_all(request: Request, roots: Roots, missing: Index, closest: Nearest) -> Nearest:
+    """The first root of each target; the nearest point to those that are missing."""
+    count = len(request.targets)
+    gamma = np.empty((count, roots.gamma.shape[1]))
+    nearest = Nearest(gamma, request.targets.copy(), np.zeros(count))
+    reached, first = np.unique(roots.target, return_index=True)
+    nearest.gamma[reached], nearest.distance[reached] = roots.gamma[first], roots.residual[first]
+    off = nearest.distance[reached] > request.residual
+    nearest.tips[reached[off]] = roots.tip[first[off]]
+    for values, of_missing in zip(nearest, closest, strict=True):
+        values[missing] = of_missing
+    return nearest

@@ -179,8 +179,9 @@ class LiftedGrid:
         n, tip_map, shape = self.n, self.tip_map, (self.n + 1,) * 3
         if self.finer is not None:
             return every_node(self.finer.jacobian_dets, self.finer.n // n, self.finer.n)
-        used = np.zeros((n + 1) ** 3, bool)
-        used[cell_corners(n, 3)[~self.is_lifted.ravel()]] = True
+        used = np.full((n + 1) ** 3, not self.is_torn)
+        if self.is_torn:
+            used[cell_corners(n, 3)[~self.is_lifted.ravel()]] = True
         dets = np.where(used, stretches(self.tips[: len(used)], np.array([n] * 3)), 0.0)
         dets *= n**3 / (8.0 * tip_map.box.volume)
         share = _NEARLY_ALL if tip_map.supports_unstable else 1.0  # |det J| grows toward snaps

@@ -96,18 +96,14 @@ def _size(grid: LiftedGrid) -> float:
     return float((np.linalg.norm(pair, axis=-1).sum(axis=0) / 2.0).sum())
 
 
-def _found(tips: Array) -> Array:
-    return tips[np.isfinite(tips[:, 0])]
-
-
 def _convex_volume(grid: LiftedGrid) -> Estimate:
     """Volume of the convex hull of mapped vertices [m³].
 
     It is too small by O(1/n²): a grid with a quarter of the cells along each axis differs by 15
     times the error. A tenth of the difference is stated.
     """
-    grids = grid, grid.coarser(4)
-    fine, coarse = (convex_hull(_found(each.tips)).volume for each in grids)
+    tips = (each.tips[np.isfinite(each.tips[:, 0])] for each in (grid, grid.coarser(4)))
+    fine, coarse = (convex_hull(points).volume for points in tips)
     return Estimate(fine, abs(fine - coarse) / 10.0)
 
 
@@ -225,8 +221,7 @@ def _smooth(tip_map: TipMap, flat: TipMap, area: Estimate) -> Estimate:
     """The area of two bundles that do not fold by Gauss nodes, as far as the outline agrees."""
     if tip_map.box.dimension != 2 or tip_map.supports_unstable or not tip_map.is_smooth:
         return area
-    grid = cube_grid(_SIGNS)[:, :2]
-    sign = np.linalg.det(box_slopes(flat, grid)[1][:, :2])
+    sign = np.linalg.det(box_slopes(flat, cube_grid(_SIGNS, 2))[1][:, :2])
     smooth = by_nodes(tip_map)
     folds = sign.min() * sign.max() <= 0.0 or abs(smooth.value - area.value) > area.error
     return area if folds else smooth
