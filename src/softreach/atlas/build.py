@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.atlas.command import Command
-from softreach.atlas.executor import ExecutorLike, run_designs
+from softreach.atlas.executor import DaskClient, ExecutorLike, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.reading import a_store, contents, open_atlas, over_length
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from zarr.storage import StoreLike
 
 
+_EXECUTORS = "a concurrent.futures executor, or a Dask client"
 _SAMPLE_MEMORY = 700  # bytes of memory of a sample and its share of the triangulation
 
 
@@ -113,11 +114,7 @@ def build_atlas(
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)
     durable = as_flag("durable", durable)
-    if not (
-        executor is None or isinstance(executor, Executor) or hasattr(executor, "get_executor")
-    ):
-        allowed = "a concurrent.futures executor, or a Dask client"
-        raise InvalidInput("executor", as_given(executor), allowed)
+    as_instance("executor", executor, (type(None), Executor, DaskClient), _EXECUTORS)
     progress = None if progress is None else as_function("progress", progress)
     check_sampler(sampler, n, 0, seed)
     check_memory("n", n, _SAMPLE_MEMORY * n)

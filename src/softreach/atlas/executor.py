@@ -20,7 +20,7 @@ from concurrent.futures import (
 )
 from functools import partial
 from itertools import chain, islice
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -42,8 +42,16 @@ Outcome = tuple[int, str]  # Number of a design, and why it failed; empty if it 
 OnOutcome = Callable[[Outcome], None]
 
 
-ExecutorLike = Any
-"""None, an `Executor`, or a `dask.distributed.Client`, which has a method `get_executor`."""
+@runtime_checkable
+class DaskClient(Protocol):
+    """A `dask.distributed.Client`."""
+
+    def get_executor(self, *, pure: bool) -> Executor:
+        """An executor on its cluster; those that are pure compute equal tasks once."""
+        ...
+
+
+ExecutorLike = Executor | DaskClient | None
 
 _opened: dict[tuple[str, int], AtlasStore] = {}  # Stores by the token of a call and the process
 

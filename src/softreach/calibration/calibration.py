@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -92,15 +92,28 @@ def calibrate(
     if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
         warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
     held = _held_out(len(table), hold_out, as_integer("seed", seed))
-    train = table.of(~held)
-    numbers = free_numbers(arm, free, prior)
-    model = MarkerModel.of(numbers, train)
-    progress = as_progress(progress)
+    numbers, progress = free_numbers(arm, free, prior), as_progress(progress)
+    model = MarkerModel.of(numbers, table.of(~held))
 
     def fit_to(model: MarkerModel, places: Array) -> Fit:
         model = replace(model, free=started(model, places))
         return fitted(model, places, robust=robust, noise=noise, progress=progress)
 
+    result = _calibrated(arm, model, table, held, fit_to, noise)
+    result = replace(result, seconds=perf_counter() - begin)
+    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+
+
+def _calibrated(
+    arm: Manipulator,
+    model: MarkerModel,
+    table: Measurements,
+    held: Mask,
+    fit_to: Callable[[MarkerModel, Array], Fit],
+    noise: float | None,
+) -> Calibration:
+    """The fit and what the data says of it; warns of what a user should look at."""
+    train = table.of(~held)
     fit = fit_to(model, train.places)
     if not fit.converged:
         warn(f"the fit did not converge in {fit.evaluations} evaluations: look at its residuals")
@@ -111,16 +124,13 @@ def calibrate(
         held=held,
         fit=fit,
         uncertainty=uncertainty(fit, train, noise),
-        rivals=(),
-        exchange=None,
-        seconds=perf_counter() - begin,
         date=dt.datetime.now(dt.UTC).date().isoformat(),
     )
     _warn_of_numbers(result)
     spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
         result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
-    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+    return result
 
 
 def _held_out(count: int, share: float, seed: int) -> Mask:

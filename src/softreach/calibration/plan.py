@@ -185,8 +185,7 @@ def plan_poses(
     trusted /= np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
     chosen = _chosen(trusted, at, n)
     np.random.default_rng(seed).shuffle(chosen)
-    own = slopes[chosen].reshape(-1, len(numbers))
-    identifiable(numbers, own)
+    identifiable(numbers, own := slopes[chosen].reshape(-1, len(numbers)))
     return PosePlan(numbers, names, inputs[chosen], own.T @ own)
 
 

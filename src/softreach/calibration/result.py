@@ -84,12 +84,12 @@ class Calibration(Reported):
     """Samples that the fit did not see, shape (n,)."""
     fit: Fit
     uncertainty: Uncertainty
-    rivals: tuple[Rival, ...]
-    """Other laws on the same samples."""
-    exchange: tuple[str, float] | None
-    """Columns by whose exchange the same numbers would fit far better, and the error then [m]."""
-    seconds: float
     date: str
+    rivals: tuple[Rival, ...] = ()
+    """Other laws on the same samples."""
+    exchange: tuple[str, float] | None = None
+    """Columns by whose exchange the same numbers would fit far better, and the error then [m]."""
+    seconds: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:

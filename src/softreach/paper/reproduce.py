@@ -58,7 +58,11 @@ class Claim(NamedTuple):
 
 
 _TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
-CLAIMS = tuple(Claim(*name.split("."), **row) for name, row in tomllib.loads(_TEXT).items())
+CLAIMS = tuple(
+    Claim(part, judge, **row)
+    for name, row in tomllib.loads(_TEXT).items()
+    for part, _, judge in [name.partition(".")]
+)
 """Every statement that is checked, in the paper's order."""
 
 _PAPER = (
