@@ -88,7 +88,7 @@ def _refusal(place: Path, mode: int, foreign: Foreign | None, overwrite: bool) -
         return "a new name: a folder that holds other files is never replaced", hint
     if not overwrite:
         hint = "choose another name, or pass --overwrite (in Python overwrite=True)"
-        return "a new name, as this one is taken", hint
+        return "a new name, as something is there", hint
     return ()
 
 
