@@ -57,19 +57,15 @@ def cloud(
         "steps per arm": (sr.rod.as_tip_map(arm, tol).steps, ""),
         "time to compute": (round(seconds, 3), "s"),
         **load_rows(arm),
-        **_status_rows(dataset),
+        **{
+            status.name.lower().replace("_", " "): (int((dataset.status == status).sum()), "")
+            for status in (sr.rod.TipStatus if "status" in dataset else ())
+        },
         "highest tip": (float(dataset.tip[:, 2].max()), "m"),
         "lowest tip": (float(dataset.tip[:, 2].min()), "m"),
         "cloud": (str(out), ""),
     }
     console.rows(f"cloud of {design}", rows, json, arm)
-
-
-def _status_rows(cloud: xr.Dataset) -> Rows:
-    return {
-        status.name.lower().replace("_", " "): (int((cloud.status == status).sum()), "")
-        for status in (sr.rod.TipStatus if "status" in cloud else ())
-    }
 
 
 def volume(

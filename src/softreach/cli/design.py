@@ -181,21 +181,17 @@ def _rest_rows(arm: sr.Manipulator) -> Rows:
 
     if load_number_faults(arm):
         return {}
+    sideways, upright = " sideways", " upright"
     if arm.loads is not None:
         held = stood = _rest(arm)
-        how = "", ""
+        sideways = upright = ""
     else:
         ways = (sr.Loads(gravity=GRAVITIES[way]) for way in ("sideways", "down"))
         held, stood = (_rest(arm.replace(loads=loads, base=sr.Base())) for loads in ways)
-        how = " sideways", " upright"
+    status = stood.status.name.lower() if stood else "unknown: the loads are too large"
     return {
-        f"sag at rest{how[0]}": (None if held is None else held.sag, "m"),
-        f"at rest{how[1]}": (
-            "unknown: the loads are too large"
-            if stood is None
-            else stood.status.name.lower().replace("_", " "),
-            "",
-        ),
+        f"sag at rest{sideways}": (held.sag if held else None, "m"),
+        f"at rest{upright}": (status.replace("_", " "), ""),
     }
 
 

@@ -50,12 +50,16 @@ def warmup(*, only: str | None = None) -> int:
 
 def _free() -> Iterator[object]:
     """Results that need the kernels of arms without loads, each computed when it is asked for."""
+    import numpy as np
+
+    from softreach.picture.zbuffer import Extent, ZBuffer
+
     arm, redundant = sr.designs.minimal_trunk(), sr.designs.redundant_trunk()
     hanging = arm.replace(base=sr.Base(points="down"))
     target, beyond = (0.2, 0.1, 0.6), (2.0, 0.0, 0.0)
     path = (target, (0.2, 0.1, 0.61))
     yield _hulls()
-    yield _triangle()
+    yield ZBuffer(Extent(0, 1, 0, 1), 4).draw_triangles(np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
     yield _calibration()
     yield sr.tip_jacobian(arm, [[-1.0, 0.0, -0.4]])
     yield sr.tip_jacobian(hanging, [[-1.0, 0.0, -0.4]])
@@ -101,14 +105,6 @@ def _hulls() -> None:
     sr.concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
     for design in (sr.designs.minimal_trunk(), sr.designs.redundant_trunk()):
         sr.activation_distance(sr.compute_cloud(design, 2000), 0.1)
-
-
-def _triangle() -> None:
-    import numpy as np
-
-    from softreach.picture.zbuffer import Extent, ZBuffer
-
-    ZBuffer(Extent(0.0, 1.0, 0.0, 1.0), 4).draw_triangles(np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
 
 
 def _loaded() -> Iterator[object]:

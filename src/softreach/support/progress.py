@@ -50,22 +50,16 @@ def bar(label: str | Callable[[], str], total: int | None) -> Iterator[Progress]
     if not sys.stderr.isatty():
         yield _Lines(said, total)
         return
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
+    from rich import console, progress
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(show_speed=True),
-        TimeRemainingColumn(),
+        progress.TextColumn("{task.description}"),
+        progress.BarColumn(),
+        progress.TaskProgressColumn(show_speed=True),
+        progress.TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as display:
+    on_error = console.Console(stderr=True)
+    with progress.Progress(*columns, console=on_error, transient=True) as display:
         task = display.add_task(said(), total=total)
         yield lambda done: display.update(task, advance=done, description=said())
 

@@ -88,7 +88,7 @@ def _refusal(place: Path, mode: int, foreign: Foreign | None, overwrite: bool) -
         return "a new name: a folder that holds other files is never replaced", hint
     if not overwrite:
         hint = "choose another name, or pass --overwrite (in Python overwrite=True)"
-        return "a new name, as this one is taken", hint
+        return "a new name, as something is there", hint
     return ()
 
 
@@ -147,7 +147,9 @@ def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False
         building.mkdir()
         try:
             yield building
-            _sync_tree(building)
+            for folder, _, names in os.walk(building, topdown=False):
+                for name in (*names, ""):  # of the folder last
+                    sync(Path(folder, name))
             check_place(path, overwrite=overwrite, foreign=foreign)
             _discard(new)  # of replacements that were killed: NAME is no older
             _discard(old)
@@ -197,13 +199,6 @@ def sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def _sync_tree(root: Path) -> None:
-    for folder, _, names in os.walk(root, topdown=False):
-        for name in names:
-            sync(Path(folder, name))
-        sync(Path(folder))
 
 
 def _beside(place: Path) -> Path:

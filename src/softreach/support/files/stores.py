@@ -296,21 +296,19 @@ class CheckedStore(WrapperStore[Any]):
             needed = chunk.array in watch.digests if chunk.place is None else watch.required(chunk)
             return "missing" if needed else ""
         if chunk.place is None:
+            text = content.to_bytes()
+            if chunk.array:
+                same = watch.digests.get(chunk.array) == sha256(text)
+                return "" if same else "changed since it was written"
             try:
-                return self._fault_of_document(chunk.array, content.to_bytes())
+                watch.digests = unsealed(text)[ARRAYS]
             except ValueError as error:
                 return str(error)
+            return ""
         numbers: Any = content.as_numpy_array()
         checksum = google_crc32c.value(numbers[:-_CHECKSUM]).to_bytes(_CHECKSUM, "little")
         whole = len(numbers) > _CHECKSUM and numbers[-_CHECKSUM:].tobytes() == checksum
         return "" if whole else "of a wrong checksum"
-
-    def _fault_of_document(self, array: str, text: bytes) -> str:
-        if not array:
-            self.watch.digests = unsealed(text)[ARRAYS]
-            return ""
-        same = self.watch.digests.get(array) == sha256(text)
-        return "" if same else "changed since it was written"
 
 
 def _sync_in(path: Path, root: Path) -> None:
