@@ -16,14 +16,7 @@ from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import (
-    WIDTH,
-    a_result,
-    figure_style,
-    legend_above,
-    pyplot,
-    some_bundles,
-)
+from softreach.plot.style import WIDTH, a_result, figure_style, legend_above, pyplot, some_bundles
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_instance, as_number
@@ -218,11 +211,7 @@ def plot_designs(
 
 
 def plot_check(
-    check: Any,
-    *,
-    ax: Axes | None = None,
-    view: View = "oblique",
-    unit: Unit = None,
+    check: Any, *, ax: Axes | None = None, view: View = "oblique", unit: Unit = None
 ) -> Axes:
     """Draw an arm at the places that it must reach, and the regions that it must keep to.
 

@@ -17,15 +17,7 @@ from softreach.picture.shading import draw_mesh
 from softreach.plot.axes import Panel
 from softreach.plot.coloring import draw_entries
 from softreach.plot.lengths import Unit, unit_for, unit_of
-from softreach.plot.style import (
-    LENGTH,
-    PLACE,
-    a_surface,
-    as_axes,
-    figure_style,
-    pyplot,
-    small_axes,
-)
+from softreach.plot.style import LENGTH, PLACE, a_surface, as_axes, figure_style, pyplot, small_axes
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, Range
@@ -171,10 +163,7 @@ def plot_slice(
 
 
 def plot_slices(
-    grid: xr.Dataset,
-    *,
-    at: Sequence[float] | None = None,
-    unit: Unit = None,
+    grid: xr.Dataset, *, at: Sequence[float] | None = None, unit: Unit = None
 ) -> Figure:
     """Draw the three planes of a reachable set that meet at a point: from the side, front and top.
 

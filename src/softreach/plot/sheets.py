@@ -207,10 +207,7 @@ def plot_opposite_sides(
 
 
 def _sheet(
-    atlas: xr.Dataset,
-    panels: int,
-    box: Array,
-    image: Callable[[xr.Dataset, Extent, int], ZBuffer],
+    atlas: xr.Dataset, panels: int, box: Array, image: Callable[[xr.Dataset, Extent, int], ZBuffer]
 ) -> Figure:
     """A sheet of images of clouds; the threads read and draw them, the caller places them."""
     picked = _thinned(atlas, as_integer("panels", panels, 1))
