@@ -162,15 +162,6 @@ class Spread:
         return quantity(scale * value, unit, 0.01 * scale * self.deviation)
 
 
-def probabilities(signed: Array, sigma: Array) -> Array:
-    """Φ(signed / σ): 0 or 1 where σ is 0 and nothing moves."""
-    from scipy.special import ndtr
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = ndtr(signed / sigma)
-    return np.where(sigma > 0.0, share, (signed >= 0.0).astype(float))
-
-
 class FirstOrder:
     """Sets, their boundaries and what deviations do to them, to first order."""
 
@@ -244,13 +235,16 @@ class FirstOrder:
                 yield within - solid.distance(places), boundary.speed_at(places)
 
     def probability(self, target: Target) -> Array:
-        """Probability that each place is reached, under the worst payload."""
-        sigmas, within = self.deviations.sigmas, max(target.within, TOL * self.solid.arm.length)
-        each = (
-            probabilities(depth, np.linalg.norm(speed * sigmas, axis=1))
-            for depth, speed in self.depths(target.points, within)
-        )
-        return np.min([*each], axis=0)
+        """Φ(depth / σ) of each place under the worst payload: 0 or 1 where nothing moves."""
+        from scipy.special import ndtr
+
+        within, each = max(target.within, TOL * self.solid.arm.length), []
+        for depth, speed in self.depths(target.points, within):
+            sigma = np.linalg.norm(speed * self.deviations.sigmas, axis=1)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = ndtr(depth / sigma)
+            each.append(np.where(sigma > 0.0, share, (depth >= 0.0).astype(float)))
+        return np.min(each, axis=0)
 
     def covered(self, target: Target, places: Array) -> Spread:
         """Share of a region with these places that is covered, under the worst payload."""
@@ -265,6 +259,6 @@ class FirstOrder:
 
 
 def _spread_of(name: str, shares: Array, nominal: float, mean: float, error: float) -> Spread:
-    low, deviation = max(0.0, float(np.quantile(shares, _QUANTILE))), float(shares.std())
-    first = dict(nominal=nominal, mean=mean, deviation=deviation, quantile=low, error=error)
-    return Spread(name=name, unit="1", **first)  # pyright: ignore[reportArgumentType]
+    low = max(0.0, float(np.quantile(shares, _QUANTILE)))
+    known: dict[str, Any] = {"nominal": nominal, "mean": mean, "error": error}
+    return Spread(name=name, unit="1", deviation=float(shares.std()), quantile=low, **known)

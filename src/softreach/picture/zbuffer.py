@@ -57,12 +57,7 @@ class ZBuffer:
         return self._keys.shape[0] // self.oversample, self._keys.shape[1] // self.oversample
 
     def draw_points(
-        self,
-        points: ArrayLike,
-        colors: ArrayLike,
-        size: float = 1.0,
-        *,
-        view: View | None = None,
+        self, points: ArrayLike, colors: ArrayLike, size: float = 1.0, *, view: View | None = None
     ) -> None:
         """Draw discs that face the camera; points that are not finite or outside are left out.
 

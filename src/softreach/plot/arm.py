@@ -219,11 +219,7 @@ def plot_designs(
 
 
 def plot_check(
-    check: Any,
-    *,
-    ax: Axes | None = None,
-    view: View = "oblique",
-    unit: Unit = None,
+    check: Any, *, ax: Axes | None = None, view: View = "oblique", unit: Unit = None
 ) -> Axes:
     """Draw an arm at the places that it must reach, and the regions that it must keep to.
 

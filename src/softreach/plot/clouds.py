@@ -16,15 +16,7 @@ from softreach.plot.arm import arm_images, arm_points, draw_markers, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import color_samples, draw_figure_key, draw_key
 from softreach.plot.lengths import Unit, common_unit, unit_for, unit_of
-from softreach.plot.style import (
-    LENGTH,
-    PAGE,
-    PLACE,
-    SIZE,
-    figure_style,
-    place_panels,
-    write_note,
-)
+from softreach.plot.style import LENGTH, PAGE, PLACE, SIZE, figure_style, place_panels, write_note
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel

@@ -161,10 +161,7 @@ def plot_compliance(
 
 
 def plot_payload_curve(
-    curve: PayloadCurve,
-    *,
-    ax: Axes | None = None,
-    largest: Sequence[LargestPayload] = (),
+    curve: PayloadCurve, *, ax: Axes | None = None, largest: Sequence[LargestPayload] = ()
 ) -> Axes:
     """Draw the share of the reachable volume against the payload, with its errors.
 

@@ -174,10 +174,7 @@ def plot_slice(
 
 
 def plot_slices(
-    grid: xr.Dataset,
-    *,
-    at: Sequence[float] | None = None,
-    unit: Unit = None,
+    grid: xr.Dataset, *, at: Sequence[float] | None = None, unit: Unit = None
 ) -> Figure:
     """Draw the three planes of a reachable set that meet at a point: from the side, front and top.
 

@@ -18,14 +18,7 @@ from softreach.atlas.metrics import METRIC_GROUPS, known_metric
 from softreach.inverse.request import positions_in
 from softreach.requirements.parts import LIMIT_UNITS, LONGEST, MOST_PLACES, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
-from softreach.support.arguments import (
-    POSITIVE,
-    as_given,
-    as_instance,
-    as_number,
-    as_path,
-    as_text,
-)
+from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import (
     Fault,
@@ -385,14 +378,14 @@ class _Reader(FaultReader):
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `WRONG` and a fault where it refuses them."""
-        wrong = {name for name, value in values.items() if value is WRONG}
+        right = {name: value for name, value in values.items() if value is not WRONG}
+        wrong = values.keys() - right.keys()
         if wrong and kind not in _INSTEAD:
             return WRONG
-        values = {name: value for name, value in values.items() if name not in wrong}
         if wrong & {"region", "places"}:
-            values = _INSTEAD[kind] | values
+            right = _INSTEAD[kind] | right
         try:
-            made = kind(**values)
+            made = kind(**right)
             return WRONG if wrong else made
         except NotPossible as error:
             return self._refuse(path, None, str(error))
@@ -418,9 +411,7 @@ class _Reader(FaultReader):
         `plain` ones may go without their unit.
         """
         known = {name: _keys(name, unit) for name, unit in numbers.items()}
-        self._check_keys(
-            raw, path, (*numbers, *others), [key for own in known.values() for key in own]
-        )
+        self._check_keys(raw, path, (*numbers, *others), set().union(*known.values()))
         start, values = f"{path}." if path else "", {}
         for name, unit in numbers.items():
             keys = [key for key in known[name] if key in raw]
