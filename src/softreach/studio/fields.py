@@ -76,7 +76,9 @@ class Fields:
         self.message: Line | None = None
         """Where refusals of widgets stand that have no line of their own; else above all tabs."""
         self.words = words
-        self._followers: list[Callable[[], None]] = []
+        self._followers: list[list[Any]] = []
+        """Each reads what it follows, what that was when it was shown last, and shows it."""
+        self._anew: list[Callable[[], Fields]] = []
         self._bindings: list[_Binding] = []
         self._widgets: list[Any] = []
         self._depth = 0
@@ -84,8 +86,15 @@ class Fields:
 
     def show(self) -> None:
         """Show again what has changed."""
-        for follow in self._followers:
-            follow()
+        session = self.session
+        for follower in self._followers:
+            read, known, show = follower
+            now = read(session)
+            if not all(map(is_, now, known)):
+                follower[1] = now
+                show(session.state, session.found)
+        for fields in self._anew:
+            fields().show()
 
     def remove(self) -> None:
         """Take all widgets away."""
@@ -94,16 +103,8 @@ class Fields:
 
     def follow(self, *paths: str, show: Callable[[StudioState, Found], object]) -> None:
         """Call this at first, and whenever what stands at one of these paths is another object."""
-        read, known = attrgetter("client", *map(in_session, paths)), (object(),)
-
-        def follow() -> None:
-            nonlocal known
-            now = read(self.session)
-            if not all(map(is_, now, known)):
-                known = now
-                show(self.session.state, self.session.found)
-
-        self._followers.append(follow)
+        read = attrgetter("client", *map(in_session, paths))
+        self._followers.append([read, (object(),), show])
 
     def say(self, *parts: Part) -> None:
         """Text that stays."""
@@ -154,7 +155,7 @@ class Fields:
                     build(fields, now)
 
         self.follow(*paths, show=fit)
-        self._followers.append(lambda: fields.show())
+        self._anew.append(lambda: fields)
 
     def checkbox(self, label: str, at: Attribute, hint: str) -> Any:
         """Add a check box."""

@@ -88,13 +88,14 @@ class Job:
     def _deciding(self) -> Callable[[Known], tuple[Any, ...]]:
         return attrgetter("__class__", *map(in_session, self.depends_on.split()))
 
-    def is_wanted(self, known: Known) -> bool:
+    @cached_property
+    def is_wanted(self) -> Callable[[Known], bool]:
         """True if its result is of use."""
-        return not self.wanted or bool(attrgetter(in_session(self.wanted))(known))
+        return attrgetter(in_session(self.wanted)) if self.wanted else lambda _: True
 
     def is_stale(self, old: Known, new: Known) -> bool:
         """True if a change decides another result: of what is known, any other object."""
-        was, wanted = self.is_wanted(old), self.is_wanted(new)
+        was, wanted = bool(self.is_wanted(old)), bool(self.is_wanted(new))
         if not (was and wanted):
             return was != wanted
         return not all(map(_same, self._deciding(old), self._deciding(new)))

@@ -74,8 +74,8 @@ def export(panel: Fields) -> None:
     with panel.folder("this work"):
         about = "Everything that this tab shows, to be loaded again (JSON)"
         state = lambda: session.state_now().to_json().encode()
-        save = lambda: session.send("softreach-studio.json", state)
-        panel.button("Save this work", save, about)
+        keep = lambda: session.send("softreach-studio.json", state)
+        panel.button("Save this work", keep, about)
         read = lambda file: session.restore(state_from(file.name, file.content, session.state))
         hint = "A state (.json) or a design (.toml) that was saved"
         panel.upload("Load state or design", read, hint, **GRAY)
