@@ -293,7 +293,7 @@ class _Arcs(NamedTuple):
         middles = 0.5 * (np.append(0.0, whole[:-1]) + whole)
         each = (part.acts(arm.profile, middles) for part in arm.actuators)
         acts = np.concatenate([np.empty((len(whole), 0), bool), *each], axis=1)
-        gains = Driving(arm).widths[: arm.bundles]
+        gains = np.abs(Driving(arm).gains)[: arm.bundles]
         acts = acts.astype(float) @ gains > 0
         moves = np.ptp(data.inputs, axis=0) > 0
         scale = np.where(moves, np.abs(data.inputs).max(axis=0), 1.0)

@@ -79,7 +79,9 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
 
 def _frame_compared(hulls: Figure) -> None:
     """Frame the two designs that figure 3c compares, the ends of the last column, in its colors."""
-    rows, columns = hulls.axes[0].get_gridspec().get_geometry()
+    grid = hulls.axes[0].get_gridspec()
+    assert grid is not None
+    rows, columns = grid.get_geometry()
     for row, color in zip((rows - 1, 0), SIDES, strict=True):
         hulls.axes[(row + 1) * columns - 1].spines[:].set(color=color, linewidth=1.6)
 

@@ -72,7 +72,7 @@ def pyplot() -> Any:
     try:
         from matplotlib import pyplot as plt
 
-        _load_backend(plt)
+        _load_backend()
     except ModuleNotFoundError as error:
         raise MissingExtra(("matplotlib", "plot")) from error
     except ValueError as error:  # of a backend that does not exist
@@ -83,8 +83,10 @@ def pyplot() -> Any:
 
 
 @cache
-def _load_backend(plt: Any) -> None:
+def _load_backend() -> None:
     """Load the backend, whose settings the end of a style's context would undo later."""
+    from matplotlib import pyplot as plt
+
     if not plt.get_fignums():
         plt.switch_backend(plt.get_backend())
 
