@@ -151,7 +151,7 @@ def test_the_command_takes_columns_priors_and_tied_numbers(folder, capsys):
         (["--free", "rings[0].material.yong_modulus"], "did you mean"),
         (["--free", "pose", "--prior", "pose.x=5"], "a finite number with its unit (m, cm, mm"),
         (["--free", "pose", "--prior", "pose.x"], "NAME=WIDTH or NAME=MEAN:WIDTH"),
-        (["--free", "pose", "--prior", "foo=1"], "of a number that is free"),
+        (["--free", "pose", "--prior", "foo=1"], "with the full name of a free number"),
         (["--free", "pose", "--input", "t 1"], "NAME=COLUMN"),
         (["--free", "pose", "--marker", "tool=a", "--marker", "tool=b"], "given once for tool"),
         (["--free", "pose", "--noise", "loud"], "a length > 0 such as 0.2mm"),
