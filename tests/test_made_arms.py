@@ -75,7 +75,7 @@ class TestSkins:
         arm = mixed_arm()
         for skins in (
             bundle_skins(arm, resting(arm)),
-            bundle_surfaces(arm, resting(arm), thickness=0),
+            bundle_surfaces(arm, resting(arm)),
         ):
             ends = [(skin.vertices[:, 2].min(), skin.vertices[:, 2].max()) for skin in skins]
             for k, (first, last) in {0: (0, 0.62), 1: (0.21, 1), 5: (0.1, 0.8)}.items():
@@ -90,7 +90,7 @@ class TestSkins:
                 return (0.1, 0.2)
 
         arm = one_ring_arm(Pausing(name="cable", place=(0.01, 0.0)))
-        (skin,) = bundle_surfaces(arm, resting(arm, 5), thickness=0.1)
+        (skin,) = bundle_surfaces(arm, resting(arm, 5))
         pieces = solid(skin).split()
         heights = sorted((*piece.bounds[:, 2],) for piece in pieces)
         np.testing.assert_allclose(heights, [(0, 0.1), (0.2, 0.3)], atol=1e-12)

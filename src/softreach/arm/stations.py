@@ -53,6 +53,7 @@ class Stations(NamedFloats):
         return dict.fromkeys(self, PLACE)
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
+        """The place of that name [m], as `Part.values_of` gives numbers."""
         return (self[name],)
 
     def replace(self, **places: float) -> Stations:
