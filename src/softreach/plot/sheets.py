@@ -73,7 +73,8 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         ax.set_title(across.text(last), fontsize=9)
         yield "curvature", ax
     hulls = plot_hull_sheet(atlas, panels=panels)
-    _frame_compared(hulls)
+    if len(those) == len(SIDES):
+        _frame_compared(hulls)
     yield "hulls", hulls
 
 
@@ -236,7 +237,7 @@ def _sheet(
         top = _KEY if keyed else _TOP
         figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
         grid = grid[::-1]  # row 0 at the bottom
-        _label_sheet(figure, grid, across, up)
+        _label_sheet(grid, across, up)
         _name_axes(figure, (across, up), atlas, top)
         across_each = max(16, round(grid[0, 0].get_position().width * PAGE * DPI))
 
@@ -251,12 +252,12 @@ def _sheet(
             ax.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
         _draw_scale(figure, grid[0, 0])
         if keyed and (cloud := _first_cloud(picked)) is not None:
-            key = color_samples(cloud, "rgb").key
+            key = color_samples(cloud.isel(sample=slice(1)), "rgb").key
             draw_figure_key(figure, key, top / figure.get_size_inches()[1])
     return figure
 
 
-def _label_sheet(figure: Figure, grid: NDArray[Any], across: SheetAxis, up: SheetAxis) -> None:
+def _label_sheet(grid: NDArray[Any], across: SheetAxis, up: SheetAxis) -> None:
     for ax in grid.ravel().tolist():
         ax.patch.set_visible(False)
         ax.spines[:].set(color="0.88", linewidth=0.4)

@@ -22,12 +22,25 @@ def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]
         number: Maker of the value of a number with a point or an exponent.
 
     Raises:
-        ValueError: No TOML, whole numbers of thousands of digits, or tables nested without end.
+        ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
     """
     try:
-        return tomllib.loads(text, parse_float=number)
+        tables = tomllib.loads(text, parse_float=number)
+        if not _fit_64_bits(tables):
+            raise OverflowError
+    except tomllib.TOMLDecodeError:
+        raise
+    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
+        raise ValueError("a whole number has more than 64 bits") from None
     except RecursionError:
         raise ValueError("lists or tables are nested too deep") from None
+    return tables
+
+
+def _fit_64_bits(value: Any) -> bool:
+    if isinstance(value, dict | list):
+        return all(map(_fit_64_bits, value.values() if isinstance(value, dict) else value))
+    return not isinstance(value, int) or -(2**63) <= value < 2**63
 
 
 def document_of(
