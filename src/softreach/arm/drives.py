@@ -112,26 +112,16 @@ class Drive(Part):
             return (sizes.pop() if len(sizes) == 1 else math.nan,)
         if name in ("lower", "upper"):
             return (self.bounds[name == "upper"],)
-        owner, _, bundle = name.partition("[")
-        if not bundle:
-            return super().values_of(name, profile, section)
-        return (float(getattr(self, owner)[bundle.removesuffix("]")]),)
+        return super().values_of(name, profile, section)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, or with numbers by the names in `numbers`."""
-        own = [name for name in self.numbers if name != "dead_zone" and name in changes]
-        for field in own:  # the size of all gains before one
-            value = changes.pop(field)
-            if field == "gain":
-                gains = changes.get("gains", self.gains).items()
-                changes["gains"] = {name: math.copysign(value, gain) for name, gain in gains}
-            elif field in ("lower", "upper"):
-                low, high = changes.get("bounds", self.bounds)
-                changes["bounds"] = (low, value) if field == "upper" else (value, high)
-            else:
-                owner, _, bundle = field.partition("[")
-                before = changes.get(owner, getattr(self, owner))
-                changes[owner] = {**before, bundle.removesuffix("]"): value}
+        if "gain" in changes:
+            size, gains = changes.pop("gain"), changes.get("gains", self.gains)
+            changes["gains"] = {name: math.copysign(size, gain) for name, gain in gains.items()}
+        if changes.keys() & {"lower", "upper"}:
+            low, high = changes.get("bounds", self.bounds)
+            changes["bounds"] = (changes.pop("lower", low), changes.pop("upper", high))
         return super().replace(**changes)
 
     def _faults(self) -> list[Fault]:
@@ -161,11 +151,10 @@ class Drive(Part):
                     yield Fault(f"offsets[{name}]", value, "must be that of a bundle in gains")
 
 
-def drive_faults(drives: Any, actuators: Sequence[str], bundles: Sequence[str]) -> Iterator[Fault]:
+def drive_faults(
+    drives: Sequence[Drive], actuators: Sequence[str], bundles: Sequence[str]
+) -> Iterator[Fault]:
     """Faults of the drives of an arm with these actuators and bundles."""
-    if not isinstance(drives, Sequence) or not all(isinstance(each, Drive) for each in drives):
-        yield Fault("drives", drives, "must be a sequence of Drive")
-        return
     taken = [*actuators, *bundles]
     for k, drive in enumerate(drives):
         name = drive.name

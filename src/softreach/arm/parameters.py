@@ -8,6 +8,7 @@ numbers of several parts follow by a law of its own.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -19,7 +20,7 @@ from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.number import Number, alternatives, fields_of
-from softreach.arm.part import faults_under
+from softreach.arm.part import gathered
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
 from softreach.support.arguments import as_instance, as_text, plain
@@ -405,16 +406,11 @@ def _made(arm: Manipulator, edits: _Edits, asked: Mapping[str, float]) -> Manipu
         part = new[key]
         if "bundles" in values and values["bundles"] != part.bundles:  # all have the first's bounds
             values = dict(zip(("lower", "upper"), part.bounds[0].tolist(), strict=True)) | values
-        try:
-            with faults_under(owner_of(key)):
-                new[key] = part.replace(**values)
-        except InvalidDesign as error:
-            faults += error.faults
-    try:
-        if not faults:
+        with gathered(faults, owner_of(key)):
+            new[key] = part.replace(**values)
+    if not faults:
+        with gathered(faults):
             return _assembled(arm, new, inside)
-    except InvalidDesign as error:
-        faults = [*error.faults]
     named = [_as_asked(fault, edits, asked) for fault in faults]
     raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in named}.values()])
 
@@ -485,16 +481,8 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
     return InvalidInput("parameter", name, allowed, hint)
 
 
-def _shortened(names: Iterable[str]) -> list[str]:
-    places: dict[str, list[str]] = {}
-    for name in names:
-        element = _ELEMENT.match(name)
-        base, place = (element[1], f"[{element[2]}]") if element else (name, "")
-        places.setdefault(base, []).append(place)
-    texts: list[str] = []
-    for base, each in places.items():
-        several = [place for place in each if place]
-        alone = [base] if "" in each else []
-        ends = [f"{base}{several[0]} to {several[-1]}"] if len(several) > 1 else []
-        texts += [*alone, *(ends or [base + place for place in several])]
-    return texts
+def _shortened(names: Iterable[str]) -> Iterator[str]:
+    """Elements of a series as `radii[0] to [2]`."""
+    for base, same in itertools.groupby(names, lambda name: _ELEMENT.sub(r"\1[", name)):
+        first, *others = same
+        yield f"{first} to {others[-1][len(base) - 1 :]}" if others else first

@@ -56,9 +56,9 @@ class SectorActuator(PolarActuator):
     def integrals(self, profile: Profile, ring: Ring, z: Array) -> RingIntegrals:
         """I0, I1, I3 of its ring at stations Z [m], each of shape (station,): theory (3)."""
 
-    @abstractmethod
     def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
         """Θ(Z) [rad]: how far the sectors have turned at stations Z [m] from where they begin."""
+        return np.zeros(len(z))
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = E R2² I0 σ and M = E R2³ (I1 a sin θ, -I1 a cos θ, I3 σ), a = 2 sin(σ/2): theory (4).
