@@ -73,8 +73,8 @@ class Block(NamedTuple):
     """One table, a list of tables, text or a number."""
     kind: Any
     """Kind of part that a table describes; None for none."""
-    about: str
-    """Description."""
+    about: str = ""
+    """Description; that of a table alone is its kind's."""
     required: bool = False
 
 
@@ -82,20 +82,16 @@ LAYOUT: Mapping[str, Block] = {
     "version": Block(int, None, "Version of the format", required=True),
     "profile": Block(dict, Profile, "Length and outer radius along the arm", required=True),
     "materials": Block(dict, Material, "Materials by name; others are looked up in the library"),
-    "section": Block(dict, Section, "Inside of the arm"),
+    "section": Block(dict, Section),
     "rings": Block(list, Ring, "Layers that actuators live in", required=True),
     "stations": Block(dict, Stations, "Places along the arm by name, Z [m]"),
-    "actuators": Block(
-        list, Actuator, "In the order of the activations; [] for a passive rod", required=True
-    ),
+    "actuators": Block(list, Actuator, "In the order of activations; [] for none", required=True),
     "rigid_pieces": Block(list, RigidPiece, "Where the arm is not deformed"),
-    "drives": Block(
-        list, Drive, "Inputs that activate bundles, before the bundles that none names"
-    ),
+    "drives": Block(list, Drive, "Inputs that activate bundles; others are inputs themselves"),
     "markers": Block(list, Marker, "Points that go with sections of the arm"),
-    "loads": Block(dict, Loads, "Gravity, payload, forces and moments"),
-    "base": Block(dict, Base, "Where in the world the arm is clamped, and which way it points"),
-    "rest": Block(dict, RestShape, "Curvature and twist of the arm that nothing drives"),
+    "loads": Block(dict, Loads),
+    "base": Block(dict, Base),
+    "rest": Block(dict, RestShape),
     "point": Block(str, None, "Name of the marker that counts as the tip"),
     "display": Block(dict, None, "How the design is shown; it changes nothing about the arm"),
 }
@@ -231,7 +227,9 @@ def one_a_path(faults: Iterable[Fault]) -> list[Fault]:
 def _in_file_terms(fault: Fault, places: Mapping[str, Place]) -> Fault:
     written = [_written(path, places) for path in fault.path.split(", ")]
     names, values = [name for name, _ in written], [value for _, value in written]
-    allowed, value = in_file_units(fault.allowed), fault.value
+    allowed, value = fault.allowed, fault.value
+    if isinstance(allowed, Range) and allowed.unit == "rad":
+        allowed = allowed.in_degrees()
     if any(one is not MISSING for one in values):
         values = [None if one is MISSING else one for one in values]
         value = values[0] if len(values) == 1 else tuple(values)
@@ -259,13 +257,6 @@ def _written(path: str, places: Mapping[str, Place]) -> tuple[str, Any]:
     key = field if field in place.table else place.keys.get(field, field)
     value = MISSING if rest else place.table.get(key, MISSING)
     return f"{place.path}.{key}{rest}".rstrip("."), value
-
-
-def in_file_units(allowed: Range | str) -> Range | str:
-    """The same range of an angle in degrees; anything else as it is."""
-    if isinstance(allowed, Range) and allowed.unit == "rad":
-        return allowed.in_degrees()
-    return allowed
 
 
 def _shown_degrees(value: object) -> object:
