@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from softreach.arm.number import number
+from softreach.arm.number import Triple, number
 from softreach.arm.part import Part, kind_faults
 from softreach.support.errors import Fault
 
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from softreach.arm.base import Base
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
-
-Triple = tuple[float, float, float]
 
 GRAVITY = 9.81
 """g, standard acceleration of what falls [m/s²]."""

@@ -76,6 +76,9 @@ def unit_suffix(unit: str) -> str:
     return _SUFFIXES.get(unit, f"_{unit}")
 
 
+Triple = tuple[float, float, float]
+
+
 class Station(float):
     """Z [m] of a named station, as a part of an arm has it that begins, ends or stands there."""
 
@@ -311,27 +314,18 @@ def own_fields(kind: type) -> frozenset[str]:
 
 
 def series_faults(values: Mapping[str, Any], field: str, per_station: bool = True) -> list[Fault]:
-    """Everything wrong with values given along the arm.
-
-    Args:
-        values: `stations_over_length` and the values themselves.
-        field: Name of the values.
-        per_station: One for each station; else one for each gap between them.
-    """
+    """Everything wrong with `stations_over_length` and a field with a value for each, or a gap."""
     stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])
     ends = stations.ndim == 1 and len(stations) > 1 and stations[0] == 0.0 and stations[-1] == 1.0
     if not ends or not np.isfinite(stations).all() or (np.diff(stations) < _NEAREST).any():
-        allowed = (
-            "must be two or more numbers that rise from 0 (base) to 1 (tip), "
-            f"each by {_NEAREST:g} or more"
-        )
+        rise = "must be two or more numbers that rise from 0 (base) to 1 (tip), each by"
+        allowed = f"{rise} {_NEAREST:g} or more"
         return [Fault("stations_over_length", values["stations_over_length"], allowed)]
     count = len(stations) if per_station else len(stations) - 1
     if along.shape != (count,) or not np.isfinite(along).all():
         where = "station" if per_station else "gap between stations"
-        return [
-            Fault(field, values[field], f"must be {count} finite numbers, one for each {where}")
-        ]
+        allowed = f"must be {count} finite numbers, one for each {where}"
+        return [Fault(field, values[field], allowed)]
     return []
 
 

@@ -233,12 +233,7 @@ class PolarActuator(Actuator):
 
 
 def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
-    """Everything wrong with a pair (lower, upper), or one such pair for each bundle.
-
-    Args:
-        bounds: Activation bounds.
-        bundles: Number of bundles; None where that is not known.
-    """
+    """Everything wrong with a pair (lower, upper), or one for each bundle, if we know how many."""
     pairs, allowed = as_numbers(bounds), ""
     if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
         allowed = "must be a pair (lower, upper), or one such pair for each bundle"

@@ -152,12 +152,10 @@ def _nodes(ratio: Array, tangent: Array) -> tuple[Array, Array]:
 
 
 def cone_integrals(ring: Ring, slope: Array, angle: Array) -> RingIntegrals:
-    """I0, I1, I3 of one ring at stations, each pair of slope and angle integrated once.
+    """I0, I1, I3 of one ring, each pair of slope and angle integrated once, shape (station,).
 
-    Args:
-        ring: The ring.
-        slope: tan φ of the arm's surface, shape (station,); that of the ring is in proportion.
-        angle: α at the outer radius of the ring [rad], shape (station,).
+    The slope is tan φ of the arm's surface, with that of the ring in proportion; the angle is α at
+    the outer radius of the ring [rad].
     """
     pairs, station = np.unique(slope + 1j * angle, return_inverse=True)
     of_ring = np.arctan(pairs.real * ring.outer_ratio)

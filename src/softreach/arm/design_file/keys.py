@@ -37,31 +37,38 @@ from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
-PROFILES: Mapping[str, type[Profile]] = MappingProxyType(
-    {"linear": LinearTaper, "piecewise": PiecewiseTaper, "sampled": SampledTaper}
-)
-"""Profiles by the kind that files know them by."""
+Kind = TypeVar("Kind", bound=Part)
+"""Actuators or profiles."""
 
-ACTUATORS: Mapping[str, type[Actuator]] = MappingProxyType(
-    {
+KINDS: Mapping[type, Mapping[str, type]] = {
+    Actuator: {
         "fiber": FiberArchitecture,
         "oblique_muscle": ObliqueMuscle,
         "radial_muscle": RadialMuscle,
         "tendon": Tendon,
         "length_tendon": LengthTendon,
         "chamber": Chamber,
-    }
-)
-"""Actuators by the kind that files know them by."""
+    },
+    Profile: {"linear": LinearTaper, "piecewise": PiecewiseTaper, "sampled": SampledTaper},
+}
+"""Kinds of actuators and of profiles by the words that files have for them."""
 
-Kind = TypeVar("Kind", bound=Part)
-"""Actuators or profiles."""
+TABLES: Mapping[str, type] = {
+    "material": Material,
+    "ring": Ring,
+    "measured": Measured,
+    "section": Section,
+    "loads": Loads,
+    "point_load": PointLoad,
+    "base": Base,
+    "rest": RestShape,
+    "rigid_piece": RigidPiece,
+    "marker": Marker,
+    "drive": Drive,
+}
+"""Other parts that tables describe."""
 
-KINDS: Mapping[type, Mapping[str, type]] = {Actuator: ACTUATORS, Profile: PROFILES}
-"""Kinds by what they are."""
 _GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
-
-_BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape, RigidPiece, Marker)
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
 
@@ -185,7 +192,7 @@ def known_kinds(of: type[Kind]) -> list[str]:
 @cache
 def _every_key() -> Mapping[str, str]:
     """Field -> key of all parts, but for bounds, whose unit depends on the actuator."""
-    kinds = (*PROFILES.values(), *_BODY, *ACTUATORS.values())
+    kinds = (*KINDS[Profile].values(), *TABLES.values(), *KINDS[Actuator].values())
     keys = {field: key for kind in kinds for field, key in field_keys(kind).items()}
     return MappingProxyType({**keys, "inner_radius": "inner_radius_m", "activation_bounds": ""})
 
@@ -204,13 +211,10 @@ class Place(NamedTuple):
 def in_file_terms(
     error: InvalidDesign, source: str = "", places: Mapping[str, Place] = MappingProxyType({})
 ) -> InvalidDesign:
-    """The same faults under a file's keys and in its units.
+    """The same faults under the keys of a file and in its units.
 
-    Args:
-        error: Faults under the fields of parts.
-        source: Name of the file in the error.
-        places: Places of the parts in the file by their paths in the arm; without them, paths stay
-            but for the field at their end.
+    `places` are those of the parts in the file by their paths in the arm; without them, paths stay
+    but for the field at their end.
     """
     faults = [_in_file_terms(fault, places) for fault in error.faults]
     return InvalidDesign(one_a_path(faults), source)

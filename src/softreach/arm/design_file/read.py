@@ -69,12 +69,7 @@ def document_of(
 
 
 def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
-    """The arm of a TOML text.
-
-    Args:
-        text: The text of a design file.
-        source: Its name in errors.
-        make: Makes the arm of its fields.
+    """The arm that `make` makes of the fields in a TOML text, which errors call `source`.
 
     Raises:
         InvalidDesign: Every fault of the tables, and of the arm that the sound ones make, with

@@ -8,16 +8,11 @@ from typing import Any
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
-from softreach.arm.base import POINTS, Base
-from softreach.arm.body import RestShape
-from softreach.arm.design_file.keys import KINDS, LAYOUT, Block, Key, keys_of
-from softreach.arm.drives import Drive
-from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.base import POINTS
+from softreach.arm.design_file.keys import KINDS, LAYOUT, TABLES, Block, Key, keys_of
 from softreach.arm.material import Material
 from softreach.arm.number import Number
 from softreach.arm.profile import Profile
-from softreach.arm.section import Measured, Ring, Section
-from softreach.arm.stations import Marker, RigidPiece
 from softreach.support.units import UNITS
 
 _Schema = dict[str, Any]
@@ -30,20 +25,6 @@ _ROTATION: _Schema = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItem
 _BY_NAME: _Schema = {"type": "object", "additionalProperties": {"type": "number"}}
 _TEXT: _Schema = {"type": "string"}
 
-_TABLES = {
-    "inline_material": Material,
-    "ring": Ring,
-    "measured": Measured,
-    "section": Section,
-    "drive": Drive,
-    "loads": Loads,
-    "point_load": PointLoad,
-    "base": Base,
-    "rest": RestShape,
-    "rigid_piece": RigidPiece,
-    "marker": Marker,
-}
-
 
 def json_schema() -> dict[str, Any]:
     """The JSON schema (draft 7) of design files of version 2."""
@@ -54,8 +35,9 @@ def json_schema() -> dict[str, Any]:
         "description": "An arm: lengths in m, angles in degrees, the unit in every key.",
         **_object({name: _block(name, block) for name, block in LAYOUT.items()}, required),
         "$defs": {
-            **{name: _table(kind) for name, kind in _TABLES.items()},
+            **{name: _table(kind) for name, kind in TABLES.items()},
             "material": _table(Material, without=("name",)),
+            "inline_material": _table(Material),
             **{n: _table(part, kind=n) for kinds in KINDS.values() for n, part in kinds.items()},
             "own_actuator": _own(Actuator, "kind"),
             "own_profile": _own(Profile, "kind", "length"),
