@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from softreach.arm.number import MOST, NamedFloats, Number, is_path_name, number
+from softreach.arm.number import MOST, NamedFloats, Number, as_numbers, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import Array
@@ -50,8 +50,7 @@ class Drive(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        low, high = (float(plain(bound)) for bound in self.bounds)
-        object.__setattr__(self, "bounds", (low, high))
+        object.__setattr__(self, "bounds", tuple(as_numbers(self.bounds).tolist()))
         for field in ("gains", "offsets"):
             object.__setattr__(self, field, NamedFloats(getattr(self, field)))
 
@@ -133,9 +132,8 @@ class Drive(Part):
         return [*faults, *self._number_faults()]
 
     def _number_faults(self) -> Iterator[Fault]:
-        is_pair = isinstance(self.bounds, Sequence | np.ndarray) and len(self.bounds) == 2
-        bounds = [plain(bound) for bound in self.bounds] if is_pair else []
-        if not is_pair or not all(map(_FINITE.admits, bounds)) or bounds[0] > bounds[1]:
+        pair = as_numbers(self.bounds)
+        if pair.shape != (2,) or not (np.abs(pair) <= MOST).all() or pair[0] > pair[1]:
             allowed = f"must be a pair (lower, upper) of numbers up to {MOST:g}, lower <= upper"
             yield Fault("bounds", self.bounds, allowed)
         bundles = self.gains if isinstance(self.gains, Mapping) else self.offsets

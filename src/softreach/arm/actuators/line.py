@@ -168,10 +168,10 @@ class LengthTendon(Tendon):
         """Displacement at which it becomes taut while the arm keeps its shape [m]."""
         return self.slack - self.pretension * self.compliance
 
-    def by_tension(self, bounds: Array) -> Tendon:
-        """The same tendon driven by its tension within bounds [N], shape (bundles, 2)."""
+    def by_tension(self) -> Tendon:
+        """The same tendon driven by its tension; its bounds are 0 until the arm sets them."""
         same = {field.name: getattr(self, field.name) for field in fields(Tendon)}
-        return Tendon(**same | {"activation_bounds": bounds.tolist()})
+        return Tendon(**same | {"activation_bounds": (0.0, 0.0)})
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
