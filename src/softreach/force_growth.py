@@ -207,10 +207,9 @@ class Growth:
         before = [each for each in path if each.force <= _AGAIN * fixed.force] or path
         cost = np.abs(best.multipliers)
         limits = self._at_bound(fixed.gamma) & (cost > _MULTIPLIER * cost.max(initial=1e-12))
-        if stop is None and np.isnan(best.slope):
-            stop = Stop.UNFINISHED
+        by_itself = Stop.BOUND if limits.any() else Stop.SINGULAR
         if stop is None:
-            stop = Stop.BOUND if limits.any() else Stop.SINGULAR
+            stop = Stop.UNFINISHED if np.isnan(best.slope) else by_itself
         return Grown(fixed, stop, limits & (stop == Stop.BOUND), best.slope, before)
 
     def _is_stable(self, fixed: FixedTip) -> bool:

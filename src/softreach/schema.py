@@ -321,11 +321,12 @@ def storable(dataset: xr.Dataset) -> xr.Dataset:
 
 def stored_names(dataset: xr.Dataset) -> xr.Dataset:
     """The inverse of `storable`: names that xarray can fill, join and pickle."""
-    names = {name: each for name, each in dataset.coords.items() if each.dtype.kind == "T"}
-    texts = {name: np.array(each.values.tolist(), dtype=str) for name, each in names.items()}
-    return dataset.assign_coords(
-        {name: (each.dims, texts[name], each.attrs) for name, each in names.items()}
-    )
+    names = {
+        name: (each.dims, np.array(each.values.tolist(), dtype=str), each.attrs)
+        for name, each in dataset.coords.items()
+        if each.dtype.kind == "T"
+    }
+    return dataset.assign_coords(names)
 
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:

@@ -10,10 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import softreach as sr
-from softreach.arm import PointLoad
 from softreach.arm.base import POINTS
 from softreach.arm.design_file.keys import keys_of
-from softreach.arm.parameters import Written, changed, find_parameter
+from softreach.arm.parameters import Written
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber
@@ -88,19 +87,9 @@ class TestPose:
             sr.Base(**fields)
         assert "\n" not in str(caught.value)
 
-    @pytest.mark.parametrize("base", ["down", None, np.eye(3)])
-    def test_an_arm_takes_no_other_base(self, trunk, base):
-        with pytest.raises(InvalidDesign, match=r"base.*: must be a Base, such as"):
-            trunk.replace(base=base)
-
 
 class TestFiles:
     """`[base]` in design files."""
-
-    @given(base=bases())
-    def test_a_pose_reads_back_to_the_last_bit(self, base):
-        arm = sr.designs.minimal_trunk().replace(base=base)
-        assert sr.Manipulator.from_toml(arm.to_toml()) == arm
 
     def test_an_upright_base_at_the_origin_has_no_table(self, trunk):
         assert "base" not in trunk.to_toml()
@@ -124,35 +113,8 @@ class TestFiles:
         with pytest.raises(InvalidDesign, match=message):
             sr.Manipulator.from_toml(f"{trunk.to_toml()}[base]\n{lines}\n")
 
-    def test_its_numbers_are_parameters_of_a_posed_arm(self, trunk):
-        moved = changed(trunk.replace(base=POSE), {"base.turn": 0.1, "base.position[2]": 2.0})
-        assert moved.base == POSE.replace(turn=0.1, position=(0.3, -0.2, 2.0))
-
 
 # Loads are a part of an arm: values, files, parameters
-
-
-number = st.floats(-1e3, 1e3)
-triples = st.tuples(number, number, number)
-points = st.builds(PointLoad, station=st.floats(0, 1), force=triples, moment=triples)
-loads = st.builds(
-    sr.Loads,
-    gravity=triples,
-    payload=st.floats(0, 1e3),
-    payload_arm=triples,
-    tip_force=triples,
-    tip_moment=triples,
-    follower_force=triples,
-    follower_moment=triples,
-    point_loads=st.lists(points, max_size=2).map(tuple),
-    force_per_length=triples,
-)
-
-
-@given(loads=loads)
-def test_loads_survive_a_design_file_to_the_last_bit(loads):
-    arm = rubber(sr.designs.minimal_trunk(), loads)
-    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
 
 
 def test_an_arm_without_loads_has_no_table_of_them(trunk):
@@ -185,19 +147,6 @@ def test_moduli_and_densities_are_asked_for_by_name(trunk):
     with pytest.raises(InvalidDesign) as caught:
         trunk.replace(loads=sr.Loads(gravity=(0, 0, 0), tip_force=(1, 0, 0)))
     assert [fault.path for fault in caught.value.faults] == ["rings[0].material.young_modulus"]
-
-
-def test_loads_are_nothing_else(trunk):
-    with pytest.raises(InvalidDesign, match="must be Loads or None"):
-        trunk.replace(loads=(0, 0, -9.81))
-
-
-def test_payload_and_gravity_are_parameters(trunk):
-    arm = rubber(trunk, sr.Loads(payload=0.1))
-    assert find_parameter(arm, "loads.payload").value(arm) == 0.1
-    found = changed(arm, {"loads.payload": 0.3, "loads.gravity[2]": -1.62}).loads
-    assert found == sr.Loads(payload=0.3, gravity=(0, 0, -1.62))
-    assert not any(name.startswith("loads") for name in sr.arm.parameters.parameters(trunk))
 
 
 def test_parameters_of_loads_are_written_as_the_keys_of_files(trunk):

@@ -19,8 +19,10 @@ from softreach.arm import (
     Chamber,
     FiberArchitecture,
     LinearTaper,
+    Loads,
     Material,
     Pieces,
+    PointLoad,
     Ring,
     Samples,
     Section,
@@ -30,6 +32,7 @@ from softreach.arm.design_file.schema import json_schema
 from softreach.arm.material import named_material
 from tests.cable import Cable
 from tests.kinds import any_arms
+from tests.laws import bases
 
 FILES = Path(__file__).parents[2] / "designs"
 
@@ -54,10 +57,27 @@ def same(one: sr.Manipulator, other: sr.Manipulator) -> bool:
 NAMES = st.text(st.characters(exclude_categories=["C", "Z"], exclude_characters=".[]"), max_size=8)
 
 
+number = st.floats(-1e3, 1e3)
+triples = st.tuples(number, number, number)
+points = st.builds(PointLoad, station=st.floats(0, 0.05), force=triples, moment=triples)
+loads = st.builds(
+    Loads,
+    gravity=triples,
+    payload=st.floats(0, 1e3),
+    payload_arm=triples,
+    tip_force=triples,
+    tip_moment=triples,
+    follower_force=triples,
+    follower_moment=triples,
+    point_loads=st.lists(points, max_size=2).map(tuple),
+    force_per_length=triples,
+)
+
+
 @st.composite
 def named_arms(draw: st.DrawFn) -> sr.Manipulator:
-    """Any arm with a cable, whose parts have any names that a file can hold, or none."""
-    arm, number = draw(any_arms()), st.floats(-1e3, 1e3)
+    """Any arm with a cable, loads and base, of parts with any names that a file can hold."""
+    arm = draw(any_arms())
     cable = Cable(place=draw(st.tuples(number, number)), activation_bounds=(-0.0, 5e-324))
     actuators = [one.replace(name=draw(NAMES)) for one in (*arm.actuators, cable)]
     rings = []
@@ -67,7 +87,10 @@ def named_arms(draw: st.DrawFn) -> sr.Manipulator:
         rings.append(ring.replace(name=f"{draw(NAMES)}{k}x", material=material))
     kept = [one.replace(ring=0) if hasattr(one, "ring") else one for one in actuators]
     try:
-        return arm.replace(section=arm.section.replace(rings=tuple(rings)), actuators=tuple(kept))
+        section = arm.section.replace(rings=tuple(rings))
+        weighs = not section.density_faults("")
+        others = {"loads": draw(loads) if weighs else None, "base": draw(bases())}
+        return arm.replace(section=section, actuators=tuple(kept), **others)
     except sr.InvalidDesign as error:  # names alike
         assume("name" not in str(error))
         raise

@@ -121,6 +121,7 @@ def test_the_ratio_of_a_ring_is_that_of_its_own_radii():
         (lambda: Ring(inner_ratio=0.5, outer_ratio=0.5), "must be below outer_ratio = 0.5"),
         (lambda: Ring(inner_ratio=0.5, material=0.5), "material = 0.5: must be a Material"),
         (lambda: Section(rings=()), r"section.rings = \(\): must hold one Ring"),
+        (lambda: Section(rings=(Ring(inner_ratio=0.5),), measured=3), "must be Measured or None"),
         (
             lambda: Section(rings=Ring(inner_ratio=0.5)),
             r"section.rings = Ring\(.*must hold one Ring",

@@ -40,6 +40,8 @@ def test_an_impossible_arm_is_refused_with_value_and_allowed_range(trunk, change
         ({"profile": 1.0}, "profile = 1: must be a Profile"),
         ({"section": Ring(inner_ratio=0.5)}, "section = Ring.*: must be a Section"),
         ({"actuators": iter(())}, "must be a sequence"),
+        ({"base": np.eye(3)}, r"base.*: must be a Base, such as"),
+        ({"loads": (0, 0, -9.81)}, "must be Loads or None"),
     ],
 )
 def test_parts_of_another_kind_are_refused(trunk, change, message):

@@ -16,11 +16,13 @@ from softreach.arm.actuators import (
     Tendon,
 )
 from softreach.arm.along import Samples
+from softreach.arm.base import Base
+from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.parameters import Written, changed, find_parameter, parameters, shifted
 from softreach.arm.profile import PiecewiseTaper
-from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.section import Measured, Ring, Section, name_faults
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.cable import Cable
@@ -40,7 +42,12 @@ def made_arm() -> Manipulator:
         profile=PiecewiseTaper(
             length=0.3, stations_over_length=(0.0, 0.4, 1.0), radii=(0.02, 0.015, 0.01)
         ),
-        section=Section(rings=rings, core=Material(young_modulus=5e4), bore_ratio=0.1),
+        section=Section(
+            rings=rings,
+            core=Material(young_modulus=5e4, density=900.0),
+            bore_ratio=0.1,
+            measured=Measured(bending_stiffness=0.1, mass_per_length=0.3),
+        ),
         actuators=(
             FiberArchitecture(
                 name="left", ring="skin", helical_angle=SAMPLED, extent=0.5, bundles=2
@@ -54,6 +61,8 @@ def made_arm() -> Manipulator:
             ),
             Chamber(name="air", distance_ratio=0.5, radius_ratio=0.1, activation_bounds=(0.0, 1e4)),
         ),
+        loads=Loads(payload=0.1),
+        base=Base(position=(0.3, -0.2, 1.5), points="down", turn=0.7),
     )
 
 

@@ -26,7 +26,7 @@ from softreach.arm import (
 )
 from softreach.arm.body import load_number, mass
 from softreach.arm.loads import GRAVITY
-from softreach.arm.parameters import changed, parameters
+from softreach.arm.parameters import changed
 from softreach.arm.tables import compliance, tables
 from softreach.rod.summary import describe
 from softreach.support.errors import InvalidDesign
@@ -328,11 +328,6 @@ def test_what_is_still_needed_is_asked_for(given, changes, message):
         tube(sr.Material(), measured=Measured(**given), **changes)
 
 
-def test_a_measurement_is_measured():
-    with pytest.raises(InvalidDesign, match=r"section.measured = 3: must be Measured or None"):
-        sr.Section(rings=(sr.Ring(inner_ratio=0.5),), measured=3)
-
-
 def test_files_hold_what_was_measured():
     along = Pieces(stations_over_length=(0.0, 0.5, 1.0), values=(0.1, 0.2))
     made = tube(measured=Measured(bending_stiffness=along, mass_per_length=0.1 + 0.2))
@@ -340,16 +335,6 @@ def test_files_hold_what_was_measured():
     assert sr.Manipulator.from_toml(made.to_toml()) == made
 
 
-def test_measured_numbers_are_parameters():
-    values = numbers()
-    made = tube(measured=Measured(**values))
-    for field, value in values.items():
-        name = f"measured.{field}"
-        assert parameters(made)[name].value(made) == value
-        assert changed(made, {name: 2 * value}) == tube(
-            measured=Measured(**values | {field: 2 * value})
-        )
-    with pytest.raises(InvalidDesign, match=r"measured.bending_stiffness = -1: must be"):
-        changed(made, {"measured.bending_stiffness": -1.0})
+def test_what_was_not_measured_is_no_parameter():
     with pytest.raises(sr.InvalidInput, match="nothing was measured on the arm"):
         changed(tube(), {"measured.bending_stiffness": 1.0})
