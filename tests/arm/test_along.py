@@ -123,24 +123,6 @@ def test_at_the_end_of_a_piece_holds_what_begins_there():
     assert hash(pieces) == hash(pieces.replace())
 
 
-TWO = {"stations_over_length": (0, 1)}
-
-
-@pytest.mark.parametrize(
-    ("make", "fields", "message"),
-    [
-        (Pieces, {**TWO, "values": (1, 2)}, "values = .*must be 1 finite"),
-        (Samples, {"stations_over_length": (1, 0), "values": (1, 2)}, "rise from 0"),
-        (Samples, {**TWO, "values": (1, 2), "interpolation": "spline"}, "must be one of cubic, l"),
-        (fiber, {"angle": Samples(values=(0, 2), **TWO)}, "helical_angle = 2: "),
-        (fiber, {"angle": 0.1, "revolution": 0.2}, "give exactly one of helical_angle and revol"),
-    ],
-)
-def test_what_cannot_be_along_an_arm_is_refused(make, fields, message):
-    with pytest.raises(InvalidDesign, match=message):
-        make(**fields)
-
-
 # Laws of the lines along which bundles run: closed forms, and the drawn shape as an oracle
 
 

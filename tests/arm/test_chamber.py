@@ -141,23 +141,3 @@ def test_sizes_that_are_ratios_shrink_with_the_arm_and_lengths_do_not():
     ]
     area = math.pi * 0.004**2
     np.testing.assert_allclose(ends, [[area, area], [area, area * share**2]], rtol=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"distance_ratio": 0.5}, "give exactly one of distance and distance_ratio"),
-        ({"radius_ratio": 0.2}, r"\(0.004, 0.2\): give exactly one of radius and radius_ratio"),
-    ],
-)
-def test_an_impossible_chamber_is_refused_in_one_line(fields, message):
-    with pytest.raises(InvalidDesign, match=message) as caught:
-        chamber(**fields)
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_replacing_lengths_by_ratios_and_back():
-    by_ratio = chamber().replace(distance_ratio=0.5, radius_ratio=0.2)
-    assert (by_ratio.distance, by_ratio.radius) == (None, None)
-    assert by_ratio.replace(distance=0.008, radius=0.004) == chamber()
-    assert by_ratio.value_on("radius", CYLINDER, SECTION) == pytest.approx(0.2 * RADIUS)

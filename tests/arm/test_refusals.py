@@ -157,6 +157,70 @@ def test_a_part_is_refused_by_the_name_of_its_field_or_can_be_computed_with(kind
         assert complaint or np.isfinite(tips).all()
 
 
+TWO = {"stations_over_length": (0, 1)}
+BEYOND_SENSE = Samples(**TWO, values=(0, 2))
+IMPOSSIBLE = [
+    (
+        Tendon,
+        {"distance_ratio": 0.5},
+        r"\(0.01, 0.5\): give exactly one of distance and",
+    ),
+    (Tendon, {"distance": (0.01, 0.02, 0.03)}, "must be .*, or two at its ends, or Samples"),
+    (
+        Tendon,
+        {"routing": 0.3, "revolution": 0.0},
+        "routing = 0.3: must be Samples along the arm, or None",
+    ),
+    (Tendon, {"routing": BEYOND_SENSE}, "give exactly one of routing and revolution"),
+    (
+        Tendon,
+        {"activation_bounds": (-1, 5)},
+        "must be at least 0 N: a tendon pulls and",
+    ),
+    (Chamber, {"distance_ratio": 0.5}, "give exactly one of distance and distance_ratio"),
+    (
+        Chamber,
+        {"radius_ratio": 0.2},
+        r"\(0.005, 0.2\): give exactly one of radius and",
+    ),
+    (ObliqueMuscle, {"helical_angle": Pieces(**TWO, values=(0.1,))}, r"Pieces\(.*a finite number"),
+    (FiberArchitecture, {"helical_angle": BEYOND_SENSE}, "helical_angle = 2: "),
+    (FiberArchitecture, {"revolution": 0.2}, "give exactly one of helical_angle and revol"),
+    (Pieces, TWO | {"values": (1, 2)}, "values = .*must be 1 finite"),
+    (Samples, {"stations_over_length": (1, 0), "values": (1, 2)}, "rise from 0"),
+    (Samples, {"interpolation": "spline"}, "must be one of cubic, l"),
+    (Ring, {"outer_ratio": 0.5}, "must be below outer_ratio = 0.5"),
+    (Ring, {"material": 0.5}, "material = 0.5: must be a Material"),
+    (Section, {"rings": ()}, r"section.rings = \(\): must hold one Ring"),
+    (Section, {"rings": RING}, r"section.rings = Ring\(.*must hold one Ring"),
+    (
+        Section,
+        {"rings": (RING.replace(outer_ratio=0.9),)},
+        r"\[0\].outer_ratio = 0.9: must be 1",
+    ),
+    (Section, {"measured": 3}, "section.measured = 3: must be Measured or None"),
+]
+
+
+@pytest.mark.parametrize(("kind", "fields", "message"), IMPOSSIBLE)
+def test_an_impossible_part_is_refused_in_one_line(kind, fields, message):
+    with pytest.raises(InvalidDesign, match=message) as caught:
+        kind(**SOUND[kind] | fields)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "field"), [(Tendon, "distance"), (Chamber, "distance"), (Chamber, "radius")]
+)
+def test_one_of_two_ways_to_say_a_number_replaces_the_other_and_back(kind, field):
+    given, body = kind(**SOUND[kind]), (LinearTaper(length=1.0, outer_radius=0.04), SOUND[Section])
+    by_ratio = given.replace(**{f"{field}_ratio": 0.7})
+    assert getattr(by_ratio, field) is None
+    assert by_ratio.replace(**{field: getattr(given, field)}) == given
+    assert by_ratio.value_on(field, *body) == pytest.approx(0.7 * 0.04)
+    assert given.value_on(f"{field}_ratio", *body) == pytest.approx(getattr(given, field) / 0.04)
+
+
 def test_faults_of_parts_that_do_not_fit_are_named_with_the_actuator():
     section = Section(rings=(Ring(inner_ratio=0.5),))
     with pytest.raises(InvalidDesign) as caught:

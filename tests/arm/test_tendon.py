@@ -218,33 +218,6 @@ def test_tendons_break_the_arm_where_they_start_end_and_turn():
     np.testing.assert_allclose(arm(one, profile=profile).breakpoints, [0.1, 0.3, 0.5, 0.75])
 
 
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"distance_ratio": 0.5}, r"\(0.008, 0.5\): give exactly one of distance and distance_r"),
-        ({"distance": (0.01, 0.02, 0.03)}, "must be .*, or two at its ends, or Samples"),
-        ({"routing": 0.3}, "routing = 0.3: must be Samples along the arm, or None"),
-        (
-            {"routing": Samples(stations_over_length=(0, 1), values=(0, 1)), "revolution": 1.0},
-            "give exactly one of routing and revolution",
-        ),
-        ({"activation_bounds": (-1, 5)}, "must be at least 0 N: a tendon pulls and cannot push"),
-    ],
-)
-def test_an_impossible_tendon_is_refused_in_one_line(fields, message):
-    with pytest.raises(InvalidDesign, match=message) as caught:
-        tendon(**fields)
-    assert len(str(caught.value).splitlines()) == 1
-
-
-def test_replacing_a_distance_by_a_ratio_and_back():
-    by_ratio = tendon().replace(distance_ratio=0.7)
-    assert (by_ratio.distance, by_ratio.distance_ratio) == (None, 0.7)
-    assert by_ratio.replace(distance=0.008) == tendon()
-    assert by_ratio.value_on("distance", STRAIGHT, SECTION) == pytest.approx(0.7 * RADIUS)
-    assert tendon().value_on("distance_ratio", STRAIGHT, SECTION) == pytest.approx(0.8)
-
-
 def test_millimeters_taken_for_meters_are_refused():
     """Such an arm would curl up so far that no search of it ends."""
     with pytest.raises(
