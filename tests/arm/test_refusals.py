@@ -160,29 +160,13 @@ def test_a_part_is_refused_by_the_name_of_its_field_or_can_be_computed_with(kind
 TWO = {"stations_over_length": (0, 1)}
 BEYOND_SENSE = Samples(**TWO, values=(0, 2))
 IMPOSSIBLE = [
-    (
-        Tendon,
-        {"distance_ratio": 0.5},
-        r"\(0.01, 0.5\): give exactly one of distance and",
-    ),
+    (Tendon, {"distance_ratio": 0.5}, r"\(0.01, 0.5\): give exactly one of distance and"),
     (Tendon, {"distance": (0.01, 0.02, 0.03)}, "must be .*, or two at its ends, or Samples"),
-    (
-        Tendon,
-        {"routing": 0.3, "revolution": 0.0},
-        "routing = 0.3: must be Samples along the arm, or None",
-    ),
+    (Tendon, {"routing": 0.3, "revolution": 0.0}, "routing = 0.3: must be Samples along the arm"),
     (Tendon, {"routing": BEYOND_SENSE}, "give exactly one of routing and revolution"),
-    (
-        Tendon,
-        {"activation_bounds": (-1, 5)},
-        "must be at least 0 N: a tendon pulls and",
-    ),
+    (Tendon, {"activation_bounds": (-1, 5)}, "must be at least 0 N: a tendon pulls and"),
     (Chamber, {"distance_ratio": 0.5}, "give exactly one of distance and distance_ratio"),
-    (
-        Chamber,
-        {"radius_ratio": 0.2},
-        r"\(0.005, 0.2\): give exactly one of radius and",
-    ),
+    (Chamber, {"radius_ratio": 0.2}, r"\(0.005, 0.2\): give exactly one of radius and"),
     (ObliqueMuscle, {"helical_angle": Pieces(**TWO, values=(0.1,))}, r"Pieces\(.*a finite number"),
     (FiberArchitecture, {"helical_angle": BEYOND_SENSE}, "helical_angle = 2: "),
     (FiberArchitecture, {"revolution": 0.2}, "give exactly one of helical_angle and revol"),
@@ -193,11 +177,7 @@ IMPOSSIBLE = [
     (Ring, {"material": 0.5}, "material = 0.5: must be a Material"),
     (Section, {"rings": ()}, r"section.rings = \(\): must hold one Ring"),
     (Section, {"rings": RING}, r"section.rings = Ring\(.*must hold one Ring"),
-    (
-        Section,
-        {"rings": (RING.replace(outer_ratio=0.9),)},
-        r"\[0\].outer_ratio = 0.9: must be 1",
-    ),
+    (Section, {"rings": (RING.replace(outer_ratio=0.9),)}, r"\[0\].outer_ratio = 0.9: must be 1"),
     (Section, {"measured": 3}, "section.measured = 3: must be Measured or None"),
 ]
 
