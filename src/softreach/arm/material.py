@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from types import MappingProxyType
@@ -49,11 +49,7 @@ class Material(Part):
 
     def same_matter(self, other: Material) -> bool:
         """All but the names are equal."""
-        return all(
-            getattr(self, field.name) == getattr(other, field.name)
-            for field in fields(self)
-            if field.name != "name"
-        )
+        return self.replace(name="") == other.replace(name="")
 
 
 @dataclass(frozen=True)

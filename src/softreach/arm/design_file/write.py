@@ -121,10 +121,8 @@ def _pairs(part: Part, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str
 
 @cache
 def _ordered_keys(kind: type) -> list[Key]:
-    def rank(key: Key) -> int:
-        return _ORDER.index(key.field if key.field in _ORDER else "")
-
-    return sorted(keys_of(kind).values(), key=rank)
+    keys = keys_of(kind).values()
+    return sorted(keys, key=lambda key: _ORDER.index(key.field if key.field in _ORDER else ""))
 
 
 def _text(key: str, value: Any) -> str:
