@@ -162,8 +162,9 @@ class Manipulator(Body):
             faults.append(Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m"))
         parts: dict[str, Any] = {}
         with gathered(faults):
-            radii = {"outer_radius": outer_radius, "tip_radius": tip_radius}
-            parts["profile"] = LinearTaper(length=length, taper=taper, **radii)
+            parts["profile"] = LinearTaper(
+                length=length, taper=taper, outer_radius=outer_radius, tip_radius=tip_radius
+            )
         with gathered(faults):
             parts["material"] = Material(
                 young_modulus=young_modulus, poisson_ratio=poisson_ratio, density=density

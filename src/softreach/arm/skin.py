@@ -253,9 +253,9 @@ def _skins(arm: Body, shape: Shape, sector: Callable[[_Span], Surface]) -> list[
 
     def span(k: int, part: slice) -> _Span:
         along = (outline.center, outline.inner_ratio, outline.outer_ratio)
-        bundle = (values[part, k] for values in along)
-        extent = float(outline.extent[k])
-        return _Span(extent, line.position[part], line.directors[part], *bundle, radius[part])
+        center, inner, outer = (values[part, k] for values in along)
+        section = line.position[part], line.directors[part]
+        return _Span(float(outline.extent[k]), *section, center, inner, outer, radius[part])
 
     return [
         joined([make[kind](span(k, part)) for part in _runs(acts[:, k])])

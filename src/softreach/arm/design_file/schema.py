@@ -129,13 +129,13 @@ def _value(part: type, key: Key) -> _Schema:
 
 def _number(number: Number) -> _Schema:
     allowed = number.allowed.in_degrees() if number.unit == "rad" else number.allowed
-    about = {"description": f"{number.symbol}: {number.meaning} [{allowed.unit or '-'}]"}
+    about: _Schema = {"description": f"{number.symbol}: {number.meaning} [{allowed.unit or '-'}]"}
     single: _Schema = {"type": "integer" if allowed.whole else "number"}
     if allowed.low > -math.inf:
         single["exclusiveMinimum" if allowed.open_low else "minimum"] = allowed.low
     if allowed.high < math.inf:
         single["exclusiveMaximum" if allowed.open_high else "maximum"] = allowed.high
-    series = {"type": "array", "items": single}
+    series: _Schema = {"type": "array", "items": single}
     shapes = {"triple": _TRIPLE, "stations": _NUMBERS, "series": series}
     if number.shape in shapes or number.along is None:
         return about | shapes.get(number.shape, single)
