@@ -141,8 +141,8 @@ def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | N
     activation, begun = np.full((2, n, bundles), np.nan)
     status, limit = np.full(n, Stop.NO_START, np.int8), np.zeros((n, bundles), bool)
     settles = np.zeros(n, bool)
-    found = [(k, result) for k, result in enumerate(best) if result is not None]
-    for k, (start, end, tip_error, settled) in found:
+    known = [(k, result) for k, result in enumerate(best) if result is not None]
+    for k, (start, end, tip_error, settled) in known:
         force[k], status[k], settles[k] = end.fixed.force, end.stop, settled
         error[k], limit[k] = end.slope * tip_error, end.limits[:bundles]
         activation[k], begun[k] = end.fixed.gamma[:bundles], start[:bundles]

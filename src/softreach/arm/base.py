@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.number import Triple, as_numbers, number
-from softreach.arm.part import Part
+from softreach.arm.number import as_numbers, number
+from softreach.arm.part import Part, Triple
 from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault
 from softreach.support.lazy import lazy

@@ -116,9 +116,9 @@ class Body:
     """Loads beside the actuators; None for nothing, not even its weight."""
 
     def __post_init__(self) -> None:
-        for faults in (self._faults, self._settle, self._fit_faults):  # each needs those before
-            if found := faults():
-                raise InvalidDesign(found)
+        for judge in (self._faults, self._settle, self._fit_faults):  # each needs those before
+            if faults := judge():
+                raise InvalidDesign(faults)
 
     def _faults(self) -> list[Fault]:
         kinds = {

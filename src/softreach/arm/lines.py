@@ -75,8 +75,8 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
 def _tangents(places: Array, slopes: Array, turn: Array, zeta: Array) -> Array:
     """dp/dZ of lines in the directors [-], shape (3, n, node, bundle)."""
     (x, y), (dx, dy) = places, slopes
-    one, two, three = (turn[..., k, None] for k in range(3))
-    return np.stack([dx - three * y, dy + three * x, zeta[..., None] + one * y - two * x])
+    w1, w2, w3 = (turn[..., k, None] for k in range(3))
+    return np.stack([dx - w3 * y, dy + w3 * x, zeta[..., None] + w1 * y - w2 * x])
 
 
 def line_strains(arm: Manipulator) -> Array:

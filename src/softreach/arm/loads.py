@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from softreach.arm.number import Triple, number
-from softreach.arm.part import Part, kind_faults
+from softreach.arm.number import number
+from softreach.arm.part import Part, Triple, kind_faults
 from softreach.support.errors import Fault
 
 if TYPE_CHECKING:

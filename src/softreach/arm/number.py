@@ -76,9 +76,6 @@ def unit_suffix(unit: str) -> str:
     return _SUFFIXES.get(unit, f"_{unit}")
 
 
-Triple = tuple[float, float, float]
-
-
 class Station(float):
     """Z [m] of a named station, as a part of an arm has it that begins, ends or stands there."""
 

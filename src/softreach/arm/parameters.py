@@ -169,14 +169,14 @@ def _scaled(arm: Manipulator, new: Rule) -> dict[Address, float]:
 
 def _revolutions(arm: Manipulator) -> dict[Address, float]:
     """Ω of all that is helical by a single number other than 0 [rad]."""
-    found: dict[Address, float] = {}
+    turns: dict[Address, float] = {}
     for actuator in arm.actuators:
         numbers = fields_of(type(actuator))
         along = any(isinstance(getattr(actuator, field), AlongArm) for field in numbers)
         if not along and "revolution" in numbers and numbers["revolution"].unit == "rad":
             place = ("actuators", actuator.name), "revolution"
-            found |= {place: turn} if (turn := _values(arm, place)[0]) else {}
-    return found
+            turns[place] = _values(arm, place)[0]
+    return {place: turn for place, turn in turns.items() if turn}
 
 
 def _sizes_of_revolutions(arm: Manipulator) -> tuple[float, ...]:
@@ -248,7 +248,7 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
 
 def _of_arm(arm: Manipulator, own: Mapping[Address, Parameter]) -> Iterator[Parameter]:
     alone = {each.name: each.number for each in own.values() if not each.owner}
-    if any(called == "revolution" and one.unit == "rad" for (_, called), one in own.items()):
+    if any(called == "revolution" and each.unit == "rad" for (_, called), each in own.items()):
         meaning = "revolution of all that is helical, each in its own sense"
         number = dataclasses.replace(fields_of(FiberArchitecture)["revolution"], meaning=meaning)
         laws = {"read": _sizes_of_revolutions, "write": _revolved}
@@ -347,25 +347,25 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
         InvalidDesign: No such arm can exist; the error names every fault.
     """
     as_instance("values", values, Mapping, "a dictionary of parameters")
-    found = find_parameters(a_manipulator("arm", arm), tuple(values))
-    return with_values(arm, {each: values[name] for name, each in found.items()})
+    known = find_parameters(a_manipulator("arm", arm), tuple(values))
+    return with_values(arm, {each: values[name] for name, each in known.items()})
 
 
 def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipulator:
     """As `changed`, with parameters that were found before, those of the whole arm first."""
-    asked = {each: plain(value) for each, value in values.items()}
-    asked |= {
+    new = {each: plain(value) for each, value in values.items()}
+    new |= {
         each: int(value)
-        for each, value in asked.items()
+        for each, value in new.items()
         if each.whole and isinstance(value, float) and value.is_integer()
     }
-    judged = [(each, value, each.number.refusal(value)) for each, value in asked.items()]
+    judged = [(each, value, each.number.refusal(value)) for each, value in new.items()]
     if faults := [Fault(each.name, value, limits) for each, value, limits in judged if limits]:
         raise InvalidDesign(faults)
     edits: _Edits = {}
-    for each, value in asked.items():
+    for each, value in new.items():
         _add_edits(edits, arm, each, lambda _, value=value: value)
-    names = {each.name: value for each, value in asked.items()}
+    names = {each.name: value for each, value in new.items()}
     return _made(arm, edits, names) if edits else arm
 
 
@@ -398,8 +398,8 @@ def _add_edits(edits: _Edits, arm: Manipulator, by: Parameter, new: Rule) -> Non
         numbers[called] = value, by
 
 
-def _made(arm: Manipulator, edits: _Edits, asked: Mapping[str, float]) -> Manipulator:
-    """The arm with changed parts; faults under the names and with the values that were asked."""
+def _made(arm: Manipulator, edits: _Edits, given: Mapping[str, float]) -> Manipulator:
+    """The arm with changed parts; faults under the names and with the values that were given."""
     new, faults = dict(parts(arm)), list[Fault]()
     changes = {key: {name: x for name, (x, _) in each.items()} for key, each in edits.items()}
     inside = changes.pop(("section",), {})
@@ -412,7 +412,7 @@ def _made(arm: Manipulator, edits: _Edits, asked: Mapping[str, float]) -> Manipu
     if not faults:
         with gathered(faults):
             return _assembled(arm, new, inside)
-    named = [_as_asked(fault, edits, asked) for fault in faults]
+    named = [_as_given(fault, edits, given) for fault in faults]
     raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in named}.values()])
 
 
@@ -433,7 +433,7 @@ def _assembled(
     return arm.replace(section=section, **changes)
 
 
-def _as_asked(fault: Fault, edits: _Edits, asked: Mapping[str, float]) -> Fault:
+def _as_given(fault: Fault, edits: _Edits, given: Mapping[str, float]) -> Fault:
     names = {
         by.name: None
         for path in fault.path.split(", ")
@@ -443,7 +443,7 @@ def _as_asked(fault: Fault, edits: _Edits, asked: Mapping[str, float]) -> Fault:
     }
     if not names:
         return fault
-    value = asked[next(iter(names))] if len(names) == 1 else fault.value
+    value = given[next(iter(names))] if len(names) == 1 else fault.value
     return Fault(", ".join(names), value, fault.allowed)
 
 

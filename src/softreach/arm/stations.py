@@ -6,16 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from softreach.arm.number import (
-    NamedFloats,
-    Number,
-    Station,
-    Triple,
-    fields_of,
-    is_path_name,
-    number,
-)
-from softreach.arm.part import Part
+from softreach.arm.number import NamedFloats, Number, Station, fields_of, is_path_name, number
+from softreach.arm.part import Part, Triple
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 

@@ -234,8 +234,8 @@ def _in_file_terms(fault: Fault, places: Mapping[str, Place]) -> Fault:
     allowed, value = fault.allowed, fault.value
     if isinstance(allowed, Range) and allowed.unit == "rad":
         allowed = allowed.in_degrees()
-    if any(one is not MISSING for one in values):
-        values = [None if one is MISSING else one for one in values]
+    if any(given is not MISSING for given in values):
+        values = [None if given is MISSING else given for given in values]
         value = values[0] if len(values) == 1 else tuple(values)
     elif allowed != fault.allowed or names[0].endswith("_deg"):
         value = _shown_degrees(value)

@@ -220,7 +220,7 @@ class _Reader(FaultReader):
         if key.of_names and not isinstance(raw, str):
             return self._refuse(path, raw, "must be text")
         if key.field == "point_loads" and isinstance(raw, list):
-            each = [self._part(PointLoad, one, f"{path}[{k}]") for k, one in enumerate(raw)]
+            each = [self._part(PointLoad, load, f"{path}[{k}]") for k, load in enumerate(raw)]
             return WRONG if WRONG in each else tuple(each)
         return self._refuse(path, raw, "must be a list") if key.field == "point_loads" else raw
 

@@ -57,14 +57,14 @@ def _block(name: str, block: Block) -> _Schema:
     }
     if name in others:
         return about | others[name]
-    one = _of(name if block.shape is dict else name.removesuffix("s"))
+    table = _of(name if block.shape is dict else name.removesuffix("s"))
     if block.kind in KINDS:
         own = f"own_{block.kind.__name__.lower()}"
-        one = {"anyOf": [_of(kind) for kind in (*KINDS[block.kind], own)]}
+        table = {"anyOf": [_of(kind) for kind in (*KINDS[block.kind], own)]}
     if block.shape is dict:
-        return about | one if block.kind in KINDS else one
+        return about | table if block.kind in KINDS else table
     least = {"minItems": 1} if name == "rings" else {}
-    return about | {"type": "array", "items": one} | least
+    return about | {"type": "array", "items": table} | least
 
 
 def _of(name: str) -> _Schema:
