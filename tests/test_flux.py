@@ -39,16 +39,16 @@ class Mapped(TipMap):
     def box(self):
         return ActivationBox.between(((0.0, 1.0),) * 3, tuple("abc"))
 
-    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
-        tips[:] = self.of(gamma)
-        if slopes is None:
+    def fill(self, gamma, out):
+        out.tips[:] = self.of(gamma)
+        if out.slopes is None:
             return
         for k in range(3):
             moved = gamma.astype(complex)
             moved[:, k] += 1j * STEP
-            slopes[:, :, k] = np.imag(self.of(moved)) / STEP
+            out.slopes[:, :, k] = np.imag(self.of(moved)) / STEP
 
-    def shapes(self, activations, framed, strained, status=None):
+    def shapes(self, activations, framed, strained):
         raise NotImplementedError
 
 

@@ -24,7 +24,7 @@ from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import ArmMap, as_tip_map
-from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
+from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.kinds import fibers_and_a_tendon
@@ -142,10 +142,8 @@ def test_activations_that_leave_no_arm_have_a_status_and_no_shape(make, gone):
     tips, status = rod.tips_and_status(gamma)
     lost = [False, True, False]
     assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
-    status[:] = -1
-    frames = rod.frames(gamma, [0.5], status)
+    frames, strains, status = rod.shapes(gamma, [0.5], [0.5])
     assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
-    strains = rod.strains(gamma, [0.5])
     for values in (tips, rod.tip_twists(gamma)[1], *frames, *strains):
         assert np.isnan(values.reshape(3, -1)).all(axis=1).tolist() == lost
         assert np.isfinite(values).reshape(3, -1).all(axis=1).tolist() == [True, False, True]
@@ -303,10 +301,10 @@ def test_the_filling_of_tips_and_slopes_is_that_of_whole_batches(make, arm):
     gamma = activations(rod, 10)
     tips, slopes = rod.tips_and_slopes(gamma)
     filled = np.full_like(tips, np.nan)
-    rod.fill(gamma, filled)
+    rod.fill(gamma, TipOutputs(filled))
     np.testing.assert_array_equal(filled, rod.tips(gamma))
     filled_slopes = np.full_like(slopes, np.nan)
-    rod.fill(gamma, filled, filled_slopes)
+    rod.fill(gamma, TipOutputs(filled, filled_slopes))
     np.testing.assert_array_equal(filled, tips)
     np.testing.assert_array_equal(filled_slopes, slopes)
 

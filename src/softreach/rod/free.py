@@ -28,6 +28,7 @@ from softreach.rod.tip_map import (
     Status,
     Strains,
     TipMap,
+    TipOutputs,
     TipStatus,
     check_tol,
     drop,
@@ -110,12 +111,13 @@ class ArmRod(TipMap):
                 most[block] = (eta * bend * step).max(axis=1)
         return least, most
 
-    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
-        """Frames at ascending stations Z [m], and m in the directors there [N m], (n, station, 3).
+    def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
+        """Frames at ascending stations Z [m], m in the directors there [N m], and the status.
 
-        Without loads there is none.
+        Without loads m is 0, shape (n, station, 3).
         """
-        return self.frames(gamma, z, status), np.zeros((len(gamma), len(z), 3))
+        shapes = self.shapes(gamma, z, ())
+        return shapes.frames, np.zeros((len(gamma), len(z), 3)), shapes.status
 
     @abstractmethod
     def _prepare(self) -> None:
@@ -166,17 +168,9 @@ class FreeRod(ArmRod):
     def _prepare(self) -> None:
         self._table  # noqa: B018
 
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-    ) -> None:
-        """Put tips, and what else is asked for, into place: theory (25) and (31)."""
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
+        """Put tips, and what else is wanted, into place: theory (25) and (31)."""
+        tips, slopes, twists, status, directions = out
         has_offset = self.reach > 0.0
         if has_offset and slopes is not None and twists is None:
             twists = np.empty((len(gamma), 6, gamma.shape[1]))
@@ -211,21 +205,13 @@ class FreeRod(ArmRod):
     def _linearization(self) -> Linearization:
         return Linearization(self.arm, self.box, self.end, self.reach)
 
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
+    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         """Centerlines and directors, and u = Uγ η/ζ and ζ = 1 + z·γ: theory (7)."""
         gamma, lost = self.with_arms(self.box.check(activations))
         z, at = np.asarray(framed, float), np.asarray(strained, float)
         strains = per_length(*linear_strains(tables_at(self.arm, at), gamma))
-        shapes = Shapes(*self._frames(gamma, z), *strains)
-        if status is not None:
-            status[:] = TipStatus.STABLE
-        drop(lost, status, *shapes)
+        shapes = Shapes(self._frames(gamma, z), strains, np.zeros(len(gamma), np.int8))
+        drop(lost, shapes.status, *shapes.frames, *shapes.strains)
         return shapes
 
     def _frames(self, gamma: Array, z: Array) -> Frames:

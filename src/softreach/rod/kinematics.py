@@ -17,7 +17,7 @@ from softreach.arm.lines import lengths_of_strains
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import quadrature
 from softreach.rod.rods import ArmMap, as_tip_map, with_unstable
-from softreach.rod.tip_map import Frame, Frames, Shapes, TipMap
+from softreach.rod.tip_map import Frame, Frames, Strains, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import Array, as_floats
@@ -172,15 +172,17 @@ def configuration(
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
     values = as_floats("activation", activation)
     gamma = tip_map.check_activations("activation", np.atleast_2d(values))
-    z, status = stations_along(tip_map, stations), np.empty(len(gamma), np.int8)
+    z = stations_along(tip_map, stations)
     nodes = quadrature(body_of(tip_map.arm))[0] if tip_map.arm.bundles else np.empty(0)
     strained = np.union1d(z, nodes)
-    position, directors, curvature, extension = tip_map.shapes(gamma, z, strained, status)
-    at, on_lines = np.searchsorted(strained, z), np.searchsorted(strained, nodes)
-    others = _lines(tip_map, gamma, curvature[:, on_lines], extension[:, on_lines])
+    frames, strains, status = tip_map.shapes(gamma, z, strained)
+    at_stations, on_lines = (
+        Strains(*(values[:, np.searchsorted(strained, places)] for values in strains))
+        for places in (z, nodes)
+    )
+    others = _lines(tip_map, gamma, on_lines)
     others["marker_position"] = _markers(tip_map, gamma)
-    shapes = Shapes(position, directors, curvature[:, at], extension[:, at])
-    dataset = shape_dataset(tip_map, gamma, z, shapes, **others)
+    dataset = shape_dataset(tip_map, gamma, z, frames, at_stations, **others)
     if tip_map.supports_unstable:
         dataset = schema.with_status(dataset, status)
     return dataset.isel(sample=0) if values.ndim == 1 else dataset
@@ -215,7 +217,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
 
 
 def shape_dataset(
-    tip_map: TipMap, gamma: Array, z: Array, shapes: Shapes, **others: Array
+    tip_map: TipMap, gamma: Array, z: Array, frames: Frames, strains: Strains, **others: Array
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
     return schema.configuration_dataset(
@@ -224,20 +226,22 @@ def shape_dataset(
         z,
         names=tip_map.box.names,
         frame=tip_map.frame,
-        **shapes._asdict(),
+        **frames._asdict(),
+        **strains._asdict(),
         radius=tip_map.radius(z),
         **{name: values for name, values in others.items() if values.shape[1]},
     )
 
 
-def _lines(tip_map: ArmMap, gamma: Array, curvature: Array, extension: Array) -> dict[str, Array]:
+def _lines(tip_map: ArmMap, gamma: Array, strains: Strains) -> dict[str, Array]:
     """Lengths of the lines of bundles, and what drives and displacements activate there."""
     arm, length = tip_map.arm, np.empty((len(gamma), tip_map.arm.bundles))
     if not arm.bundles:
         return {}
     for b in parallel.blocks(len(gamma), _LINES_TOGETHER):
-        turn = curvature[b] * extension[b, :, None]
-        length[b] = lengths_of_strains(arm, turn, extension[b])
+        extension = strains.extension[b]
+        turn = strains.curvature[b] * extension[..., None]
+        length[b] = lengths_of_strains(arm, turn, extension)
     if arm.is_direct:
         return {"line_length": length}
     activation = tip_map.inputs.activations(gamma)[:, : arm.bundles]

@@ -220,9 +220,7 @@ def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
     order = np.argsort(z, kind="stable")
     back = np.empty_like(order)
     back[order] = np.arange(len(z))
-    status = np.zeros(len(gamma), np.int8)
-    ascending = np.clip(z[order], 0.0, rod.length)
-    frames, moment = rod.with_moments(gamma, ascending, status)
+    frames, moment, status = rod.with_moments(gamma, np.clip(z[order], 0.0, rod.length))
     moment = moment[:, back]
     position, directors = frames.position[:, back], frames.directors[:, back]
     steps, count, asked = table.stations.shape[0], table.stations.size, len(table.asked)

@@ -78,61 +78,38 @@ class TipMap(ABC):
         """The activations within bounds."""
 
     @abstractmethod
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-    ) -> None:
-        """Put tips, and what else is asked for, into place, on the calling thread.
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
+        """Put tips, and what else is wanted, into place, on the calling thread.
 
         Whoever calls it from several threads calls `prepare` before.
 
         Args:
             gamma: Checked activations, shape (n, bundles).
-            tips: r [m], shape (n, 3); NaN without an equilibrium.
-            slopes: ∂r/∂γ [m], shape (n, 3, bundles).
-            twists: (v, ω) of the tip frame per unit of each activation [m, rad], (n, 6, bundles).
-            status: `TipStatus`, shape (n,).
-            directions: Tangents d3 [-], shape (n, 3).
+            out: Arrays to be filled.
         """
 
     @abstractmethod
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
+    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         """Arms at stations along them; each equilibrium is found once.
 
         Args:
             activations: Shape (n, bundles).
             framed: Z of centerline and directors [m], ascending; there may be none.
             strained: Z of curvature and extension [m], likewise.
-            status: `TipStatus`, shape (n,), which is put into place.
         """
 
-    def frames(
-        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
-    ) -> Frames:
-        """Centerline and directors at ascending stations Z [m]; `status` (n,) is put into place."""
-        shapes = self.shapes(activations, self.check_stations(stations), (), status)
-        return Frames(shapes.position, shapes.directors)
+    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+        return self.shapes(activations, self.check_stations(stations), ()).frames
 
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
         """Curvature and extension at stations Z [m], in any order."""
         z = self.check_stations(stations, ascending=False)
         ascending, back = np.unique(z, return_inverse=True)
-        shapes = self.shapes(activations, (), ascending)
+        strains = self.shapes(activations, (), ascending).strains
         if np.array_equal(z, ascending):
-            return Strains(shapes.curvature, shapes.extension)
-        return Strains(shapes.curvature[:, back], shapes.extension[:, back])
+            return strains
+        return Strains(strains.curvature[:, back], strains.extension[:, back])
 
     @property
     def length(self) -> float:
@@ -288,7 +265,7 @@ class TipMap(ABC):
 
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""
-        return self._filled(activations)["tips"]
+        return self._filled(activations)[0]
 
     def status(self, activations: ArrayLike) -> Status:
         """`TipStatus` of each activation, shape (n,)."""
@@ -296,13 +273,11 @@ class TipMap(ABC):
 
     def tips_and_status(self, activations: ArrayLike) -> tuple[Array, Status]:
         """Tips [m], shape (n, 3), NaN without an equilibrium, and their `TipStatus`, (n,)."""
-        filled = self._filled(activations, "status")
-        return filled["tips"], filled["status"]
+        return self._filled(activations, "status")
 
     def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
-        filled = self._filled(activations, "slopes")
-        return filled["tips"], filled["slopes"]
+        return self._filled(activations, "slopes")
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation.
@@ -310,22 +285,22 @@ class TipMap(ABC):
         Returns:
             Tips, shape (n, 3); (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
         """
-        filled = self._filled(activations, "twists")
-        return filled["tips"], filled["twists"]
+        return self._filled(activations, "twists")
 
     def tip_motions(self, activations: ArrayLike) -> TipMotions:
         """Positions and directions of the tips with their derivatives."""
-        filled = self._filled(activations, "slopes", "twists", "directions")
-        rotations = filled["twists"][:, 3:]
-        return TipMotions(filled["tips"], filled["slopes"], filled["directions"], rotations)
+        tips, slopes, twists, directions = self._filled(
+            activations, "slopes", "twists", "directions"
+        )
+        return TipMotions(tips, slopes, directions, twists[:, 3:])
 
     def tip_directions(self, activations: ArrayLike) -> Array:
         """Tangents d3 of the tips [-], shape (n, 3)."""
         end = self.length if self.point is None else self.point.station_at("station", self.length)
         return np.ascontiguousarray(self.frames(activations, [end]).directors[:, 0, 2])
 
-    def _filled(self, activations: ArrayLike, *wanted: str) -> dict[str, Any]:
-        """Results of `fill` by name: tips and what else is wanted, on all threads."""
+    def _filled(self, activations: ArrayLike, *wanted: str) -> tuple[Any, ...]:
+        """Tips, and what else of `TipOutputs` is wanted, on all threads."""
         gamma, lost = self.with_arms(self.box.check(activations))
         n, m = gamma.shape
         room: dict[str, Any] = {"tips": np.empty((n, 3))}
@@ -337,11 +312,11 @@ class TipMap(ABC):
             size //= 16 if self.supports_unstable else 8  # an equilibrium takes a search
         self.prepare()
         parallel.run(
-            partial(self.fill, gamma[b], **{name: values[b] for name, values in room.items()})
+            partial(self.fill, gamma[b], TipOutputs(**{name: room[name][b] for name in room}))
             for b in parallel.blocks(n, size)
         )
         drop(lost, room.get("status"), *(room[name] for name in room if name != "status"))
-        return room
+        return tuple(room.values())
 
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""
@@ -410,14 +385,27 @@ class Held(NamedTuple):
 class Shapes(NamedTuple):
     """Arms at stations."""
 
-    position: Array
-    """Centerline r [m], shape (n, framed station, 3)."""
-    directors: Array
-    """d1, d2, d3 as rows, shape (n, framed station, 3, 3)."""
-    curvature: Array
-    """u in the directors, per unit of activated arclength [1/m], (n, strained station, 3)."""
-    extension: Array
-    """ζ [-], shape (n, strained station)."""
+    frames: Frames
+    """At those for centerline and directors."""
+    strains: Strains
+    """At those for curvature and extension."""
+    status: Status
+    """`TipStatus`, shape (n,)."""
+
+
+class TipOutputs(NamedTuple):
+    """Arrays for n activations that a tip map fills; None for what is not wanted."""
+
+    tips: Array
+    """r [m], shape (n, 3); NaN without an equilibrium."""
+    slopes: Array | None = None
+    """∂r/∂γ [m], shape (n, 3, bundles)."""
+    twists: Array | None = None
+    """(v, ω) of the tip frame per unit of each activation [m, rad], shape (n, 6, bundles)."""
+    status: Status | None = None
+    """`TipStatus`, shape (n,)."""
+    directions: Array | None = None
+    """Tangents d3 [-], shape (n, 3)."""
 
 
 class TipMotions(NamedTuple):

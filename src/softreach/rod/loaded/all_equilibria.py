@@ -40,7 +40,7 @@ from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip
+from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus, has_tip
 from softreach.support.arrays import Array, Mask, as_floats
 from softreach.support.errors import InvalidInput, counted, warn
 
@@ -101,8 +101,9 @@ class AllEquilibria:
         strains = loaded.strains_under(inner, together, shapes)
         places = marked(rod.arm, together, frames)
         rows = np.searchsorted(together, z)
-        shapes = Shapes(*(values[:, rows] for values in (*frames, *strains)))
-        return shape_dataset(rod, gamma, z, shapes, marker_position=places)
+        frames = Frames(*(values[:, rows] for values in frames))
+        strains = Strains(*(values[:, rows] for values in strains))
+        return shape_dataset(rod, gamma, z, frames, strains, marker_position=places)
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `equilibrium` and `axis`."""

@@ -47,7 +47,7 @@ from softreach.rod.tip_map import (
     Shapes,
     Status,
     Strains,
-    TipStatus,
+    TipOutputs,
     drop,
     has_tip,
     position_slopes,
@@ -183,19 +183,12 @@ class LoadedRod(ArmRod):
         drop(lost, equilibria.status, equilibria.tips, equilibria.margin)
         return equilibria
 
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-        known: Equilibria | None = None,
-    ) -> None:
-        """Put tips, and what else is asked for, into place; each equilibrium is found once."""
-        known = known or self.postures.find(gamma)
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
+        """Put tips, and what else is wanted, into place; each equilibrium is found once."""
+        self._fill(gamma, self.postures.find(gamma), out)
+
+    def _fill(self, gamma: Array, known: Equilibria, out: TipOutputs) -> None:
+        tips, slopes, twists, status, directions = out
         if status is not None:
             status[:] = known.status
         is_moving = slopes is not None or twists is not None
@@ -241,7 +234,7 @@ class LoadedRod(ArmRod):
         points, stable = np.empty((len(gamma), 3)), np.zeros(len(gamma), np.int8)
         known = known._replace(status=stable)
         for rows in parallel.blocks(len(gamma), _BLOCK):
-            self.fill(gamma[rows], points[rows], known=known.of(rows))
+            self._fill(gamma[rows], known.of(rows), TipOutputs(points[rows]))
         return points
 
     def compliance(self, activations: ArrayLike) -> Array:
@@ -268,42 +261,31 @@ class LoadedRod(ArmRod):
         apart = turn_between(here.frame, there.frame) > _SIDES
         return here.is_found & there.is_found & apart
 
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
+    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         """Frames, and (û + K⁻¹m) η/ζ and ζ = ζ̂ + η n3/K0.
 
         Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
         """
         gamma = self.box.check(activations)
-        z, at, known = (
-            np.asarray(framed, float),
-            np.asarray(strained, float),
-            self.equilibria(gamma),
-        )
-        framed_shapes = strained_shapes = self._walked(gamma, known, z, status)
+        z, at = np.asarray(framed, float), np.asarray(strained, float)
+        known = self.equilibria(gamma)
+        walked, status = self._walked(gamma, known, z)
+        frames = walked.frames
         if not np.array_equal(z, at):
-            strained_shapes = self._walked(gamma, known, at, status)
-        return Shapes(*framed_shapes.frames, *self.strains_under(gamma, at, strained_shapes))
+            walked, status = self._walked(gamma, known._replace(status=status), at)
+        return Shapes(frames, self.strains_under(gamma, at, walked), status)
 
-    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
-        shapes = self._walked(gamma, self.equilibria(gamma), z, status)
-        return shapes.frames, shapes.moment
+    def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
+        walked, status = self._walked(gamma, self.equilibria(gamma), z)
+        return walked.frames, walked.moment, status
 
-    def _walked(
-        self, gamma: Array, known: Equilibria, z: Array, status: Status | None
-    ) -> LoadedShapes:
+    def _walked(self, gamma: Array, known: Equilibria, z: Array) -> tuple[LoadedShapes, Status]:
+        """Shapes of known equilibria, undecided where steps that end at Z [m] do not find them."""
         if not len(z):
-            return LoadedShapes.empty(len(gamma), 0)
+            return LoadedShapes.empty(len(gamma), 0), known.status
         shapes = self._shape_solver.shapes(gamma, z, known)
-        if status is not None:
-            gone = known.is_found & np.isnan(shapes.frames.position[:, 0, 0])
-            status[:] = np.where(gone, TipStatus.UNDECIDED, known.status)
-        return shapes
+        gone = known.is_found & np.isnan(shapes.frames.position[:, 0, 0])
+        return shapes, known.only(~gone).status
 
     def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
         """The strains at stations Z [m], from m and n in the directors of the shapes there."""
