@@ -11,6 +11,7 @@ import pytest
 import softreach as sr
 from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.tables import compliance
 from softreach.cloud.curvature import strain_ranges
 from softreach.rod import TipStatus, as_tip_map, free_bundles
 from softreach.rod.free import FreeRod
@@ -20,11 +21,11 @@ from softreach.rod.loaded import rod as loaded_rod
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, LoadTables
+from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidInput
-from tests.bodies import Uniform, oracle_rod, rubber, uniform, weighed
+from tests.bodies import oracle_rod, rubber, straight, uniform, weighed
 from tests.oracles import column, elastica
 from tests.oracles.chain import Chain
 
@@ -64,7 +65,7 @@ def test_no_random_start_of_a_chain_of_links_comes_to_another(load, starts):
     """Newton's method on the energy of a chain, from shapes with random bending."""
     arm = trunk(load)
     every = sr.equilibria(arm, BENT)
-    chain = Chain(*oracle_rod(arm, every.rod.rod.body, BENT, arm.loads), 20)
+    chain = Chain(*oracle_rod(arm, BENT, arm.loads), 20)
     tips = [tip for seed in range(starts) if (tip := come_to_rest(chain, seed)) is not None]
     assert len(tips) > 10
     apart = np.linalg.norm(np.array(tips)[:, None] - every.tips, axis=2)
@@ -103,7 +104,7 @@ def test_stable_ones_are_minima_and_signs_count_the_ways_to_fall(load, gravity):
 def softest_of(every, links=24):
     """The smallest eigenvalues of the energy of a chain at each equilibrium."""
     rod = every.rod
-    chain = Chain(*oracle_rod(rod.arm, rod.rod.body, every.activation, rod.arm.loads), links)
+    chain = Chain(*oracle_rod(rod.arm, every.activation, rod.arm.loads), links)
     many = np.repeat(every.activation[None], len(every), axis=0)
     shapes = every.solver.shapes_facing(many, every.directions, chain.joints)[0]
     frames, moments = shapes.frames.directors, shapes.moment
@@ -309,9 +310,7 @@ def test_a_smooth_branch_is_not_lost_under_a_little_more_load():
     gamma, found = _TENSION * SMOOTH, []
     for share in shares:
         arm = soft_tendons(share)
-        found.append(
-            Postures.of(Solver(LoadTables(arm, arm.loads, ArmBody(arm)), 16, 1e-6)).find(gamma)
-        )
+        found.append(Postures.of(Solver(LoadTables(arm=arm), 16, 1e-6)).find(gamma))
     assert (np.array([one.status for one in found]) == TipStatus.STABLE).all()
     ways = np.diff([one.tips for one in found], axis=0)
     assert np.linalg.norm(ways, axis=2).max() < 0.01 * arm.length
@@ -362,13 +361,13 @@ def test_an_upright_arm_under_forces_in_several_directions_does_not_stand_again_
 def test_the_phase_of_a_tip_force_is_its_closed_form():
     """√(F/K) L for K1 > K3, without axial yield; steps make no more than π/2 of it."""
     loads = Loads(gravity=NOTHING, tip_force=(3.0, 0.0, 4.0))
-    body = Uniform((0.0, 1 / 4.0, 1 / 2.0), 0.0)
-    phase = LoadTables(held(CYLINDER), loads, body).phase
+    body = uniform(4.0, torsion=2.0)
+    phase = straight(body, loads).tables.phase
     assert phase.entire == pytest.approx(np.sqrt(5.0 / 2.0))
     assert phase.steepest == pytest.approx(phase.entire)
     for force in (50.0, 500.0):
         heavy = loads.replace(tip_force=(0.0, 0.0, force))
-        phase = LoadTables(held(CYLINDER), heavy, body).phase
+        phase = straight(body, heavy).tables.phase
         assert phase.entire / phase.fewest_steps <= np.pi / 2
         assert phase.entire / (phase.fewest_steps - 1) > np.pi / 2
 
@@ -397,8 +396,7 @@ def test_every_load_that_is_added_adds_to_the_phase(arm):
 def test_a_cantilever_hangs_from_its_base_as_published_however_heavy_its_payload(load):
     """The tip hardly turns any more, and the base must tell when it is found."""
     loads = Loads(gravity=NOTHING, tip_force=(load, 0, 0))
-    solver = Solver(LoadTables(held(CYLINDER), loads, uniform(1.0)), 64, 1e-9)
-    found = Postures.of(solver).find(REST)
+    found = Postures.of(straight(uniform(1.0), loads, steps=64)).find(REST)
     assert found.status[0] == TipStatus.STABLE
     np.testing.assert_allclose(found.tips[0, [0, 2]], elastica.tip_loaded(load), atol=1e-7)
 
@@ -427,7 +425,7 @@ def stubby(share):
     arm = designs.minimal_trunk(taper=0.0, length=0.2)
     arm = arm.replace(profile=arm.profile.replace(outer_radius=0.1))
     rod = LoadedRod(rubber(arm, Loads(gravity=NOTHING)), 1e-6)
-    force = share / float(rod.body.compliance(np.zeros(1))[0][0])
+    force = share / float(compliance(rod.arm, np.zeros(1))[0][0])
     return LoadedRod(rod.arm.replace(loads=Loads(gravity=NOTHING, tip_force=(0, 0, -force))), 1e-6)
 
 

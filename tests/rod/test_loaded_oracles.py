@@ -15,9 +15,9 @@ from softreach.arm.tables import tables
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, LoadTables
+from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus, has_tip
-from tests.bodies import oracle_rod, posture_shapes, rubber, straight, uniform
+from tests.bodies import of_body, oracle_rod, posture_shapes, rubber, straight, uniform
 from tests.oracles import bend, elastica, linear_strains, loaded_rod, sorosim
 
 NOTHING = Loads(gravity=(0.0, 0.0, 0.0))
@@ -45,7 +45,7 @@ def test_a_force_and_a_moment_about_its_direction_wind_a_helix(force):
     np.testing.assert_allclose(moment, [helix.moment(z) for z in stations], atol=1e-8)
 
 
-def bent_arm(length, curvature):
+def bent_arm(length, curvature, body, loads):
     """An untapered arm, and activations that bend it to a curvature in x and z at its length."""
     sides = FiberArchitecture(
         bundles=2, revolution=0.0, offset=0.0, extent=0.5, activation_bounds=(-1, 1)
@@ -53,6 +53,7 @@ def bent_arm(length, curvature):
     arm = designs.minimal_trunk().replace(
         profile=LinearTaper(length=length, outer_radius=length / 20), actuators=(sides,)
     )
+    arm = of_body(arm, body, loads)
     per_unit = tables(arm, [0.0]).curvature[0, 1] @ [1.0, -1.0]
     return arm, curvature / per_unit * np.array([[1.0, -1.0]])
 
@@ -60,10 +61,9 @@ def bent_arm(length, curvature):
 def test_a_bend_of_45_degrees_goes_to_its_published_place():
     """The fixed frame of the oracle is that of the arm."""
     bar, loads = bend.bend()
-    arm, gamma = bent_arm(bar.length, 0.01)
     body = uniform(bar.bending(0.0), bar.axial(0.0), bar.torsion(0.0))
-    pulled = NOTHING.replace(tip_force=loads.tip_force)
-    tip = Postures.of(Solver(LoadTables(arm, pulled, body), 32, 1e-10)).find(gamma).tips[0]
+    arm, gamma = bent_arm(bar.length, 0.01, body, NOTHING.replace(tip_force=loads.tip_force))
+    tip = Postures.of(Solver(LoadTables(arm=arm), 32, 1e-10)).find(gamma).tips[0]
     np.testing.assert_allclose(tip, bend.TIP, atol=1e-6)
 
 
@@ -110,8 +110,8 @@ def test_arms_of_all_kinds_rest_where_a_shooting_from_the_base_puts_them(arm, ac
         ]
     gamma = np.asarray(activation, float)
     tip, status = found.tips(gamma[None])[0], found.status(gamma[None])[0]
-    expected = loaded_rod.equilibrium(*oracle_rod(arm, ArmBody(arm), gamma, loads), rtol=1e-10)
-    unloaded = loaded_rod.equilibrium(*oracle_rod(arm, ArmBody(arm), gamma, NOTHING), rtol=1e-8)
+    expected = loaded_rod.equilibrium(*oracle_rod(arm, gamma, loads), rtol=1e-10)
+    unloaded = loaded_rod.equilibrium(*oracle_rod(arm, gamma, NOTHING), rtol=1e-8)
     assert expected.converged
     assert status == TipStatus.STABLE
     assert np.linalg.norm(expected.tip - unloaded.tip) > 0.02 * arm.length
@@ -140,7 +140,7 @@ def solver(loads, steps=12):
             PointLoad(station=point.place, force=BASE @ point.force, moment=BASE @ point.moment),
         ),
     )
-    return Solver(LoadTables(ARM, turned, BODY), steps, 1e-8)
+    return Solver(LoadTables(arm=of_body(ARM, BODY, turned)), steps, 1e-8)
 
 
 def places(loads):

@@ -16,7 +16,6 @@ from softreach.arm.loads import Loads
 from softreach.rod.loaded import flood
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.tables import ArmBody
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import by_lines, oracle_rod
@@ -74,7 +73,7 @@ def pulled_chain(arm, rod, gamma, links=40, steps=10):
     """The tip of a chain of links that hangs, is pulled step by step, and comes to rest in each."""
     twist, q = np.array([0.0, 0.0, TWIST / arm.length]), None
     for share in np.linspace(0.0, 1.0, steps + 1):
-        one, loads = oracle_rod(arm, ArmBody(arm), share * gamma, rod.loads)
+        one, loads = oracle_rod(arm, share * gamma, rod.tables.loads)
         chain = Chain(replace(one, curvature=lambda z, u=one.curvature: u(z) + twist), loads, links)
         scale = 1.0 / chain.stiffness.max()
         ways = [

@@ -6,7 +6,7 @@ from .kinematics import tip_positions as tip_positions
 from .loaded.all_equilibria import AllEquilibria as AllEquilibria
 from .loaded.all_equilibria import equilibria as equilibria
 from .loaded.rod import LoadedRod as LoadedRod
-from .loaded.shooting import Equilibria as Equilibria
+from .loaded.solver import Equilibria as Equilibria
 from .rods import ArmMap as ArmMap
 from .rods import as_tip_map as as_tip_map
 from .rods import free_bundles as free_bundles

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import compliance, tables
+from softreach.arm.tables import compliance
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
 from softreach.rod.free import ArmRod
+from softreach.rod.steps import tables_on
 from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -136,18 +137,16 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
     z = profile.station(at)
     # Steps without length stand where something ends: the inside of the arm decides.
     length = width[:, None] * profile.radius(z)
-    table = tables(arm, z.ravel())
-    soft = np.zeros((*z.shape, 4))
+    table, soft = tables_on(arm, z), np.zeros((*z.shape, 4))
     if arm.loads is not None:
-        axial, bending, torsion = (c.reshape(z.shape) for c in compliance(arm, z.ravel()))
+        axial, bending, torsion = compliance(arm, z)
         soft = np.stack([axial, bending, bending, torsion], axis=-1)
-    shape, bundles = z.shape, arm.bundles
     return NodeTables(
         stations=z,
         length=length,
-        extension=table.extension.reshape(*shape, bundles),
-        rest_length_factor=table.rest_length_factor.reshape(*shape, bundles),
-        curvature=table.curvature.reshape(*shape, 3, bundles),
+        extension=table.extension,
+        rest_length_factor=table.rest_length_factor,
+        curvature=table.curvature,
         compliance=soft,
         force=dead_force(arm, arm.base, z, length),
         lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),

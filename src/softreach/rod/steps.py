@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.driving import cube_corners
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.profile import Profile
-from softreach.arm.tables import both_sides, jumps, tables
+from softreach.arm.tables import Tables, both_sides, jumps, tables
 from softreach.kernels.rod import frames, magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
@@ -41,6 +41,13 @@ _SEARCHED = 8  # corners from which larger errors are searched
 _ROUNDS = 24
 _FEW_BREAKS = 64
 """Breakpoints at all of which steps end, however few the arm needs otherwise."""
+
+
+def tables_on(arm: Manipulator, z: Array) -> Tables:
+    """Tables at the nodes of steps, Z [m] of shape (step, node), which lead their arrays."""
+    table = tables(arm, z.ravel())
+    values = table.extension, table.curvature, table.rest_length_factor
+    return Tables(z, *(value.reshape(*z.shape, *value.shape[1:]) for value in values))
 
 
 class Nodes(NamedTuple):
@@ -93,13 +100,8 @@ class StepRule:
         width = np.diff(edges)[:, None]
         s = edges[:-1, None] + width * np.array(magnus.NODES)
         z = self.arm.profile.station(s)
-        table = tables(self.arm, z.ravel())
-        return Nodes(
-            width * self.arm.profile.radius(z),  # dZ = R2 dS
-            table.extension.reshape(*s.shape, self.arm.bundles),
-            table.rest_length_factor.reshape(*s.shape, self.arm.bundles),
-            table.curvature.reshape(*s.shape, 3, self.arm.bundles),
-        )
+        table, measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
+        return Nodes(measure, table.extension, table.rest_length_factor, table.curvature)
 
     def packed(self, edges: Array) -> Array:
         """Packed tables of the steps between edges, read-only."""

@@ -92,13 +92,13 @@ class AllEquilibria:
             stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
-        if self.solver is None or not isinstance(loaded := rod.rod, LoadedRod):
+        if self.solver is None:
             return configuration(rod, gamma, stations)
         z, inner = stations_along(rod, stations), rod.inputs.activations(gamma)
         together = np.union1d(z, marker_sections(rod.arm))
         shapes = self.solver.shapes_facing(inner, self.directions, together)[0]
         frames = rod.placed(shapes.frames)
-        strains = loaded.strains_under(inner, together, shapes)
+        strains = self.solver.strains_under(inner, together, shapes)
         places = marked(rod.arm, together, frames)
         rows = np.searchsorted(together, z)
         frames = Frames(*(values[:, rows] for values in frames))
@@ -191,7 +191,7 @@ def equilibria(
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     if not loaded.tables.one_direction:
-        crossing = ", ".join(_crossing(loaded.loads, loaded.tables.axes[0]))
+        crossing = ", ".join(_crossing(loaded.tables.loads, loaded.tables.axes[0]))
         allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
         raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
     posture = loaded.equilibria(at)

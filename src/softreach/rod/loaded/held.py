@@ -15,8 +15,7 @@ import numpy as np
 from softreach.kernels.lanes import LANES
 from softreach.rod.loaded.flood import are_same, follow, smooth_edges
 from softreach.rod.loaded.postures import Postures, polished
-from softreach.rod.loaded.shooting import Equilibria
-from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.solver import Equilibria, Solver
 from softreach.rod.tip_map import Held
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined

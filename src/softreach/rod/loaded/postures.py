@@ -23,8 +23,7 @@ from softreach.kernels.lanes import LANES
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.flood import CUT, PARTS, Flood, Flooding, Followed, follow
-from softreach.rod.loaded.shooting import Equilibria, turn_between
-from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.solver import Equilibria, Solver, turn_between
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.tip_map import BLOCK, TipStatus
 from softreach.support import parallel

@@ -12,8 +12,7 @@ import numpy as np
 
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.shooting import Equilibria, turn_between
-from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.solver import Equilibria, Solver, turn_between
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus, position_slopes
 from softreach.support.arrays import Array
@@ -59,7 +58,7 @@ class PushingTip:
 
     @lazy
     def _tables(self) -> LoadTables:
-        return LoadTables(self.rod.arm, self.rod.loads, self.rod.body, direction=-self.direction)
+        return LoadTables(arm=self.rod.arm, direction=-self.direction)
 
     def _solver(self, force: float, steps: int) -> Solver:
         return Solver(self._tables.under(force), steps, self.rod.tol)

@@ -12,26 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.body import load_number
-from softreach.arm.loads import Loads
 from softreach.rod.free import (
     ArmRod,
     FreeRod,
     add_offset,
-    linear_strains,
-    per_length,
-    tables_at,
 )
 from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
-from softreach.rod.loaded.shooting import Equilibria, LoadedShapes, turn_between
-from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, LoadTables
+from softreach.rod.loaded.solver import Equilibria, LoadedShapes, Solver, turn_between
+from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.response import (
     NodeTables,
     linear_response,
@@ -46,7 +41,6 @@ from softreach.rod.tip_map import (
     Held,
     Shapes,
     Status,
-    Strains,
     TipOutputs,
     drop,
     has_tip,
@@ -86,24 +80,13 @@ class LoadedRod(ArmRod):
         return True
 
     @lazy
-    def loads(self) -> Loads:
-        """Loads on the arm beside its actuators, in the frame of the base."""
-        loads = self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
-        return loads.seen_from(self.arm.base)
-
-    @property
-    def body(self) -> ArmBody:
-        """Compliance and weight of the arm."""
-        return ArmBody(self.arm)
-
-    @lazy
     def tables(self) -> LoadTables:
         """Tables for the kernels.
 
         Raises:
             InvalidInput: Loads so heavy that no number of steps resolves what they do.
         """
-        tables = LoadTables(self.arm, self.loads, self.body)
+        tables = LoadTables(arm=self.arm)
         if (steps := tables.phase.fewest_steps) > _MOST_STEPS:
             load = f"of load number {load_number(self.arm):.3g}"
             allowed = f"lighter: they need {steps:,} steps, at most {_MOST_STEPS} allowed"
@@ -273,7 +256,7 @@ class LoadedRod(ArmRod):
         frames = walked.frames
         if not np.array_equal(z, at):
             walked, status = self._walked(gamma, known._replace(status=status), at)
-        return Shapes(frames, self.strains_under(gamma, at, walked), status)
+        return Shapes(frames, self._shape_solver.strains_under(gamma, at, walked), status)
 
     def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
         walked, status = self._walked(gamma, self.equilibria(gamma), z)
@@ -281,24 +264,9 @@ class LoadedRod(ArmRod):
 
     def _walked(self, gamma: Array, known: Equilibria, z: Array) -> tuple[LoadedShapes, Status]:
         """Shapes of known equilibria, undecided where steps that end at Z [m] do not find them."""
-        if not len(z):
-            return LoadedShapes.empty(len(gamma), 0), known.status
         shapes = self._shape_solver.shapes(gamma, z, known)
-        gone = known.is_found & np.isnan(shapes.frames.position[:, 0, 0])
+        gone = known.is_found & np.isnan(shapes.frames.position[:, :1, 0]).any(axis=1)
         return shapes, known.only(~gone).status
-
-    def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
-        """The strains at stations Z [m], from m and n in the directors of the shapes there."""
-        axial, bending, torsion = _compliance_at(self.body, z.tobytes())
-        u, extension, eta = linear_strains(tables_at(self.arm, z), gamma)
-        extension = extension + eta * shapes.force[..., 2] * axial
-        yielded = np.stack([bending, bending, torsion], axis=1)
-        return per_length(u + shapes.moment * yielded, extension, eta)
-
-
-@lru_cache(maxsize=64)
-def _compliance_at(body: ArmBody, stations: bytes) -> tuple[Array, Array, Array]:
-    return body.compliance(np.frombuffer(stations))
 
 
 class _ContinuedRod(LoadedRod):
