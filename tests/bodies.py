@@ -58,7 +58,7 @@ def straight(body: Measured, loads: Loads, steps=32) -> Solver:
 def by_lines(solver: Solver, gamma: np.ndarray) -> Equilibria:
     """Postures found along lines from rest alone."""
     equilibria = solver.empty(len(gamma))
-    Postures.of(solver).by_line(gamma, np.arange(len(gamma)), equilibria)
+    Postures(solver).by_line(gamma, np.arange(len(gamma)), equilibria)
     return equilibria
 
 
@@ -127,4 +127,4 @@ def _coefficients(values: Callable, middle: float, half: float):
 
 def posture_shapes(solver, gamma, stations):
     """Shapes of the postures of activations."""
-    return solver.shapes(gamma, stations, Postures.of(solver).find(gamma))
+    return solver.shapes(gamma, stations, Postures(solver).find(gamma))

@@ -117,7 +117,7 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
         acting = tuple(np.array(arm.loads.tip_force) - x[-1] * force * d)
         tables = LoadTables(arm=arm.replace(loads=arm.loads.replace(tip_force=acting)))
         gamma = arm.bounds[:, 0] + x[:-1] * width
-        found = Postures.of(Solver(tables, 2 * rod.steps, rod.tol)).find(gamma[None])
+        found = Postures(Solver(tables, 2 * rod.steps, rod.tol)).find(gamma[None])
         return (found.tips[0] - place) / arm.length
 
     start = np.append((gamma - arm.bounds[:, 0]) / width, 0.9)

@@ -310,7 +310,7 @@ def test_a_smooth_branch_is_not_lost_under_a_little_more_load():
     gamma, found = _TENSION * SMOOTH, []
     for share in shares:
         arm = soft_tendons(share)
-        found.append(Postures.of(Solver(LoadTables(arm=arm), 16, 1e-6)).find(gamma))
+        found.append(Postures(Solver(LoadTables(arm=arm), 16, 1e-6)).find(gamma))
     assert (np.array([one.status for one in found]) == TipStatus.STABLE).all()
     ways = np.diff([one.tips for one in found], axis=0)
     assert np.linalg.norm(ways, axis=2).max() < 0.01 * arm.length
@@ -322,7 +322,7 @@ def test_a_search_that_is_cut_short_is_undecided(heavy, monkeypatch):
     gamma = np.array([[-0.72288394, -0.72127314, -4.22473062]])
     monkeypatch.setattr(flood, "_MOST_STEPS", 1)
     found = heavy.solver.empty(1)
-    Postures.of(heavy.solver).by_line(gamma, np.array([0]), found)
+    Postures(heavy.solver).by_line(gamma, np.array([0]), found)
     assert found.status[0] == TipStatus.UNDECIDED
     assert np.isnan(found.tips).all()
 
@@ -396,7 +396,7 @@ def test_every_load_that_is_added_adds_to_the_phase(arm):
 def test_a_cantilever_hangs_from_its_base_as_published_however_heavy_its_payload(load):
     """The tip hardly turns any more, and the base must tell when it is found."""
     loads = Loads(gravity=NOTHING, tip_force=(load, 0, 0))
-    found = Postures.of(straight(uniform(1.0), loads, steps=64)).find(REST)
+    found = Postures(straight(uniform(1.0), loads, steps=64)).find(REST)
     assert found.status[0] == TipStatus.STABLE
     np.testing.assert_allclose(found.tips[0, [0, 2]], elastica.tip_loaded(load), atol=1e-7)
 

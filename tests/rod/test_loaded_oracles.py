@@ -27,7 +27,7 @@ REST = np.zeros((1, 3))
 def test_a_tip_force_and_a_moment_bend_an_elastica():
     for load, moment in ((1.0, 0.5), (2.0, 1.0)):
         loads = NOTHING.replace(tip_force=(load, 0, 0), tip_moment=(0, moment, 0))
-        tip = Postures.of(straight(uniform(1.0), loads)).find(REST).tips[0]
+        tip = Postures(straight(uniform(1.0), loads)).find(REST).tips[0]
         expected = elastica.tip_loaded_with_moment(load, moment)
         np.testing.assert_allclose(tip[[0, 2]], expected, atol=1e-9)
 
@@ -63,7 +63,7 @@ def test_a_bend_of_45_degrees_goes_to_its_published_place():
     bar, loads = bend.bend()
     body = uniform(bar.bending(0.0), bar.axial(0.0), bar.torsion(0.0))
     arm, gamma = bent_arm(bar.length, 0.01, body, NOTHING.replace(tip_force=loads.tip_force))
-    tip = Postures.of(Solver(LoadTables(arm=arm), 32, 1e-10)).find(gamma).tips[0]
+    tip = Postures(Solver(LoadTables(arm=arm), 32, 1e-10)).find(gamma).tips[0]
     np.testing.assert_allclose(tip, bend.TIP, atol=1e-6)
 
 
@@ -157,7 +157,7 @@ def test_all_of_sorosim_s_equilibria_are_those_of_the_branch_and_stable(step):
     """As far as rounded wrenches and the file's strains are right: a thousandth of the length."""
     assert len(sorosim.cases()) == 500
     cases = sorosim.cases()[::step]
-    found = [Postures.of(solver(case.loads)).find(REST) for case in cases]
+    found = [Postures(solver(case.loads)).find(REST) for case in cases]
     assert {int(one.status[0]) for one in found} == {TipStatus.STABLE}
     tips = np.concatenate([one.tips for one in found]) @ BASE
     apart = np.linalg.norm(tips - [case.place[-1] for case in cases], axis=1)

@@ -139,14 +139,14 @@ def test_a_parallel_tendon_or_chamber_is_the_forces_that_it_puts_on_a_passive_ar
 @pytest.mark.parametrize("load", [1.0, 10.0])
 def test_a_tip_force_bends_an_elastica(load):
     found = straight(uniform(1.0), Loads(gravity=(0, 0, 0), tip_force=(load, 0, 0)))
-    tip = Postures.of(found).find(np.zeros((1, 3))).tips[0]
+    tip = Postures(found).find(np.zeros((1, 3))).tips[0]
     np.testing.assert_allclose(tip[[0, 2]], elastica.tip_loaded(load), atol=1e-9)
 
 
 @pytest.mark.parametrize("load", [1.0, 4.0, 10.0, 50.0])
 def test_a_heavy_cantilever_drops_as_published(load):
     found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, load, 0)), steps=48)
-    tip = Postures.of(found).find(np.zeros((1, 3))).tips[0]
+    tip = Postures(found).find(np.zeros((1, 3))).tips[0]
     np.testing.assert_allclose(tip[[1, 2]], elastica.heavy(load), atol=1e-9)
 
 
@@ -154,7 +154,7 @@ def test_a_column_is_stable_up_to_its_own_greatest_height():
     greatest = column.greenhill()
     for share, status in ((0.999, TipStatus.STABLE), (1.001, TipStatus.UNSTABLE)):
         found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, 0, -share * greatest)))
-        of_column = Postures.of(found).find(np.zeros((1, 3)))
+        of_column = Postures(found).find(np.zeros((1, 3)))
         assert of_column.status[0] == status
         np.testing.assert_allclose(of_column.tips[0], [0, 0, 1], atol=1e-12)
 
@@ -162,7 +162,7 @@ def test_a_column_is_stable_up_to_its_own_greatest_height():
 def test_a_hanging_rod_stretches_by_the_weight_beyond_each_section():
     loads = Loads(gravity=(0, 0, 10.0), payload=0.4)
     found = straight(uniform(1.0, axial=40.0, mass=1.5), loads)
-    tip = Postures.of(found).find(np.zeros((1, 3))).tips[0]
+    tip = Postures(found).find(np.zeros((1, 3))).tips[0]
     np.testing.assert_allclose(tip, [0, 0, 1 + (7.5 + 4.0) / 40.0], atol=1e-12)
 
 
@@ -280,7 +280,7 @@ def test_what_is_found_at_once_is_what_is_followed_from_rest(gravity):
     young = 1000 * 9.81 / (5.0 * TRUNK.profile.outer_radius**2)
     solver = Solver(loaded(Loads(gravity=gravity), young=young).tables, 16, 1e-8)
     gamma = np.random.default_rng(2).uniform(-5 / 3, 0, (128, 3))
-    found, followed = Postures.of(solver).find(gamma), by_lines(solver, gamma)
+    found, followed = Postures(solver).find(gamma), by_lines(solver, gamma)
     assert (followed.status == TipStatus.STABLE).mean() > 0.95
     np.testing.assert_allclose(found.tips, followed.tips, atol=1e-7)
     np.testing.assert_array_equal(found.status, followed.status)

@@ -53,7 +53,7 @@ def test_tapered_columns_buckle_where_ritz_has_them_buckle(taper, payload):
     critical = column.buckling_gravity(1.0, of_column.bending, of_column.mass, payload=payload)
     for share, status in ((0.9995, TipStatus.STABLE), (1.0005, TipStatus.UNSTABLE)):
         fallen = arm.replace(loads=arm.loads.replace(gravity=(0, 0, -share * critical)))
-        found = Postures.of(solver_of(fallen)).find(rest[None])
+        found = Postures(solver_of(fallen)).find(rest[None])
         assert found.status[0] == status
         np.testing.assert_allclose(found.tips[0], [0, 0, 1], atol=1e-9)
 
@@ -72,7 +72,7 @@ def test_tapered_columns_buckle_where_ritz_has_them_buckle(taper, payload):
 def test_of_the_reported_equilibria_the_stable_ones_are_minima_of_energy(load, gravity, more):
     arm = weighed(CYLINDER, load, gravity, **more)
     gamma, solver = np.concatenate([SYMMETRIC, ANY]), solver_of(arm)
-    found = Postures.of(solver).find(gamma)
+    found = Postures(solver).find(gamma)
     assert (found.status != TipStatus.NO_EQUILIBRIUM).all()
     stations = chain_of(arm, gamma[0], 64).joints
     moments = solver.shapes(gamma, stations, found).moment
@@ -151,7 +151,7 @@ of_kinds = pytest.mark.parametrize("loads", KINDS.values(), ids=KINDS.keys())
 
 def tips(arm, loads, young=1e6, gamma=GAMMA):
     arm = rubber(arm, loads, young)
-    return Postures.of(Solver(LoadTables(arm=arm), 24, 1e-9)).find(gamma).tips
+    return Postures(Solver(LoadTables(arm=arm), 24, 1e-9)).find(gamma).tips
 
 
 def changed(loads, change):
@@ -217,7 +217,7 @@ def test_a_payload_is_the_limit_of_a_short_heavy_end():
 
     def tips_of(mass_per_length, loads):
         arm = of_body(MINIMAL, Measured(mass_per_length=mass_per_length), loads)
-        return Postures.of(Solver(LoadTables(arm=arm), 24, 1e-9)).find(GAMMA).tips
+        return Postures(Solver(LoadTables(arm=arm), 24, 1e-9)).find(GAMMA).tips
 
     expected, apart = tips_of(of_arm, side.replace(payload=mass)), []
     for length in (0.002, 0.001):

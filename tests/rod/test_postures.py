@@ -111,7 +111,7 @@ def test_a_chain_that_hangs_and_is_pulled_comes_to_rest_in_the_posture(name, sam
 def test_a_hanging_arm_leans_to_a_side_where_its_plane_of_symmetry_loses_its_stability():
     """At a pitchfork: continuously, and to the other side with the other twist."""
     rod = as_tip_map(example("tentacle", 0.02), 1e-8)
-    postures = Postures.of(rod.rod.solver)
+    postures = Postures(rod.rod.solver)
     planar = postures.find(np.array([[6.25, 6.25]]))
     assert planar.status[0] == TipStatus.STABLE
     assert abs(planar.tips[0, 1]) < 1e-9

@@ -8,7 +8,6 @@ odd.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,7 +18,6 @@ from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.sphere_maps import (
-    Map,
     Roots,
     icosphere,
     is_axisymmetric,
@@ -40,7 +38,7 @@ from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus, has_tip
+from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus
 from softreach.support.arrays import Array, Mask, as_floats
 from softreach.support.errors import InvalidInput, counted, warn
 
@@ -182,11 +180,15 @@ def equilibria(
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
     """
-    asked = of_tip(as_tip_map(arm, tol, warn=False))  # the degree tells whether any is missing
-    gamma = asked.inputs.every(_one(asked, activations))
-    rod = with_unstable(all_inputs(asked))
+    whole = of_tip(as_tip_map(arm, tol, warn=False))  # the degree says whether any is missing
+    gamma = as_floats("activations", activations)
+    gamma = whole.check_activations("activations", gamma[None] if gamma.ndim == 1 else gamma)
+    if len(gamma) != 1:
+        allowed = f"({whole.box.bundles},) or (1, {whole.box.bundles}): one activation at a time"
+        raise InvalidInput("activations.shape", gamma.shape, allowed)
+    gamma, rod = whole.inputs.every(gamma), with_unstable(all_inputs(whole))
     if not rod.supports_unstable:
-        return _one_of(rod, gamma, np.full((1, 3), np.nan), np.ones(1), complete=True)
+        return _single(rod, gamma, np.full((1, 3), np.nan), np.ones(1), complete=True)
     loaded, at = rod.rod, rod.inputs.activations(gamma)
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
@@ -197,22 +199,12 @@ def equilibria(
     posture = loaded.equilibria(at)
     if loaded.tables.phase.entire > SHOT_AT_ONCE:
         warn("the posture alone is listed: the loads are too heavy for a search of all others")
-        return _one_of(rod, gamma, posture.frame[:, :3], posture.margin, complete=False)
-    known = posture.frame[has_tip(posture.status), :3]  # as the tip sees it
+        return _single(rod, gamma, posture.frame[:, :3], posture.margin, complete=False)
+    known = posture.frame[posture.is_found, :3]  # as the tip sees it
     solver = Solver(loaded.tables.in_one_segment, loaded.unloaded_steps, rod.tol)
     solver = _resolving(solver, at)
     solver, roots = _accurate(solver, at, _search(solver, at, known))
-    result = _judged(rod, solver, at, roots, known)
-    return replace(result, activation=gamma[0])
-
-
-def _one(rod: TipMap, activations: ArrayLike) -> Array:
-    gamma = as_floats("activations", activations)
-    gamma = rod.check_activations("activations", gamma[None] if gamma.ndim == 1 else gamma)
-    if len(gamma) != 1:
-        allowed = f"({rod.box.bundles},) or (1, {rod.box.bundles}): one activation at a time"
-        raise InvalidInput("activations.shape", gamma.shape, allowed)
-    return gamma
+    return replace(_judged(rod, solver, at, roots, known), activation=gamma[0])
 
 
 def _crossing(loads: Loads, direction: Array) -> list[str]:
@@ -232,7 +224,7 @@ def _crossing(loads: Loads, direction: Array) -> list[str]:
     ]
 
 
-def _one_of(
+def _single(
     rod: ArmMap, gamma: Array, directions: Array, margin: Array, *, complete: bool
 ) -> AllEquilibria:
     return AllEquilibria(
@@ -251,34 +243,27 @@ def _one_of(
 
 
 def _search(solver: Solver, gamma: Array, known: Array) -> _Roots:
-    """All of them; the known ones are tried first."""
+    """All of them, searched more finely if the degree is not 1; the known ones are tried first."""
     image, axis = solver.base_map(gamma), solver.tables.axes[0]
     if is_axisymmetric(image, axis, SYMMETRIC):
         rings = pole_rings(image, axis, known[0] if len(known) else axis)
         directions = np.concatenate([axis[None], rings.points])
         is_ring = np.arange(len(directions)) > 0
         return _Roots(directions, np.append(1, rings.signs), is_ring, rings.complete)
-    return _isolated(image, axis, known, _MOST_WALKED // solver.steps)
+    most, tries = _MOST_WALKED // solver.steps, list[_Roots]()
+    for levels, caution in _SEARCHES:
+        roots, was_cut = sphere_roots(
+            image, axis, levels=levels, caution=caution, starts=known, most=most
+        )
+        tries.append(_isolated(roots, complete=was_cut))
+        if tries[-1].complete:
+            break
+    return tries[-1]
 
 
-def _isolated(
-    image: Map,
-    axis: Array,
-    known: Array,
-    most: int,
-    searches: Sequence[tuple[int, float]] = _SEARCHES,
-) -> _Roots:
-    """Those of an arm that is not axisymmetric, searched more finely if the degree is not 1."""
-    (levels, caution), *finer = searches
-    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known, most=most)
-    complete = cut and int(np.sign(roots.determinants).sum()) == 1
-    if complete or not finer:
-        return _of_roots(roots, complete=complete)
-    return _isolated(image, axis, known, most, finer)
-
-
-def _of_roots(roots: Roots, *, complete: bool) -> _Roots:
+def _isolated(roots: Roots, *, complete: bool) -> _Roots:
     signs = np.sign(roots.determinants).astype(np.int8)
+    complete = complete and int(signs.sum()) == 1
     return _Roots(roots.points, signs, np.zeros(len(signs), bool), complete)
 
 
@@ -319,8 +304,8 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
 def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
     if roots.is_ring.any():
         return _search(solver, gamma, roots.directions[1:])
-    image, axis = solver.base_map(gamma), solver.tables.axes[0]
-    return _of_roots(polished_roots(image, axis, roots.directions), complete=roots.complete)
+    polished = polished_roots(solver.base_map(gamma), solver.tables.axes[0], roots.directions)
+    return _isolated(polished, complete=roots.complete)
 
 
 def _tips(solver: Solver, gamma: Array, roots: _Roots) -> Array:

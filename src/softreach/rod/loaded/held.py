@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from softreach.kernels.lanes import LANES
-from softreach.rod.loaded.flood import are_same, follow, smooth_edges
+from softreach.rod.loaded.flood import Flood, are_same, edges_along, follow, neighbors, smooth_edges
 from softreach.rod.loaded.postures import Postures, polished
 from softreach.rod.loaded.solver import Equilibria, Solver
 from softreach.rod.tip_map import Held
@@ -40,7 +40,9 @@ def held_over(
     grid = _Grid(postures.solver, gamma, sizes)
     grid.fill(postures, grid.has_arm)
     is_doubled = grid.states[:, 1] >= 0
-    beside = grid.has_arm & postures.differ(mirrored, gamma)
+    beside = grid.has_arm
+    if postures.flood is not None and mirrored.flood is not None:
+        beside = beside & postures.flood.differ(mirrored.flood, gamma)
     if beside.any():
         grid.fill(mirrored, beside)
     return grid.held(is_doubled, points)
@@ -66,8 +68,9 @@ class _Grid:
 
     def fill(self, postures: Postures, where: Mask) -> None:
         """Find the postures that are connected with those at some nodes, on the twin of a side."""
-        first, uncut = len(self.node), self.has_arm.copy()
-        uncut[uncut] = postures.is_uncut(self.gamma[uncut])
+        first, uncut = len(self.node), self.has_arm & (postures.flood is not None)
+        if postures.flood is not None:
+            uncut[uncut] = postures.flood.is_uncut(self.gamma[uncut])
         by_lines = not uncut.any()
         if by_lines:
             place = np.unravel_index(np.arange(len(where)), self.sizes)
@@ -79,7 +82,7 @@ class _Grid:
         at[nodes[good]] = self._put(nodes[good], known.of(good))
         if not len(self.node):
             return
-        self._link_smooth(at, postures)
+        self._link_smooth(at, postures.flood)
         front = np.arange(first, len(self.node))
         while len(front):
             front = self._wave(postures.twin, front)
@@ -130,18 +133,18 @@ class _Grid:
         self.next[low, column], self.next[high, column ^ 1] = high, low
         self.links.append(np.stack([low, high], axis=1))
 
-    def _link_smooth(self, at: Index, postures: Postures) -> None:
+    def _link_smooth(self, at: Index, flood: Flood | None) -> None:
         """Link neighbors on an edge in an uncut cell, or that goes on as that beside it does."""
         lost = np.where(at >= 0, 0.0, np.nan)[:, None]
         frames = (self.found.frame[at] + lost).reshape(*self.sizes, -1)
         tips = (self.found.tips[at] / self.length + lost).reshape(*self.sizes, 3)
-        numbers = np.arange(len(at)).reshape(self.sizes)
         for axis in range(len(self.sizes)):
-            low, high = (np.delete(numbers, end, axis).ravel() for end in (-1, 0))
+            low, high = edges_along(self.sizes, axis)
             smooth = smooth_edges(frames, tips, axis).ravel()
             both = (at[low] >= 0) & (at[high] >= 0)
             low, high, smooth = low[both], high[both], smooth[both]
-            smooth |= postures.is_uncut(0.5 * (self.gamma[low] + self.gamma[high]))
+            if flood is not None:
+                smooth |= flood.is_uncut(0.5 * (self.gamma[low] + self.gamma[high]))
             self._link(at[low[smooth]], at[high[smooth]], 2 * axis + 1)
 
     def _wave(self, twin: Solver, front: Index) -> Index:
@@ -150,17 +153,13 @@ class _Grid:
         for up in (1, 0):  # those that are found from below need not be followed from above
             row, column = np.nonzero((self.next[front] == _UNKNOWN) & (columns % 2 == up))
             state = front[row]
-            place = np.stack(np.unravel_index(self.node[state], self.sizes), axis=1)
-            place[np.arange(len(state)), column // 2] += 2 * up - 1
-            inside = ((place >= 0) & (place < self.sizes)).all(axis=1)
-            to = np.atleast_1d(np.ravel_multi_index(tuple(place[inside].T), self.sizes))
-            if len(to):
-                self._grow(twin, state[inside], to, column[inside])
+            to, exists = neighbors(self.sizes, self.node[state], column // 2, 2 * up - 1)
+            exists &= self.has_arm[to]
+            if exists.any():
+                self._grow(twin, state[exists], to[exists], column[exists])
         return np.arange(known, len(self.node))
 
     def _grow(self, twin: Solver, state: Index, to: Index, column: Index) -> None:
-        exists = self.has_arm[to]
-        state, to, column = state[exists], to[exists], column[exists]
         ends, share = self._followed(twin, state, to, column)
         good, before = ends.is_found.copy(), self.found.of(state)
         numbers = self._put(to[good], ends.of(good))

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import ClassVar
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.kernels.lanes import LANES
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded.flood import CUT, PARTS, Flood, Flooding, Followed, follow
+from softreach.rod.loaded.flood import CUT, PARTS, Flood, Followed, follow
 from softreach.rod.loaded.solver import Equilibria, Solver, turn_between
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.tip_map import BLOCK, TipStatus
@@ -39,6 +38,7 @@ _NODES = {1: 33, 2: 33, 3: 17}  # of the grid for each free bundle: at most a fe
 _TWIST = 1e-4  # [rad], of the twin over its length
 _OF_TWIN = 1e-3  # [L], its tolerance, as postures are polished on the arm
 _DOUBTFUL = 0.02  # margin below which what is found from the unloaded arm may not be its posture
+_NEAR = 0.15  # [rad], of what the flood guesses
 _BESIDE = 0.03  # [rad], by which the arm differs from its twin but near a pitchfork
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
@@ -56,21 +56,19 @@ class Postures:
 
     Args:
         solver: That of the arm.
-        box: Bounds of its activations.
         side: Sense of the twist that decides between mirror images, 1 or -1.
+        flood: Starts on a grid over the box of activations; None for those on lines alone.
     """
 
     solver: Solver
-    box: ActivationBox
     side: int = 1
-    _nearness: ClassVar[float] = np.inf  # [rad], of what is found from guesses
-    _least: ClassVar[float] = _DOUBTFUL  # margin of what is found from guesses
+    flood: Flood | None = None
 
-    @classmethod
-    def of(cls, solver: Solver) -> Postures:
-        """Those of an arm, by lines from rest."""
-        arm = solver.tables.arm
-        return Postures(solver, ActivationBox.between(arm.bounds, arm.bundle_names))
+    @lazy
+    def box(self) -> ActivationBox:
+        """Bounds of the activations."""
+        arm = self.solver.tables.arm
+        return ActivationBox.between(arm.bounds, arm.bundle_names)
 
     @lazy
     def twin(self) -> Solver:
@@ -133,13 +131,20 @@ class Postures:
         order, guesses = self._guesses(gamma[at])
         at = at[order]
         found = self.solver.search(gamma[at], guesses)
-        good = found.margin > self._least
-        if guesses is not None:
-            good &= turn_between(found.frame, guesses) < self._nearness
+        good = found.margin > (_DOUBTFUL if self.flood is None else 0.0)
+        if self.flood is not None and guesses is not None:
+            good &= turn_between(found.frame, guesses) < _NEAR
         self.solver.put(gamma, at, found.only(good), equilibria)
 
     def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
-        """Rows, and frames of the unloaded arm there, or of one that hangs along it."""
+        """Rows, and frames there of the flood, of the unloaded arm, or of one that hangs along it.
+
+        Those of uncut cells, rough ones last: lanes wait for the slowest among them.
+        """
+        if self.flood is not None:
+            frames, rough = self.flood.at(gamma)
+            order = np.argsort(rough, kind="stable")[: (rough < CUT).sum()]
+            return order, frames[order]
         tables, every = self.solver.tables, np.arange(len(gamma))
         if tables.phase.entire <= _HANGING or tables.axes[0, 2] < _PULLED:
             return every, None
@@ -177,13 +182,49 @@ class Postures:
         self.solver.put(gamma, rows, found, equilibria)
 
     def followed(self, gamma: Array) -> Followed:
-        """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
+        """Branches of the twin from nodes of the flood, or along lines from rest."""
+        return self._from_rest(gamma) if self.flood is None else self._flooded(self.flood, gamma)
+
+    def _from_rest(self, gamma: Array) -> Followed:
+        """Along lines from rest; where nothing holds the twin there, from beside it."""
         if self.is_held_at_rest:
             begin = np.repeat(self.rest_activation, len(gamma), axis=0)
             start = self.rest.of(np.zeros(len(gamma), int))
         else:
             begin, start = self._leaning(gamma)
         return follow(self.twin, begin, gamma, start)
+
+    def _flooded(self, flood: Flood, gamma: Array) -> Followed:
+        """In uncut cells from the nearest node, else from where the lines meet the first cut."""
+        uncut = flood.is_uncut(gamma)
+        begin, start = flood.nearest(gamma)
+        slopes = flood.at(gamma)[0] - start.frame
+        cut = np.flatnonzero(~uncut)
+        if len(cut):
+            begin[cut], of_cut, slopes[cut] = self._before_cuts(flood, gamma[cut])
+            start.put(cut, of_cut)
+        followed = follow(self.twin, begin, gamma, start, slopes)
+        lost = np.flatnonzero(uncut & ~followed.last.is_found)
+        if len(lost):
+            by_line = self._from_rest(gamma[lost])
+            followed.has_ended[lost] = by_line.has_ended
+            followed.last.put(lost, by_line.last)
+        return followed
+
+    def _before_cuts(self, flood: Flood, gamma: Array) -> tuple[Array, Equilibria, Array]:
+        """Where lines meet their first cut, else rest; postures there, and changes of frames."""
+        rest, clear = self.rest_activation, flood.clear(gamma)[:, None]
+        way = gamma - rest
+        begin = rest + clear * way
+        guesses = flood.at(begin)[0]
+        before = flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
+        slopes = (1.0 - clear) * PARTS * (guesses - before)
+        start = self.twin.search(begin, guesses)
+        near = turn_between(start.frame, guesses) <= _NEAR
+        lost = np.flatnonzero(~(start.is_stable & near))
+        start.put(lost, self.rest.of(np.zeros(len(lost), int)))
+        begin[lost], slopes[lost] = rest, 0.0
+        return begin, start, slopes
 
     def _leaning(self, gamma: Array) -> tuple[Array, Equilibria]:
         """Places on lines where the twin leans that nothing holds at rest, and how it does."""
@@ -200,22 +241,12 @@ class Postures:
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
         """Postures of an arm that is in one of some at activations (k, bundles)."""
-        return ContinuedPostures(
-            self.solver, self.box, self.side, origin=self, at=gamma, frame=frame
-        )
-
-    def is_uncut(self, gamma: Array) -> Mask:
-        """Mask of activations in cells of the flooded grid that are on one branch."""
-        return np.zeros(len(gamma), bool)
-
-    def differ(self, mirrored: Postures, gamma: Array) -> Mask:
-        """Mask of activations beside which the other side may hold another posture."""
-        return np.ones(len(gamma), bool)
+        return ContinuedPostures(self.solver, self.side, origin=self, at=gamma, frame=frame)
 
     @lazy
     def mirrored(self) -> Postures:
         """Those of the twin with the other twist."""
-        return Postures(self.solver, self.box, -self.side)
+        return Postures(self.solver, -self.side)
 
     def with_flood(self) -> Postures:
         """The same, with starts from a grid over the box where that is worth it."""
@@ -223,11 +254,10 @@ class Postures:
         if nodes is None or not self.is_held_at_rest:
             return self
         sizes = tuple(nodes if free else 1 for free in self.box.is_free)
-        grid = Flooding(self.twin, self.box, sizes)
-        flood = grid.run(self.rest_activation, self.rest)
-        on_arm = polished(self.solver, grid.gamma, flood.held, _BESIDE)
+        flood = Flood(self.twin, self.box, sizes, self.rest_activation, self.rest)
+        on_arm = polished(self.solver, flood.gamma, flood.held, _BESIDE)
         flood.held.put(np.flatnonzero(on_arm.is_found), on_arm.of(on_arm.is_found))
-        return FloodedPostures(self.solver, self.box, self.side, flood=flood)
+        return Postures(self.solver, self.side, flood)
 
 
 def polished(solver: Solver, gamma: Array, on_twin: Equilibria, within: float) -> Equilibria:
@@ -235,61 +265,6 @@ def polished(solver: Solver, gamma: Array, on_twin: Equilibria, within: float) -
     found = solver.search(gamma, on_twin.frame)
     near = turn_between(found.frame, on_twin.frame) < within
     return found.only(on_twin.is_found & found.is_stable & near)
-
-
-@dataclass(frozen=True, eq=False)
-class FloodedPostures(Postures):
-    """The same with starts from a flooded grid."""
-
-    flood: Flood = field(kw_only=True)
-    _nearness: ClassVar[float] = 0.15
-    _least: ClassVar[float] = 0.0
-
-    def is_uncut(self, gamma: Array) -> Mask:
-        return self.flood.is_uncut(gamma)
-
-    def differ(self, mirrored: Postures, gamma: Array) -> Mask:
-        if not isinstance(mirrored, FloodedPostures):
-            return super().differ(mirrored, gamma)
-        return self.flood.differ(mirrored.flood, gamma)
-
-    def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
-        """Those of uncut cells, rough ones last: lanes wait for the slowest among them."""
-        frames, rough = self.flood.at(gamma)
-        order = np.argsort(rough, kind="stable")[: (rough < CUT).sum()]
-        return order, frames[order]
-
-    def followed(self, gamma: Array) -> Followed:
-        """In uncut cells from the nearest node, else from where the lines meet the first cut."""
-        uncut = self.flood.is_uncut(gamma)
-        begin, start = self.flood.nearest(gamma)
-        slopes = self.flood.at(gamma)[0] - start.frame
-        cut = np.flatnonzero(~uncut)
-        if len(cut):
-            begin[cut], of_cut, slopes[cut] = self._before_cuts(gamma[cut])
-            start.put(cut, of_cut)
-        followed = follow(self.twin, begin, gamma, start, slopes)
-        lost = np.flatnonzero(uncut & ~followed.last.is_found)
-        if len(lost):
-            by_line = super().followed(gamma[lost])
-            followed.has_ended[lost] = by_line.has_ended
-            followed.last.put(lost, by_line.last)
-        return followed
-
-    def _before_cuts(self, gamma: Array) -> tuple[Array, Equilibria, Array]:
-        """Where lines meet their first cut, else rest; postures there, and changes of frames."""
-        rest, clear = self.rest_activation, self.flood.clear(self.rest_activation, gamma)[:, None]
-        way = gamma - rest
-        begin = rest + clear * way
-        guesses = self.flood.at(begin)[0]
-        before = self.flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
-        slopes = (1.0 - clear) * PARTS * (guesses - before)
-        start = self.twin.search(begin, guesses)
-        near = turn_between(start.frame, guesses) <= self._nearness
-        lost = np.flatnonzero(~(start.is_stable & near))
-        start.put(lost, self.rest.of(np.zeros(len(lost), int)))
-        begin[lost], slopes[lost] = rest, 0.0
-        return begin, start, slopes
 
 
 @dataclass(frozen=True, eq=False)
@@ -364,7 +339,6 @@ class Ring:
         tables, axis = solver.tables, solver.tables.axes[0]
         if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
             return None
-
         image = solver.base_map(rest)
         if not is_axisymmetric(image, axis, SYMMETRIC):
             return None

@@ -73,7 +73,7 @@ class PushingTip:
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
         if near is None:
-            known = Postures.of(solver).find(sample)
+            known = Postures(solver).find(sample)
         else:
             known = solver.near(sample, near.equilibrium)
         response = solver.respond(sample, known, compliance=True)
@@ -97,7 +97,7 @@ class PushingTip:
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if the force alone, raised from the posture without it, leads there."""
         sample, share, step = gamma[None], 0.0, 0.25
-        held = Postures.of(self._solver(0.0, self.steps)).find(sample)
+        held = Postures(self._solver(0.0, self.steps)).find(sample)
         while share < 1.0 and step > _SHORTEST:
             to = min(1.0, share + step)
             found = self._solver(to * force, self.steps).near(sample, held)

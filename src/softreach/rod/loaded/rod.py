@@ -18,22 +18,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.body import load_number
-from softreach.rod.free import (
-    ArmRod,
-    FreeRod,
-    add_offset,
-)
+from softreach.rod.free import ArmRod, FreeRod, add_offset
 from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Equilibria, LoadedShapes, Solver, turn_between
 from softreach.rod.loaded.tables import LoadTables
-from softreach.rod.response import (
-    NodeTables,
-    linear_response,
-    node_tables,
-    rod_state,
-    step_grid,
-)
+from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.rod.steps import enough_for_all_breaks, pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
@@ -43,7 +33,6 @@ from softreach.rod.tip_map import (
     Status,
     TipOutputs,
     drop,
-    has_tip,
     position_slopes,
 )
 from softreach.support import parallel
@@ -100,27 +89,51 @@ class LoadedRod(ArmRod):
         Raises:
             InvalidInput: None is enough.
         """
-        return _checked(self._tip_steps, self._tip_tol)
+        return self._checked(self._tip_steps)
 
     @lazy
     def _tip_steps(self) -> int | None:
-        """Steps with which `tol` holds for tips, if any are enough, theory (72)."""
-        fewest = self.tables.phase.fewest_steps
-        return self.fixed_steps or self._fewest(fewest, tip_differences)
+        return self.fixed_steps or self._fewest(self.tables.phase.fewest_steps, tip_differences)
 
     @lazy
     def _shape_steps(self) -> int | None:
-        """Steps with which `tol` holds all along the arm, if any are enough."""
         return self.fixed_steps or self._fewest(self.steps, shape_differences)
 
+    def _checked(self, steps: int | None) -> int:
+        if steps is None:
+            allowed = f"reachable within {_MOST_STEPS} steps"
+            raise InvalidInput("tol", self._tip_tol, allowed, "enlarge it")
+        return steps
+
     def _fewest(self, least: int, differences: Differences) -> int | None:
+        """The fewest steps with which `tol` holds; None where the most are too few."""
         pilot, steps = pilot_activations(self.arm, self.box), max(least, _FEWEST_STEPS)
         others = pilot[_FEW:]  # behind the first, which are corners
         few = np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
-        enough = _enough(self._solver_of, few, steps, differences)
+        enough = self._enough(few, steps, differences)
         if enough is not None:
-            enough = _enough(self._solver_of, pilot, enough or steps, differences)
+            enough = self._enough(pilot, enough or steps, differences)
         return max(least, self.unloaded_steps) if enough == _UNJUDGED else enough
+
+    def _enough(self, gamma: Array, steps: int, differences: Differences) -> int | None:
+        """The same for some activations; `_UNJUDGED` where nothing judges any steps."""
+        at_all, allowed = enough_for_all_breaks(self.arm), self._tip_tol * self.length / _SAFETY
+        known = Postures(self._solver_of(steps)).find(gamma)
+        gamma, known = gamma[known.is_found], known.of(known.is_found)
+        while steps <= max(_MOST_STEPS, _FINER * at_all):
+            solver = self._solver_of(steps)
+            equilibria = solver.near(gamma, known)
+            settled = equilibria.is_found & (np.abs(equilibria.margin) > _CRITICAL)
+            errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
+            if not len(errors):
+                return _UNJUDGED
+            error = float(errors.max())
+            if error <= allowed:
+                return steps
+            steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
+            if steps > _MOST_STEPS:
+                steps = max(steps, at_all)
+        return None
 
     @lazy
     def unloaded_steps(self) -> int:
@@ -138,11 +151,11 @@ class LoadedRod(ArmRod):
     @lazy
     def postures(self) -> Postures:
         """Postures, with starts on a grid over the box where that is worth it."""
-        return Postures.of(self.solver).with_flood()
+        return Postures(self.solver).with_flood()
 
     @lazy
     def _shape_solver(self) -> Solver:
-        return self._solver_of(_checked(self._shape_steps, self._tip_tol))
+        return self._solver_of(self._checked(self._shape_steps))
 
     @lazy
     def _mirrored(self) -> Postures:
@@ -288,33 +301,6 @@ class _ContinuedRod(LoadedRod):
         return self.origin._shape_solver
 
 
-def _enough(
-    solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
-) -> int | None:
-    """The fewest steps, `_UNJUDGED` where nothing judges any; None where the most are too few."""
-    tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
-    known: Equilibria | None = None
-    while steps <= max(_MOST_STEPS, _FINER * at_all):
-        solver = solver_of(steps)
-        allowed = tol * solver.tables.arm.length / _SAFETY
-        if known is None:
-            known = Postures.of(solver).find(gamma)
-            held = has_tip(known.status)
-            gamma, known = gamma[held], known.of(held)
-        equilibria = solver.near(gamma, known)
-        settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
-        errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
-        if not len(errors):
-            return _UNJUDGED
-        error = float(errors.max())
-        if error <= allowed:
-            return steps
-        steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
-        if steps > _MOST_STEPS:
-            steps = max(steps, at_all)
-    return None
-
-
 def _bulk(distances: Array) -> Array:
     """Without those that are far larger than nearly all."""
     known = distances[np.isfinite(distances)]
@@ -337,9 +323,3 @@ def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
 
 def _distances(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=-1)
-
-
-def _checked(steps: int | None, tol: float) -> int:
-    if steps is None:
-        raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
-    return steps
