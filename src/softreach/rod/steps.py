@@ -136,12 +136,8 @@ class StepRule:
             InvalidInput: `tol` below 1e-12, or not reached within 4,096 steps.
         """
         check_tol(tol)
-        at_all = enough_for_all_breaks(self.arm)
-
-        def halving(steps: int) -> Differences:
-            return _tips_apart(*self._halves(steps))
-
-        exact = self._fewest(tol, halving, MOST_TURN_OF_STEP, at_all)
+        at_all, turn = enough_for_all_breaks(self.arm), MOST_TURN_OF_STEP
+        exact = self._fewest(tol, lambda steps: _tips_apart(*self._halves(steps)), turn, at_all)
         if not at_all:
             return exact
         fine = self.packed(self.edges(exact))
@@ -149,7 +145,7 @@ class StepRule:
         def from_fine(steps: int) -> Differences:
             return _tips_apart(self.packed(self.edges(steps)), fine)
 
-        return self._search(tol, from_fine, MOST_TURN_OF_STEP, 0, at_all - 1) or exact
+        return self._search(tol, from_fine, turn, 0, at_all - 1) or exact
 
     def steps_for_shapes(self, tol: float) -> int:
         """As `steps_for`, for the largest error of the centerline anywhere along the arm."""
@@ -166,12 +162,7 @@ class StepRule:
         raise InvalidInput("tol", tol, f"reachable within {most} steps", "use a larger one")
 
     def _search(
-        self,
-        tol: float,
-        halving: Callable[[int], Differences],
-        turn: float,
-        least: int,
-        most: int,
+        self, tol: float, halving: Callable[[int], Differences], turn: float, least: int, most: int
     ) -> int | None:
         """The fewest steps whose differences on the pilot, and on what it leads to, are allowed."""
         allowed = tol * self.arm.length / _SAFETY
@@ -221,16 +212,15 @@ class StepRule:
         steps = len(self.edges(steps)) - 1
         ends = np.arange(1, steps + 1)
 
-        def of_block(gamma: Array) -> Array:
-            places = np.empty((2, len(gamma), steps, 3))
-            directors = np.empty((len(gamma), steps, 3, 3))
-            frames.frames(coarse, ends, gamma, places[0], directors)
-            frames.frames(fine, 2 * ends, gamma, places[1], directors)
-            return np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
-
         def difference(gamma: Array) -> Array:
-            rows = parallel.blocks(len(gamma), _SHAPES)
-            return np.concatenate([of_block(gamma[block]) for block in rows])
+            errors = np.empty(len(gamma))
+            for block in parallel.blocks(len(gamma), _SHAPES):
+                places = np.empty((2, len(errors[block]), steps, 3))
+                directors = np.empty((*places.shape[1:], 3))
+                frames.frames(coarse, ends, gamma[block], places[0], directors)
+                frames.frames(fine, 2 * ends, gamma[block], places[1], directors)
+                errors[block] = np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
+            return errors
 
         return difference
 

@@ -311,7 +311,7 @@ def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
 def _tips(solver: Solver, gamma: Array, roots: _Roots) -> Array:
     many = np.repeat(gamma, len(roots.directions), axis=0)
     stations = np.array([solver.tables.arm.length])
-    return solver.shapes_facing(many, roots.directions, stations)[0].frames.position[:, 0]
+    return solver.shapes_facing(many, roots.directions, stations)[0].position[:, 0]
 
 
 def _judged(
@@ -321,7 +321,7 @@ def _judged(
     shapes, margin = solver.shapes_facing(many, roots.directions, np.array([rod.length]))
     margin = np.where(roots.is_ring & (margin > -NEUTRAL), 0.0, margin)
     stable = (roots.signs > 0) & np.where(roots.is_ring, margin == 0.0, margin > 0.0)
-    places = np.round(shapes.frames.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
+    places = np.round(shapes.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
     order = np.lexsort((*places.T, -np.round(margin, 6), ~stable))
     followed = _nearest(roots, known, axis)
     complete = roots.complete and (followed is not None or not len(known))
@@ -332,7 +332,7 @@ def _judged(
         rod=rod,
         solver=solver,
         activation=gamma[0],
-        tips=rod.pose.to_world(shapes.frames.position[order, 0]),
+        tips=rod.pose.to_world(shapes.position[order, 0]),
         status=np.where(stable, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)[order],
         margin=margin[order],
         directions=roots.directions[order],

@@ -97,10 +97,6 @@ class Postures:
         start = self.twin.search(gamma, None, np.zeros(1))
         return follow(self.twin, gamma, gamma, start, hangs=False)
 
-    @lazy
-    def _ring(self) -> Ring | None:
-        return Ring.at_rest(self.solver, self.rest_activation)
-
     def find(self, gamma: Array) -> Equilibria:
         """Postures at activations (n, bundles), on the calling thread."""
         equilibria = self.solver.empty(len(gamma))
@@ -232,12 +228,52 @@ class Postures:
         begin = rest + _FIRST_PARTS[0] * (gamma - rest)
         if ring is None:
             return begin, self._hung(begin).last
-        start = ring.near(self.twin, begin)
+        start = self._near_ring(*ring, begin)
         for part in _FIRST_PARTS[1:]:
             left = np.flatnonzero(~start.is_found)
             begin[left] = rest + part * (gamma[left] - rest)
-            start.put(left, ring.near(self.twin, begin[left]))
+            start.put(left, self._near_ring(*ring, begin[left]))
         return begin, start
+
+    @lazy
+    def _ring(self) -> tuple[Array, float] | None:
+        """Frame of an arm of the ring that leans at rest, and the azimuth to which this one does.
+
+        None where there is none, loads have several directions, or are too heavy for a search.
+        """
+        solver, rest, tables = self.solver, self.rest_activation, self.solver.tables
+        if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
+            return None
+        image, axis = solver.base_map(rest), tables.axes[0]
+        if not is_axisymmetric(image, axis, SYMMETRIC):
+            return None
+        rings = pole_rings(image, axis, axis)
+        points = rings.points[rings.signs > 0]
+        whole = replace(solver, tables=tables.in_one_segment)
+        many, tip = np.repeat(rest, len(points), axis=0), np.array([tables.arm.length])
+        shapes, margin = whole.shapes_facing(many, points, tip)
+        if not (margin > -NEUTRAL).any():
+            return None
+        first = int((margin > -NEUTRAL).argmax())
+        frame = solver.frames_facing(rest, points[[first]])[0]
+        return frame, float(_azimuth(shapes.position[:, 0], tables.axes)[first])
+
+    def _near_ring(self, frame: Array, azimuth: float, gamma: Array) -> Equilibria:
+        """Stable equilibria of the twin near the ring, under small activations (n, bundles).
+
+        They lean to about where the activations bend the unloaded arm; without a bend none is
+        found.
+        """
+        twin, tables = self.twin, self.twin.tables
+        leaning = twin.search(gamma, None).only(np.zeros(len(gamma), bool))
+        bent = FreeRod(tables.arm, 1e-6).tips(gamma)
+        bends = np.linalg.norm(bent @ tables.axes[1:].T, axis=1) > _STRAIGHT * tables.arm.length
+        there = _azimuth(bent, tables.axes) - azimuth
+        for turn in _TURNS:
+            left = np.flatnonzero(bends & ~leaning.is_found)
+            found = twin.search(gamma[left], _turned(frame, there[left] + turn, tables.axes))
+            leaning.put(left[found.is_stable], found.of(found.is_stable))
+        return leaning
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
         """Postures of an arm that is in one of some at activations (k, bundles)."""
@@ -321,63 +357,15 @@ class ContinuedPostures(Postures):
         return True
 
 
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """The ring of one arm under loads along one direction."""
-
-    frame: Array
-    """As in `Equilibria`, of one arm of the ring, shape (component,)."""
-    azimuth: float
-    """To which this one leans, about the first axis of the world [rad]."""
-
-    @classmethod
-    def at_rest(cls, solver: Solver, rest: Array) -> Ring | None:
-        """The ring of an arm at rest (1, bundles).
-
-        None where there is none, loads have several directions, or are too heavy for a search.
-        """
-        tables, axis = solver.tables, solver.tables.axes[0]
-        if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
-            return None
-        image = solver.base_map(rest)
-        if not is_axisymmetric(image, axis, SYMMETRIC):
-            return None
-        rings = pole_rings(image, axis, axis)
-        points = rings.points[rings.signs > 0]
-        whole = replace(solver, tables=tables.in_one_segment)
-        many, tip = np.repeat(rest, len(points), axis=0), np.array([tables.arm.length])
-        shapes, margin = whole.shapes_facing(many, points, tip)
-        if not (margin > -NEUTRAL).any():
-            return None
-        first = int((margin > -NEUTRAL).argmax())
-        frame = solver.frames_facing(rest, points[[first]])[0]
-        return cls(frame, float(_azimuth(shapes.frames.position[:, 0], tables.axes)[first]))
-
-    def near(self, twin: Solver, gamma: Array) -> Equilibria:
-        """Stable equilibria of the twin near the ring, under small activations (n, bundles).
-
-        They lean to about where the activations bend the unloaded arm; without a bend none is
-        found.
-        """
-        leaning, tables = twin.search(gamma, None).only(np.zeros(len(gamma), bool)), twin.tables
-        bent = FreeRod(tables.arm, 1e-6).tips(gamma)
-        bends = np.linalg.norm(bent @ tables.axes[1:].T, axis=1) > _STRAIGHT * tables.arm.length
-        there = _azimuth(bent, tables.axes) - self.azimuth
-        for turn in _TURNS:
-            left = np.flatnonzero(bends & ~leaning.is_found)
-            found = twin.search(gamma[left], self._turned(there[left] + turn, tables.axes))
-            leaning.put(left[found.is_stable], found.of(found.is_stable))
-        return leaning
-
-    def _turned(self, angles: Array, axes: Array) -> Array:
-        """Frames of other arms of the ring, shape (n, component)."""
-        turns = np.zeros((len(angles), 3, 3))
-        turns[:, 0, 0] = 1.0
-        turns[:, 1, 1] = turns[:, 2, 2] = np.cos(angles)
-        turns[:, 2, 1] = np.sin(angles)
-        turns[:, 1, 2] = -turns[:, 2, 1]
-        turned = self.frame.reshape(-1, 3) @ axes.T @ turns.transpose(0, 2, 1) @ axes
-        return turned.reshape(len(angles), self.frame.size)
+def _turned(frame: Array, angles: Array, axes: Array) -> Array:
+    """Frames of a frame that turns about the first axis [rad], shape (n, component)."""
+    turns = np.zeros((len(angles), 3, 3))
+    turns[:, 0, 0] = 1.0
+    turns[:, 1, 1] = turns[:, 2, 2] = np.cos(angles)
+    turns[:, 2, 1] = np.sin(angles)
+    turns[:, 1, 2] = -turns[:, 2, 1]
+    turned = frame.reshape(-1, 3) @ axes.T @ turns.transpose(0, 2, 1) @ axes
+    return turned.reshape(len(angles), frame.size)
 
 
 def _azimuth(places: Array, axes: Array) -> Array:

@@ -14,7 +14,7 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Equilibria, Solver, turn_between
 from softreach.rod.loaded.tables import LoadTables
-from softreach.rod.tip_map import TipStatus, position_slopes
+from softreach.rod.tip_map import position_slopes
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 
@@ -86,13 +86,15 @@ class PushingTip:
         """True if this equilibrium is stable; in doubt steps half as long decide."""
         if abs(response.margin) > _DOUBTFUL:
             return response.margin > 0
-        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
-        return bool(fine.status[0] == TipStatus.STABLE)
+        return bool(self._judged(gamma, force, response).is_stable[0])
 
     def error(self, gamma: Array, force: float, response: TipResponse) -> float:
         """Movement of the tip when the steps are halved [m]."""
-        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
+        fine = self._judged(gamma, force, response)
         return float(np.linalg.norm(fine.tips[0] - response.tip))
+
+    def _judged(self, gamma: Array, force: float, response: TipResponse) -> Equilibria:
+        return self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
 
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if the force alone, raised from the posture without it, leads there."""
@@ -102,7 +104,7 @@ class PushingTip:
             to = min(1.0, share + step)
             found = self._solver(to * force, self.steps).near(sample, held)
             turn = turn_between(found.frame, held.frame)[0]
-            if found.status[0] == TipStatus.STABLE and turn < _MOST_TURN:
+            if found.is_stable[0] and turn < _MOST_TURN:
                 held, share, step = found, to, 2.0 * step
             else:
                 step *= 0.5

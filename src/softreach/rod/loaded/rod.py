@@ -190,7 +190,7 @@ class LoadedRod(ArmRod):
         is_moving = slopes is not None or twists is not None
         if self.end < self.length:
             shapes = self._shape_solver.shapes(gamma, np.array([self.end]), known)
-            tips[:], directors = shapes.frames.position[:, 0], shapes.frames.directors[:, 0]
+            tips[:], directors = shapes.position[:, 0], shapes.directors[:, 0]
             moved = self._section_twists(gamma) if is_moving else None
         else:
             tips[:], directors, moved = known.tips, None, None
@@ -278,7 +278,7 @@ class LoadedRod(ArmRod):
     def _walked(self, gamma: Array, known: Equilibria, z: Array) -> tuple[LoadedShapes, Status]:
         """Shapes of known equilibria, undecided where steps that end at Z [m] do not find them."""
         shapes = self._shape_solver.shapes(gamma, z, known)
-        gone = known.is_found & np.isnan(shapes.frames.position[:, :1, 0]).any(axis=1)
+        gone = known.is_found & np.isnan(shapes.position[:, :1, 0]).any(axis=1)
         return shapes, known.only(~gone).status
 
 
@@ -318,7 +318,7 @@ def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
     """Between centerlines, along the arm."""
     stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
     shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.judge())]
-    return _distances(*(shape.frames.position for shape in shapes)).max(axis=1, initial=0.0)
+    return _distances(*(shape.position for shape in shapes)).max(axis=1, initial=0.0)
 
 
 def _distances(a: Array, b: Array) -> Array:

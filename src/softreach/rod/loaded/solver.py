@@ -78,32 +78,21 @@ class Response(NamedTuple):
 
 
 class LoadedShapes(NamedTuple):
-    """Arms at stations."""
+    """Arms at stations, all shapes (n, station, ...)."""
 
-    frames: Frames
+    position: Array
+    """r [m]."""
+    directors: Array
+    """d1, d2, d3 as rows."""
     moment: Array
-    """m [N m] in the directors, shape (n, station, 3)."""
+    """m [N m] in the directors."""
     force: Array
-    """n [N] in the directors, shape (n, station, 3)."""
+    """n [N] in the directors."""
 
-    @classmethod
-    def empty(cls, n: int, stations: int) -> LoadedShapes:
-        """Room for n."""
-        position, moment, force = np.empty((3, n, stations, 3))
-        return cls(Frames(position, np.empty((n, stations, 3, 3))), moment, force)
-
-    def put(self, rows: slice, some: LoadedShapes) -> None:
-        """Put some into place."""
-        self.frames.position[rows], self.frames.directors[rows] = some.frames
-        self.moment[rows], self.force[rows] = some.moment, some.force
-
-    def on_base(self) -> LoadedShapes:
-        """Moved and turned so that their last station stands on the base, and without it."""
-        (position, directors), moment, force = self
-        turn = np.swapaxes(directors[:, -1], -1, -2)
-        position, directors = (position - position[:, -1:]) @ turn, directors @ turn[:, None]
-        frames = Frames(position[:, :-1], directors[:, :-1])
-        return LoadedShapes(frames, moment[:, :-1], force[:, :-1])
+    @property
+    def frames(self) -> Frames:
+        """Centerlines and directors."""
+        return Frames(self.position, self.directors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,9 +241,12 @@ class Solver:
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
         trace = self._walked(gamma, directions, table, trace=True)[2]
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
-        shapes = _shapes_of(at, trace, table, rows, nowhere)
+        position, directors, *inner = _shapes_of(at, trace, table, rows, nowhere)
+        turn = np.swapaxes(directors[:, -1], -1, -2)  # so that the last one stands on the base
+        position, directors = (position - position[:, -1:]) @ turn, directors @ turn[:, None]
+        shapes = LoadedShapes(*(values[:, :-1] for values in (position, directors, *inner)))
         margin = self._shot(gamma, directions, table, (np.inf, np.inf, 0.0), walks=(1, 0)).margin
-        return shapes.on_base(), margin
+        return shapes, margin
 
     def frames_facing(self, gamma: Array, directions: Array) -> Array:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
@@ -289,7 +281,7 @@ class Solver:
             return Response(twists, yields, np.empty((0, 3, 3)))
         at, at_tip = np.zeros(1, int), np.array([self.tables.arm.length])
         shapes = _shapes_of(known.tips, trace, self._steps, at, at_tip)
-        return Response(twists, yields, shapes.frames.directors[:, 0])
+        return Response(twists, yields, shapes.directors[:, 0])
 
     def shapes(self, gamma: Array, stations: Array, known: Equilibria) -> LoadedShapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
@@ -299,7 +291,8 @@ class Solver:
             stations: Ascending Z [m]; there may be none.
             known: Their equilibria, with these steps or others.
         """
-        shapes = LoadedShapes.empty(len(gamma), len(stations))
+        places, directors = (len(gamma), len(stations), 3), (len(gamma), len(stations), 3, 3)
+        shapes = LoadedShapes(*map(np.empty, (places, directors, places, places)))
         if not len(stations):
             return shapes
         edges = self.tables.edges(stations, self.steps)
@@ -312,7 +305,9 @@ class Solver:
             found = self._shot(inner, some.frame[at], table, (_WIDEST, _SMALL, 1e-12))
             trace = self._walked(inner, found.frame, table, trace=True)[2]
             tips = np.where((lost | ~found.is_found)[:, None], np.nan, found.tips)
-            shapes.put(block, _shapes_of(tips, trace, table, rows, stations))
+            at_block = _shapes_of(tips, trace, table, rows, stations)
+            for values, new in zip(shapes, at_block, strict=True):
+                values[block] = new
 
         size = max(1, _TRACED // (len(edges) * TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
@@ -350,7 +345,7 @@ def _shapes_of(
     thrust = ((force + trace[..., 16:19])[..., None, :] @ world)[..., 0, :]
     for values in (position, directors, moment, thrust):
         values[np.isnan(tips).any(axis=1)] = np.nan
-    return LoadedShapes(Frames(position, directors), moment, thrust)
+    return LoadedShapes(position, directors, moment, thrust)
 
 
 def _world(trace: Array) -> Array:
