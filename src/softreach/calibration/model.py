@@ -7,7 +7,7 @@ equilibrium; all that follows from them, how the arm moves, is the linear respon
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +37,7 @@ from softreach.rod.response import (
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import rows as table_rows
 
 _BLOCK = 1024  # samples at once: their shapes at all nodes are kept
 _TOL = 1e-6
@@ -186,8 +187,7 @@ class MarkerModel:
         known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
         changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
         result = np.full((*places.shape, len(changes)), np.nan)
-        some = RodState(*(getattr(state, name)[known] for name in RodState.__dataclass_fields__))
-        result[known] = _slopes(rod.arm, at, some, changes, known)
+        result[known] = _slopes(rod.arm, at, table_rows(state, known), changes, known)
         return places, result, state.status
 
     def _change(
@@ -202,7 +202,7 @@ class MarkerModel:
         for _, other in neighbors:
             if isinstance(other, Base):  # gravity alone is another one in its frame
                 force = dead_force(arm, other, at.table.stations, at.table.length)
-                table = replace(at.table, force=force, weight=payload_weight(arm, other))
+                table = at.table._replace(force=force, weight=payload_weight(arm, other))
                 place = np.array(other.position)
                 each.append(at._replace(table=table, rotation=other.rotation, position=place))
             elif any(getattr(arm, part) != getattr(other, part) for part in _BODY):

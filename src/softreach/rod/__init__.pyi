@@ -1,4 +1,4 @@
-from .activation_box import ActivationBox as ActivationBox
+from .inputs import ActivationBox as ActivationBox
 from .kinematics import configuration as configuration
 from .kinematics import marker_positions as marker_positions
 from .kinematics import tip_jacobian as tip_jacobian

@@ -17,7 +17,7 @@ from softreach.arm.tables import Tables, check_extension, strain_stations, table
 from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import slopes as derivatives
 from softreach.kernels.rod import tips as rod
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
 from softreach.rod.tip_map import (

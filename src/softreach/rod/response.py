@@ -7,9 +7,8 @@ actuator ends inside one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +27,7 @@ _TOGETHER = 64
 """Samples to a task."""
 
 
-@dataclass(frozen=True, eq=False)
-class StepGrid:
+class StepGrid(NamedTuple):
     """Steps of an arm between the places where something begins or ends."""
 
     counts: NDArray[np.intp]
@@ -38,8 +36,7 @@ class StepGrid:
     """True if what ends at the base or at the tip may come to end before."""
 
 
-@dataclass(frozen=True, eq=False)
-class NodeTables:
+class NodeTables(NamedTuple):
     """Tables of an arm at the nodes of its steps, base first."""
 
     stations: Array
@@ -63,19 +60,14 @@ class NodeTables:
     asked: Array
     """Z of the stations that were asked for [m], shape (station,)."""
 
-    def combined(self, others: list[Self], factors: list[float]) -> Self:
+    def combined(self, others: list[NodeTables], factors: list[float]) -> NodeTables:
         """Σ factor x other, of differences."""
-        values: dict[str, Any] = {
-            field.name: sum(
-                f * getattr(o, field.name) for f, o in zip(factors, others, strict=True)
-            )
-            for field in fields(self)
-        }
-        return type(self)(**values)
+        columns = zip(*others, strict=True)
+        weighted = (map(np.multiply, factors, column) for column in columns)
+        return NodeTables(*(np.asarray(sum(terms)) for terms in weighted))
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
+class Response(NamedTuple):
     """Changes of places per unit of each column, in the frame of the base."""
 
     moves: Array
@@ -193,8 +185,7 @@ def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
     return force
 
 
-@dataclass(frozen=True, eq=False)
-class RodState:
+class RodState(NamedTuple):
     """Shapes of one arm in equilibrium at the nodes of its steps, in the frame of the base."""
 
     gamma: Array
@@ -216,12 +207,9 @@ class RodState:
 def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
     """Equilibria of a rod at activations of its arm, at the nodes of its tables."""
     z = np.concatenate([table.stations.ravel(), table.asked, [rod.length]])
-    order = np.argsort(z, kind="stable")
-    back = np.empty_like(order)
-    back[order] = np.arange(len(z))
-    frames, moment, status = rod.with_moments(gamma, np.clip(z[order], 0.0, rod.length))
-    moment = moment[:, back]
-    position, directors = frames.position[:, back], frames.directors[:, back]
+    ascending, back = np.unique(np.clip(z, 0.0, rod.length), return_inverse=True)
+    frames, moment, status = rod.with_moments(gamma, ascending)
+    position, directors, moment = (values[:, back] for values in (*frames, moment))
     steps, count, asked = table.stations.shape[0], table.stations.size, len(table.asked)
     return RodState(
         gamma,
@@ -252,12 +240,13 @@ def linear_response(
     if unit_loads is None:
         unit_loads = np.zeros((*table.length.shape, 4, 0))
     unit_loads = np.ascontiguousarray(unit_loads)
-    change = _at_rest_and_per_activation(table, changes)
-    lever = np.einsum("c,nca->na", table.lever, state.tip_directors)
-    tipping = _tipping(table, state, changes)
+    change, columns = _changed_tables(table, changes), bundles + len(changes)
+    lever, tipping = table.lever @ state.tip_directors, np.zeros((n, 3, columns))
+    for k, other in enumerate(changes, bundles):  # moment of the payload at the same directors
+        moved = other.lever @ state.tip_directors
+        tipping[..., k] = np.cross(lever, other.weight) + np.cross(moved, table.weight)
     marks = np.searchsorted(table.stations[:, 1], np.sort(table.asked))
-    asked, columns = len(table.asked), bundles + len(changes)
-    moves, turns = np.zeros((2, n, asked, 3, columns))
+    moves, turns = np.zeros((2, n, len(table.asked), 3, columns))
     works = np.zeros((n, unit_loads.shape[-1], columns))
 
     def fill(rows: slice) -> None:
@@ -272,34 +261,12 @@ def linear_response(
     return Response(moves[:, back], turns[:, back], works)
 
 
-def _tipping(table: NodeTables, state: RodState, changes: list[NodeTables]) -> Array:
-    """Change of the moment of the payload at the same directors, (n, 3, column)."""
-    n, bundles = state.gamma.shape
-    result = np.zeros((n, 3, bundles + len(changes)))
-    arm = np.einsum("c,nca->na", table.lever, state.tip_directors)
-    for k, change in enumerate(changes):
-        moved = np.einsum("c,nca->na", change.lever, state.tip_directors)
-        tipping = np.cross(arm, change.weight) + np.cross(moved, table.weight)
-        result[..., bundles + k] = tipping
-    return result
+def _changed_tables(table: NodeTables, changes: list[NodeTables]) -> tuple[Array, ...]:
+    """Changes of ζ̂ dZ, η dZ, U, compliance and force by column.
 
+    Those of products are per activation, (..., column, bundle + 1), the last place at rest.
+    """
 
-class _Changes(NamedTuple):
-    """Changes of tables: rows of columns; the last place of a product is its value at rest."""
-
-    stretch: Array
-    """Of ζ̂ dZ, shape (step, 3, column, bundle + 1)."""
-    rest_length: Array
-    """Of η dZ, likewise."""
-    curvature: Array
-    """Of U, shape (step, 3, 3, column, bundle)."""
-    compliance: Array
-    """Shape (step, 3, 4, column)."""
-    force: Array
-    """Shape (step, 3, 3, column)."""
-
-
-def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) -> _Changes:
     def stacked(name: str, axis: int) -> Array:
         whole = getattr(table, name)
         if not changes:
@@ -313,21 +280,16 @@ def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) ->
         by = length * getattr(table, name)[:, :, None] + each * stacked(name, -2)
         return np.concatenate([by, length], axis=-1)
 
-    return _Changes(
-        product("extension"),
-        product("rest_length_factor"),
-        stacked("curvature", -2),
-        stacked("compliance", -1),
-        stacked("force", -1),
-    )
+    products = product("extension"), product("rest_length_factor")
+    return *products, stacked("curvature", -2), stacked("compliance", -1), stacked("force", -1)
 
 
 def _per_arm(
-    table: NodeTables, change: _Changes, gamma: Array, d: Array, moment: Array
+    table: NodeTables, change: tuple[Array, ...], gamma: Array, d: Array, moment: Array
 ) -> tuple[Array, ...]:
     """What the kernel wants of one arm."""
-    length = table.length
-    whole = np.append(gamma, 1.0)
+    by_stretch, by_rest_length, by_curvature, by_compliance, by_force = change
+    length, whole = table.length, np.append(gamma, 1.0)
     axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
     thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
     squeeze = axial * thrust  # n3/K0
@@ -335,18 +297,18 @@ def _per_arm(
     stretch = length * (1.0 + table.extension @ gamma) + rest_length * squeeze
     bend = table.curvature @ gamma + bending * moment
     each = length[..., None]
-    grown, stretched = change.rest_length @ whole, change.stretch @ whole
-    bent = change.curvature @ gamma + change.compliance[..., 1:, :] * moment[..., None]
+    grown, stretched = by_rest_length @ whole, by_stretch @ whole
+    bent = by_curvature @ gamma + by_compliance[..., 1:, :] * moment[..., None]
     of_activations = (each * table.rest_length_factor)[:, :, None] * bend[..., None]
     of_activations += rest_length[..., None, None] * table.curvature
     of_changes = grown[:, :, None] * bend[..., None] + rest_length[..., None, None] * bent
     turning = np.concatenate([of_activations, of_changes], axis=-1)
     of_activations = each * (table.extension + table.rest_length_factor * squeeze[..., None])
     of_changes = stretched + grown * squeeze[..., None]
-    of_changes += rest_length[..., None] * change.compliance[..., 0, :] * thrust[..., None]
+    of_changes += rest_length[..., None] * by_compliance[..., 0, :] * thrust[..., None]
     pushing = np.concatenate([of_activations, of_changes], axis=-1)
     yielding = np.zeros((*table.force.shape, turning.shape[-1]))
-    yielding[..., len(gamma) :] = change.force
+    yielding[..., len(gamma) :] = by_force
     return (
         rest_length,
         stretch,

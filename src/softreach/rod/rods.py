@@ -14,9 +14,8 @@ from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
 from softreach.kernels.rod.frames import move, turn
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import ArmRod, FreeRod
-from softreach.rod.inputs import Inputs
+from softreach.rod.inputs import ActivationBox, Inputs
 from softreach.rod.tip_map import (
     Array,
     Frame,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +17,7 @@ from softreach.arm.profile import Profile
 from softreach.arm.tables import Tables, both_sides, jumps, tables
 from softreach.kernels.rod import frames, magnus
 from softreach.kernels.rod import tips as rod
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
 from softreach.support import parallel
 from softreach.support.arrays import Array, read_only
@@ -50,19 +49,6 @@ def tables_on(arm: Manipulator, z: Array) -> Tables:
     return Tables(z, *(value.reshape(*z.shape, *value.shape[1:]) for value in values))
 
 
-class Nodes(NamedTuple):
-    """Tables at the three Gauss nodes of every step, what a rod kernel reads."""
-
-    measure: Array
-    """Length of the step as each node sees it [m], shape (step, node)."""
-    stretch: Array
-    """z [-], shape (step, node, bundle)."""
-    rest_length_factor: Array
-    """Its part in η [-], shape (step, node, bundle)."""
-    curvature: Array
-    """U [1/m], shape (step, node, 3, bundle)."""
-
-
 @dataclass(frozen=True)
 class StepRule:
     """Steps along an arm, uniform in the slender coordinate S, in which bending is even.
@@ -90,18 +76,22 @@ class StepRule:
             marks = np.unique(np.concatenate([marks[marks < s[-1]], s]))
         return edges_between(profile, marks, steps)
 
-    def nodes(self, edges: ArrayLike) -> Nodes:
+    def nodes(self, edges: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
 
         Args:
             edges: Step boundaries S [-], ascending, shape (step + 1,).
+
+        Returns:
+            Length of the step as each node sees it [m], shape (step, node); z [-] and its part in
+            η [-], shape (step, node, bundle); U [1/m], shape (step, node, 3, bundle).
         """
         edges = np.asarray(edges, float)
         width = np.diff(edges)[:, None]
         s = edges[:-1, None] + width * np.array(magnus.NODES)
         z = self.arm.profile.station(s)
-        table, measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
-        return Nodes(measure, table.extension, table.rest_length_factor, table.curvature)
+        at, measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
+        return measure, at.extension, at.rest_length_factor, at.curvature
 
     def packed(self, edges: Array) -> Array:
         """Packed tables of the steps between edges, read-only."""

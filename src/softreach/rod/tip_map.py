@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.support import parallel
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, as_floats

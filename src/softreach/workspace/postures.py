@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import ArmMap
 from softreach.rod.tip_map import Shapes, TipMap, TipOutputs
 from softreach.support.arrays import Array

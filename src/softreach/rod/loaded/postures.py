@@ -19,8 +19,8 @@ import numpy as np
 
 from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.kernels.lanes import LANES
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.loaded.flood import CUT, PARTS, Flood, Followed, follow
 from softreach.rod.loaded.solver import Equilibria, Solver, turn_between
 from softreach.rod.loaded.tables import SHOT_AT_ONCE

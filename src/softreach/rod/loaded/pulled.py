@@ -96,7 +96,9 @@ class LoadedLengths:
         tension, taut = np.full_like(start.tension, np.nan), start.is_taut.copy()
         of_free = law.shortening_slopes(law.inner(bundles, start.tension))[..., law.columns]
         slopes = np.broadcast_to(of_free, (n, *law.compliance.shape * 2)).copy()
-        lowered, shortening = self._after(0.0 * tension, start.tension, bundles, _HALVINGS + 1)
+        lowered, shortening = self._after(
+            0.0 * start.tension, start.tension, bundles, _HALVINGS + 1
+        )
         left = np.flatnonzero(~_has_nan(shortening))
         state = rows(_State(lowered, shortening, slopes), left)
         for _ in range(_MOST_STEPS):
