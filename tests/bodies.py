@@ -17,6 +17,8 @@ from softreach.rod.loaded.tables import LoadTables
 from tests.oracles import rod
 
 _DEGREE = 40
+# The base frame stands upright; seen from it, gravity pulls back (up), aside, or ahead (down).
+UP, SIDE, DOWN = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (0.0, 0.0, 9.81)
 
 
 def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 1000.0):
@@ -27,8 +29,8 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
     return arm.replace(section=section, loads=loads)
 
 
-def weighed(arm: Manipulator, load: float, gravity=(0.0, 0.0, -9.81), **loads) -> Manipulator:
-    """The arm with E such that its load number is `load`."""
+def weighed(arm: Manipulator, load: float, gravity=UP, **loads) -> Manipulator:
+    """The arm with E such that its load number ρgL³/(E R2²) is `load`."""
     young = 1000 * 9.81 * arm.length**3 / (load * arm.profile.outer_radius**2)
     return rubber(arm, Loads(gravity=gravity, **loads), young)
 

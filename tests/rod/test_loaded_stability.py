@@ -17,11 +17,11 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import of_body, oracle_rod, rubber, weighed
+from tests.bodies import SIDE, UP, of_body, oracle_rod, rubber, weighed
 from tests.oracles import column
 from tests.oracles.chain import Chain
 
-UP, SIDE, ASLANT = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (3.0, 4.0, -8.0)
+ASLANT = (3.0, 4.0, -8.0)
 CYLINDER, TRUNK = designs.minimal_trunk(taper=0.0), designs.minimal_trunk()
 # Bent in the plane of symmetry, upright arms may fall out of it.
 SYMMETRIC = np.array([[-0.5, -0.5, -0.6], [-1.2, -1.2, -1.4], [-1.3, -1.3, -1.4]])

@@ -19,6 +19,7 @@ from softreach.arm.tables import compliance
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
 from softreach.rod.free import ArmRod
 from softreach.rod.steps import tables_on
+from softreach.rod.tip_map import InvalidLoads
 from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -170,7 +171,7 @@ def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
     others += [load.moment for load in loads.point_loads]
     if any(map(any, others)):
         allowed = "gravity, a payload and dead forces: moments and forces that follow have none"
-        raise InvalidInput("loads", "others", allowed)
+        raise InvalidLoads("loads", "others", allowed)
     gravity = np.array(loads.gravity)
     mass = np.zeros(z.shape)
     if gravity.any():

@@ -59,6 +59,10 @@ def has_tip(status: Status) -> NDArray[np.bool_]:
     return status <= TipStatus.UNSTABLE
 
 
+class InvalidLoads(InvalidInput):
+    """Loads under which an arm has no equilibrium, or none that can be computed."""
+
+
 class TipMap(ABC):
     """The map from the activations of one arm to its tip, to a tolerance; frozen.
 
@@ -459,7 +463,7 @@ def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> 
     return f"none of {tried} activations tried has {sought}"
 
 
-def no_equilibrium(tried: int, sought: str = "a stable equilibrium") -> InvalidInput:
+def no_equilibrium(tried: int, sought: str = "a stable equilibrium") -> InvalidLoads:
     """Error of loads under which none of so many activations has what is sought."""
     missing = no_equilibrium_message(tried, sought)
-    return InvalidInput("loads", missing, "such that some have one", "lighten the load")
+    return InvalidLoads("loads", missing, "such that some have one", "lighten the load")

@@ -38,7 +38,7 @@ from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus
+from softreach.rod.tip_map import Frames, InvalidLoads, Strains, TipMap, TipStatus
 from softreach.support.arrays import Array, Mask, as_floats
 from softreach.support.errors import InvalidInput, counted, warn
 
@@ -195,7 +195,7 @@ def equilibria(
     if not loaded.tables.one_direction:
         crossing = ", ".join(_crossing(loaded.tables.loads, loaded.tables.axes[0]))
         allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
-        raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
+        raise InvalidLoads("loads", crossing, allowed, "ask the tip map for the branch alone")
     posture = loaded.equilibria(at)
     if loaded.tables.phase.entire > SHOT_AT_ONCE:
         warn("the posture alone is listed: the loads are too heavy for a search of all others")

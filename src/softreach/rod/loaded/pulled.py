@@ -19,9 +19,9 @@ from softreach.arm.tables import quadrature
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.rod.free import ArmRod
 from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
+from softreach.rod.tip_map import InvalidLoads
 from softreach.support import parallel
 from softreach.support.arrays import Array, Mask, rows
-from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
 _BLOCK = 256
@@ -186,7 +186,7 @@ class LoadedLengths:
         grid = step_grid(arm, nowhere, max(_STEPS, self.rod.steps))
         try:
             table = node_tables(arm, nowhere, grid)
-        except InvalidInput:  # loads that it does not know
+        except InvalidLoads:  # that it does not know
             return None
         force, moment = self.law.loads_at(table.stations.ravel(), np.ones(table.stations.size))
         loads = np.concatenate([moment, force[:, None]], axis=1)

@@ -29,6 +29,7 @@ from softreach.rod.tip_map import (
     BLOCK,
     Frames,
     Held,
+    InvalidLoads,
     Shapes,
     Status,
     TipOutputs,
@@ -79,7 +80,7 @@ class LoadedRod(ArmRod):
         if (steps := tables.phase.fewest_steps) > _MOST_STEPS:
             load = f"of load number {load_number(self.arm):.3g}"
             allowed = f"lighter: they need {steps:,} steps, at most {_MOST_STEPS} allowed"
-            raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
+            raise InvalidLoads("loads", load, allowed, "lighten the load or stiffen the arm")
         return tables
 
     @property

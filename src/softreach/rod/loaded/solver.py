@@ -154,22 +154,18 @@ class Solver:
         found = Equilibria(out[:, :3], status, margin, out[:, 3:-2])
         return found.only((out[:, -1] == kernels.FOUND) & np.isfinite(out[:, :-1]).all(axis=1))
 
+    def _traced(self, gamma: Array, frames: Array, steps: StepTables) -> Array:
+        """Sections between steps, tip first."""
+        return self._walked(gamma, frames, steps, (0, 0, len(gamma)))[2]
+
     def _walked(
-        self,
-        gamma: Array,
-        frames: Array,
-        steps: StepTables,
-        *,
-        slopes: bool = False,
-        compliance: bool = False,
-        trace: bool = False,
+        self, gamma: Array, frames: Array, steps: StepTables, counts: tuple[int, int, int]
     ) -> tuple[Array, Array, Array]:
-        """Twists, compliances and sections between steps, where wanted; see `respond`."""
-        n, columns = len(gamma), _columns(gamma)
-        twists = np.zeros((n if slopes else 0, 6, columns.shape[1]))
-        yields = np.zeros((n if compliance else 0, 3, 3))
-        sections = np.zeros((n if trace else 0, len(steps.lengths) + 1, TRACE))
-        walked = columns, self.tables.at_tip, np.ascontiguousarray(frames), tuple(steps)
+        """Twists, compliances and sections of so many arms, all or none; see `respond`."""
+        moved, yielding, traced = counts
+        twists, yields = np.zeros((moved, 6, gamma.shape[1] or 1)), np.zeros((yielding, 3, 3))
+        sections = np.zeros((traced, len(steps.lengths) + 1, TRACE))
+        walked = _columns(gamma), self.tables.at_tip, np.ascontiguousarray(frames), tuple(steps)
         respond(*walked, twists, yields, sections)
         return twists[:, :, : gamma.shape[1]], yields, sections
 
@@ -239,7 +235,7 @@ class Solver:
         is_uniform = len(edges) == len(self._steps.lengths) + 1  # stations at ends of steps alone
         table = self._steps if is_uniform else self.tables.of_edges(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
-        trace = self._walked(gamma, directions, table, trace=True)[2]
+        trace = self._traced(gamma, directions, table)
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
         position, directors, *inner = _shapes_of(at, trace, table, rows, nowhere)
         turn = np.swapaxes(directors[:, -1], -1, -2)  # so that the last one stands on the base
@@ -251,7 +247,7 @@ class Solver:
     def frames_facing(self, gamma: Array, directions: Array) -> Array:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
         whole = self._steps._replace(firsts=np.array([0, len(self._steps.lengths)]))
-        trace = self._walked(gamma, directions, whole, trace=True)[2]
+        trace = self._traced(gamma, directions, whole)
         seen = trace[:, self._steps.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
         seen /= np.linalg.norm(seen, axis=2, keepdims=True)  # steps do not keep the length
         return seen.reshape(len(gamma), self.tables.frame_size)
@@ -272,9 +268,9 @@ class Solver:
             compliance: Whether ∂r/∂F is wanted.
             directors: Whether the directors of the tips are.
         """
-        rows, lost = _found_rows(known)
-        wanted = {"slopes": True, "compliance": compliance, "trace": directors}
-        twists, yields, trace = self._walked(gamma[rows], known.frame[rows], self._steps, **wanted)
+        n, (rows, lost) = len(gamma), _found_rows(known)
+        counts = n, n * compliance, n * directors
+        twists, yields, trace = self._walked(gamma[rows], known.frame[rows], self._steps, counts)
         for values in (twists, yields):
             values[lost[: len(values)]] = np.nan
         if not directors:
@@ -303,7 +299,7 @@ class Solver:
             at, lost = _found_rows(some := known.of(block))
             inner = gamma[block][at]
             found = self._shot(inner, some.frame[at], table, (_WIDEST, _SMALL, 1e-12))
-            trace = self._walked(inner, found.frame, table, trace=True)[2]
+            trace = self._traced(inner, found.frame, table)
             tips = np.where((lost | ~found.is_found)[:, None], np.nan, found.tips)
             at_block = _shapes_of(tips, trace, table, rows, stations)
             for values, new in zip(shapes, at_block, strict=True):
