@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from softreach.arm import FiberArchitecture, LinearTaper, designs
+from softreach.arm import Chamber, FiberArchitecture, LinearTaper, Material, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
 from softreach.rod.loaded.postures import Postures
@@ -101,6 +101,26 @@ ARMS = {
         designs.elephant_trunk(),
         None,
         Loads(gravity=(0.0, 0.0, 9.81), tip_force=(1.0, 0.0, 0.0)),
+    ),
+    "a fiber, whose length counts, and forces, whose does not": (
+        designs.minimal_trunk(
+            material=Material(young_modulus=1e6, density=1000.0),
+        ).replace(
+            actuators=(
+                designs.minimal_trunk().actuators[0],
+                Tendon(distance_ratio=0.8, revolution=1.0, offset=2.0, activation_bounds=(0, 60)),
+                Chamber(
+                    distance_ratio=0.4, radius_ratio=0.3, offset=4.0, activation_bounds=(0, 1e5)
+                ),
+            )
+        ),
+        [-0.8, 60.0, 5e4],
+        Loads(
+            gravity=SIDE,
+            tip_moment=(0.2, 0.3, -0.4),
+            follower_force=(1.0, 2.0, -2.0),
+            force_per_length=(0.0, 2.0, 0.0),
+        ),
     ),
     "chambers": (
         designs.three_chamber_arm(),

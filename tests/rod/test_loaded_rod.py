@@ -28,7 +28,7 @@ from tests.bodies import (
     weighed,
 )
 from tests.laws import differences
-from tests.oracles import column, elastica, loaded_rod
+from tests.oracles import elastica, loaded_rod
 
 TRUNK = designs.minimal_trunk()
 GAMMA = np.array([[-1.2, -0.3, -0.8], [-0.2, -1.5, 0.0], [-1.6, -1.6, -1.6], [0.0, 0.0, -0.4]])
@@ -82,21 +82,6 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
         np.testing.assert_allclose(shapes.frames.position[k], expected.place, atol=2e-9)
         np.testing.assert_allclose(shapes.frames.directors[k], expected.frame, atol=1e-8)
         np.testing.assert_allclose(moment, expected.moment, atol=5e-8)
-
-
-@of_kinds
-def test_a_shooting_from_the_base_finds_an_arm_of_fibers_and_forces(loads):
-    """Curvature counts by the length that the fiber gives; tendon and chamber leave that."""
-    actuators = (
-        TRUNK.actuators[0],
-        Tendon(distance_ratio=0.8, revolution=1.0, offset=2.0, activation_bounds=(0, 60)),
-        Chamber(distance_ratio=0.4, radius_ratio=0.3, offset=4.0, activation_bounds=(0, 1e5)),
-    )
-    trunk = TRUNK.replace(actuators=())
-    rod = loaded(loads, arm=rubber(trunk, loads).replace(actuators=actuators))
-    gamma = np.array([[-0.8, 60.0, 5e4]])
-    expected = loaded_rod.equilibrium(*oracle_rod(rod.arm, gamma[0], loads), [0.0, 1.0], rtol=1e-10)
-    np.testing.assert_allclose(rod.tips(gamma)[0], expected.tip, atol=1e-9)
 
 
 PULLS = {
@@ -158,15 +143,6 @@ def test_a_heavy_cantilever_drops_as_published(load):
     found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, load, 0)), steps=48)
     tip = Postures(found).find(np.zeros((1, 3))).tips[0]
     np.testing.assert_allclose(tip[[1, 2]], elastica.heavy(load), atol=1e-9)
-
-
-def test_a_column_is_stable_up_to_its_own_greatest_height():
-    greatest = column.greenhill()
-    for share, status in ((0.999, TipStatus.STABLE), (1.001, TipStatus.UNSTABLE)):
-        found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, 0, -share * greatest)))
-        of_column = Postures(found).find(np.zeros((1, 3)))
-        assert of_column.status[0] == status
-        np.testing.assert_allclose(of_column.tips[0], [0, 0, 1], atol=1e-12)
 
 
 def test_a_hanging_rod_stretches_by_the_weight_beyond_each_section():

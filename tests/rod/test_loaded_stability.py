@@ -44,8 +44,8 @@ def index(chain, moment, tip):
 
 
 @pytest.mark.parametrize("payload", [0.0, 0.5])
-@pytest.mark.parametrize("taper", [-0.02, 0.02, 0.05])
-def test_tapered_columns_buckle_where_ritz_has_them_buckle(taper, payload):
+@pytest.mark.parametrize("taper", [-0.02, 0.0, 0.05])
+def test_columns_buckle_where_ritz_has_them_buckle(taper, payload):
     """A column that bends and twists alone."""
     rigid, rest = Measured(axial_stiffness=1e15), np.zeros(3)
     arm = of_body(designs.minimal_trunk(taper=taper), rigid, Loads(payload=payload))

@@ -96,7 +96,7 @@ class ArmRod(TipMap):
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         """A step turns the arm by η |Uγ| R2 dS."""
-        table, profile = tables_at(self.arm, strain_stations(self.arm)), self.arm.profile
+        table, profile = tables_at(self.arm, strain_stations(self.arm).tobytes()), self.arm.profile
         step = profile.radius(table.stations) * (profile.slender_length / self.steps)
         least, most = np.empty((2, len(gamma)))
         with np.errstate(all="ignore"):  # what overflows is no arm
@@ -209,7 +209,7 @@ class FreeRod(ArmRod):
         """Centerlines and directors, and u = Uγ η/ζ and ζ = 1 + z·γ: theory (7)."""
         gamma, lost = self.with_arms(self.box.check(activations))
         z, at = np.asarray(framed, float), np.asarray(strained, float)
-        strains = per_length(*linear_strains(tables_at(self.arm, at), gamma))
+        strains = per_length(*linear_strains(tables_at(self.arm, at.tobytes()), gamma))
         shapes = Shapes(self._frames(gamma, z), strains, np.zeros(len(gamma), np.int8))
         drop(lost, shapes.status, *shapes.frames, *shapes.strains)
         return shapes
@@ -239,13 +239,9 @@ def add_offset(tips: Array, offset: Array, directors: Array) -> None:
         tips += offset[k] * directors[:, k]
 
 
-def tables_at(arm: Manipulator, stations: Array) -> Tables:
-    """Tables at stations [m], kept for the next block of activations."""
-    return _tables_at(arm, stations.tobytes())
-
-
 @lru_cache(maxsize=64)
-def _tables_at(arm: Manipulator, stations: bytes) -> Tables:
+def tables_at(arm: Manipulator, stations: bytes) -> Tables:
+    """Tables at the stations [m] of these bytes, kept for the next block of activations."""
     return tables(arm, np.frombuffer(stations))
 
 

@@ -116,17 +116,12 @@ class _Grid:
             numbers[open_[same]] = at[same]
             new = open_[at < 0]
             numbers[new] = self.states[nodes[new], place] = len(self.node) + np.arange(len(new))
-            self._append(nodes[new], found.of(new))
+            self.node = np.concatenate([self.node, nodes[new]])
+            self.found = joined([self.found, found.of(new)])
+            unknown = np.full((len(new), self.next.shape[1]), _UNKNOWN)
+            self.next = np.concatenate([self.next, unknown])
             open_ = open_[(at >= 0) & ~same]
         return numbers
-
-    def _append(self, nodes: Index, found: Equilibria) -> None:
-        if not len(nodes):
-            return
-        self.node = np.concatenate([self.node, nodes])
-        self.found = joined([self.found, found])
-        unknown = np.full((len(nodes), self.next.shape[1]), _UNKNOWN)
-        self.next = np.concatenate([self.next, unknown])
 
     def _link(self, low: Index, high: Index, column: Index | int) -> None:
         """Note that postures are on one branch with those at the next node in a direction."""

@@ -203,7 +203,7 @@ class Solver:
         """The strains at stations Z [m], from m and n in the directors of the shapes there."""
         arm = self.tables.arm
         axial, bending, torsion = compliance_of(arm, z)
-        u, extension, eta = linear_strains(tables_at(arm, z), gamma)
+        u, extension, eta = linear_strains(tables_at(arm, z.tobytes()), gamma)
         extension = extension + eta * shapes.force[..., 2] * axial
         yielded = np.stack([bending, bending, torsion], axis=1)
         return per_length(u + shapes.moment * yielded, extension, eta)
