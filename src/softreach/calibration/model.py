@@ -27,10 +27,9 @@ from softreach.rod.response import (
     NodeTables,
     RodState,
     StepGrid,
-    dead_force,
+    dead_forces,
     linear_response,
     node_tables,
-    payload_weight,
     rod_state,
     step_grid,
 )
@@ -201,8 +200,8 @@ class MarkerModel:
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
             if isinstance(other, Base):  # gravity alone is another one in its frame
-                force = dead_force(arm, other, at.table.stations, at.table.length)
-                table = at.table._replace(force=force, weight=payload_weight(arm, other))
+                force, weight = dead_forces(arm, other, at.table.stations, at.table.length)
+                table = at.table._replace(force=force, weight=weight)
                 place = np.array(other.position)
                 each.append(at._replace(table=table, rotation=other.rotation, position=place))
             elif any(getattr(arm, part) != getattr(other, part) for part in _BODY):

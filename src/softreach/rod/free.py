@@ -210,22 +210,18 @@ class FreeRod(ArmRod):
         gamma, lost = self.with_arms(self.box.check(activations))
         z, at = np.asarray(framed, float), np.asarray(strained, float)
         strains = per_length(*linear_strains(tables_at(self.arm, at.tobytes()), gamma))
-        shapes = Shapes(self._frames(gamma, z), strains, np.zeros(len(gamma), np.int8))
+        places, directors = np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3))
+        if len(z):
+            is_tip = len(z) == 1 and z[0] == self.end
+            packed = self.rule.packed_stations
+            table = self._tip_table if is_tip else packed(z, self._shape_steps)
+            parallel.run(
+                partial(frames.frames, *table, gamma[b], places[b], directors[b])
+                for b in parallel.blocks(len(gamma), 1024)
+            )
+        shapes = Shapes(Frames(places, directors), strains, np.zeros(len(gamma), np.int8))
         drop(lost, shapes.status, *shapes.frames, *shapes.strains)
         return shapes
-
-    def _frames(self, gamma: Array, z: Array) -> Frames:
-        result = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
-        if not len(z):
-            return result
-        is_tip = len(z) == 1 and z[0] == self.end
-        packed = self.rule.packed_stations
-        table, ends = self._tip_table if is_tip else packed(z, self._shape_steps)
-        parallel.run(
-            partial(frames.frames, table, ends, gamma[b], result.position[b], result.directors[b])
-            for b in parallel.blocks(len(gamma), 1024)
-        )
-        return result
 
     @lazy
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:

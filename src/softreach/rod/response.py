@@ -134,6 +134,7 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
     if arm.loads is not None:
         axial, bending, torsion = compliance(arm, z)
         soft = np.stack([axial, bending, bending, torsion], axis=-1)
+    force, weight = dead_forces(arm, arm.base, z, length)
     return NodeTables(
         stations=z,
         length=length,
@@ -141,31 +142,27 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         rest_length_factor=table.rest_length_factor,
         curvature=table.curvature,
         compliance=soft,
-        force=dead_force(arm, arm.base, z, length),
+        force=force,
         lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
-        weight=payload_weight(arm, arm.base),
+        weight=weight,
         asked=np.asarray(stations, float),
     )
 
 
-def payload_weight(arm: Manipulator, base: Base) -> Array:
-    """Force of the payload in the frame of a base [N], shape (3,)."""
-    if arm.loads is None:
-        return np.zeros(3)
-    return arm.loads.payload * np.array(arm.loads.seen_from(base).gravity)
-
-
-def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
-    """n [N] at the nodes in the frame of a base, shape (step, 3, 3): dead forces beyond, (60).
+def dead_forces(arm: Manipulator, base: Base, z: Array, length: Array) -> tuple[Array, Array]:
+    """Dead force n beyond the nodes, theory (60), and that of the payload in the frame of a base.
 
     Args:
         arm: The arm, wherever its own base is.
         base: Pose of the base.
         z: Z of the nodes [m], shape (step, 3).
         length: dZ there [m], likewise.
+
+    Returns:
+        [N], shape (step, 3, 3) and (3,).
     """
     if arm.loads is None:
-        return np.zeros((*z.shape, 3))
+        return np.zeros((*z.shape, 3)), np.zeros(3)
     loads = arm.loads.seen_from(base)
     others = [loads.follower_force, loads.follower_moment, loads.tip_moment]
     others += [load.moment for load in loads.point_loads]
@@ -183,7 +180,7 @@ def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
     force = force + (arm.length - z)[..., None] * np.array(loads.force_per_length)
     for load in loads.point_loads:
         force = force + np.where((z < load.station)[..., None], np.array(load.force), 0.0)
-    return force
+    return force, loads.payload * gravity
 
 
 class RodState(NamedTuple):

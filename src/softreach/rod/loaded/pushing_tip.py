@@ -76,11 +76,10 @@ class PushingTip:
             known = Postures(solver).find(sample)
         else:
             known = solver.near(sample, near.equilibrium)
-        response = solver.respond(sample, known, compliance=True)
-        slopes = np.empty_like(response.twists[:, :3])
-        position_slopes(known.tips, response.twists, slopes)
-        retreat = response.compliance[0] @ self.direction
-        return TipResponse(known.tips[0], slopes[0], retreat, known)
+        twists, compliance, _ = solver.respond(sample, known, compliance=True)
+        slopes = np.empty_like(twists[:, :3])
+        position_slopes(known.tips, twists, slopes)
+        return TipResponse(known.tips[0], slopes[0], compliance[0] @ self.direction, known)
 
     def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if this equilibrium is stable; in doubt steps half as long decide."""

@@ -197,8 +197,7 @@ class LoadedRod(ArmRod):
             tips[:], directors, moved = known.tips, None, None
             if is_moving or directions is not None or self.reach > 0.0:
                 has_directors = directions is not None or self.reach > 0.0
-                response = self.solver.respond(gamma, known, directors=has_directors)
-                directors, moved = response.directors, response.twists
+                moved, _, directors = self.solver.respond(gamma, known, directors=has_directors)
         if directors is not None and len(directors):
             add_offset(tips, self.offset, directors)
             if directions is not None:
@@ -241,8 +240,7 @@ class LoadedRod(ArmRod):
         known, compliance = self.postures.find_all(gamma), np.empty((len(gamma), 3, 3))
 
         def fill(rows: slice) -> None:
-            response = solver.respond(gamma[rows], known.of(rows), compliance=True)
-            compliance[rows] = response.compliance
+            compliance[rows] = solver.respond(gamma[rows], known.of(rows), compliance=True)[1]
 
         parallel.run(partial(fill, rows) for rows in parallel.blocks(len(gamma), _BLOCK))
         return compliance

@@ -66,17 +66,6 @@ class Equilibria(NamedTuple):
         return self._replace(status=np.where(good, self.status, np.int8(TipStatus.UNDECIDED)))
 
 
-class Response(NamedTuple):
-    """Derivatives of tips along activations and forces."""
-
-    twists: Array
-    """(v, ω) per activation, shape (n, 6, bundles)."""
-    compliance: Array
-    """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
-    directors: Array
-    """Directors of the tips as rows [-], shape (n, 3, 3), or (0, 3, 3)."""
-
-
 class LoadedShapes(NamedTuple):
     """Arms at stations, all shapes (n, station, ...)."""
 
@@ -259,7 +248,7 @@ class Solver:
         *,
         compliance: bool = False,
         directors: bool = False,
-    ) -> Response:
+    ) -> tuple[Array, Array, Array]:
         """Derivatives of tips, theory (74); NaN where there is no equilibrium.
 
         Args:
@@ -267,6 +256,10 @@ class Solver:
             known: Their equilibria, with these steps.
             compliance: Whether ∂r/∂F is wanted.
             directors: Whether the directors of the tips are.
+
+        Returns:
+            (v, ω) per activation, shape (n, 6, bundles); ∂r/∂F [m/N], shape (n, 3, 3) or (0, 3, 3);
+            directors as rows [-], likewise.
         """
         n, (rows, lost) = len(gamma), _found_rows(known)
         counts = n, n * compliance, n * directors
@@ -274,10 +267,10 @@ class Solver:
         for values in (twists, yields):
             values[lost[: len(values)]] = np.nan
         if not directors:
-            return Response(twists, yields, np.empty((0, 3, 3)))
+            return twists, yields, np.empty((0, 3, 3))
         at, at_tip = np.zeros(1, int), np.array([self.tables.arm.length])
         shapes = _shapes_of(known.tips, trace, self._steps, at, at_tip)
-        return Response(twists, yields, shapes.directors[:, 0])
+        return twists, yields, shapes.directors[:, 0]
 
     def shapes(self, gamma: Array, stations: Array, known: Equilibria) -> LoadedShapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
