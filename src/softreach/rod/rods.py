@@ -236,10 +236,10 @@ def as_tip_map(
     if isinstance(arm, TipMap):
         known = arm if isinstance(arm, ArmMap) else ArmMap.of(arm)
         return replace(known, pose=UPRIGHT) if frame == "base" != known.frame else known
-    found = _of_arm(arm.at_point(point), check_tol(tol), frame)
+    made = _of_arm(arm.at_point(point), check_tol(tol), frame)
     if as_flag("warn", warn) and arm.loads is not None:
         _warn_of_large_loads(arm)
-    return found
+    return made
 
 
 def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
@@ -335,8 +335,8 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
         like: A tip map whose tolerance, frame and effective inputs it has.
     """
     driving = as_tip_map(like).inputs.driving
-    found = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
-    return effective(found) if driving is not None and driving.is_effective else found
+    made = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
+    return effective(made) if driving is not None and driving.is_effective else made
 
 
 @lru_cache(maxsize=64)

@@ -76,13 +76,13 @@ def follow(
         h = to - place[rows]
         guess = units(last.frame[rows] + h[:, None] * slopes[rows])
         gamma = begin[rows] + to[:, None] * (end[rows] - begin[rows])
-        found = solver.search(gamma, guess, ALL_LOADS if hangs else to)
-        missed = found.tips - last.tips[rows] - h[:, None] * moves[rows]
-        good, growth = _judged(solver, found, guess, missed, is_first[rows])
-        on, h_on, found = rows[good], h[good, None], found.of(good)
-        slopes[on] = (found.frame - last.frame[on]) / h_on
-        moves[on] = (found.tips - last.tips[on]) / h_on
-        last.put(on, found)
+        new = solver.search(gamma, guess, ALL_LOADS if hangs else to)
+        missed = new.tips - last.tips[rows] - h[:, None] * moves[rows]
+        good, growth = _judged(solver, new, guess, missed, is_first[rows])
+        on, h_on, new = rows[good], h[good, None], new.of(good)
+        slopes[on] = (new.frame - last.frame[on]) / h_on
+        moves[on] = (new.tips - last.tips[on]) / h_on
+        last.put(on, new)
         place[on], is_first[on] = to[good], False
         step[rows] = h * growth
         ended[rows] = ~good & (step[rows] < shortest)
@@ -90,16 +90,16 @@ def follow(
 
 
 def _judged(
-    solver: Solver, found: Equilibria, guess: Array, missed: Array, is_first: Mask
+    solver: Solver, new: Equilibria, guess: Array, missed: Array, is_first: Mask
 ) -> tuple[Mask, Array]:
     """Mask of steps that count, and what the lengths of the next ones are multiplied by."""
     allowed = _CORRECTION if solver.tables.segments == 1 else _CORRECTION_OF_NODES
     with np.errstate(all="ignore"):  # of what is not found
         off = np.linalg.norm(missed, axis=1) / solver.tables.arm.length
-        turn = turn_between(found.frame, guess)
+        turn = turn_between(new.frame, guess)
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
         wanted = 0.5 * (np.sqrt(1.0 + 4.0 * allowed / change) - 1.0)  # half of what is allowed
-    good = found.is_stable & (change < np.where(is_first, 2.0, 1.0) * allowed)
+    good = new.is_stable & (change < np.where(is_first, 2.0, 1.0) * allowed)
     shorter = np.where(wanted > 0.1, 0.4, 0.25)
     return good, np.where(good, np.clip(wanted, 0.5, 4.0), shorter)
 
@@ -168,9 +168,9 @@ class Flood:
         is_known = (inside & self.held.is_found[back])[:, None]
         slopes = np.where(is_known, self.held.frame[origin] - self.held.frame[back], 0.0)
         ends = self.gamma[origin], self.gamma[to]
-        found = follow(self.solver, *ends, self.held.of(origin), slopes).last
-        good = found.is_found
-        self.held.put(to[good], found.of(good))
+        new = follow(self.solver, *ends, self.held.of(origin), slopes).last
+        good = new.is_found
+        self.held.put(to[good], new.of(good))
         lower = np.where(way > 0, origin, to)
         self.linked[axis[good], lower[good]] = True
 
@@ -191,8 +191,8 @@ class Flood:
             self.linked[axis, low[both & smooth]] = True
             both &= ~self.linked[axis, low]
             low, high = low[both], high[both]
-            found = follow(self.solver, self.gamma[low], self.gamma[high], self.held.of(low)).last
-            self.linked[axis, low[are_same(found, self.held.of(high), length)]] = True
+            new = follow(self.solver, self.gamma[low], self.gamma[high], self.held.of(low)).last
+            self.linked[axis, low[are_same(new, self.held.of(high), length)]] = True
             edges = np.delete(self.linked[axis].reshape(self.sizes), -1, axis)
             whole &= over_cells(edges, np.logical_and, axis)
         self.is_whole = whole

@@ -58,7 +58,7 @@ class _Grid:
         self.states = np.full((len(gamma), _MOST), _NONE)
         """Numbers of the postures of each node."""
         self.node = np.empty(0, int)
-        self.found = solver.empty(0)
+        self.equilibria = solver.empty(0)
         self.next = np.empty((0, 2 * len(sizes)), int)
         """Postures on the same branch at the next node down and up each axis."""
         self.links = list[Index]()
@@ -92,32 +92,35 @@ class _Grid:
         none = np.empty((0, 2), int)
         links, ends = (np.concatenate([none, *pairs]) for pairs in (self.links, self.ends))
         end_gamma = np.concatenate([self.gamma[:0], *self.end_gamma])
-        end_postures = joined([self.found.of(slice(0)), *self.end_postures])
-        tips, end_tips = points(self.gamma[self.node], self.found), points(end_gamma, end_postures)
-        return Held(self.node, tips, links, ends, end_tips, is_doubled, self.found.frame)
+        end_postures = joined([self.equilibria.of(slice(0)), *self.end_postures])
+        tips, end_tips = (
+            points(self.gamma[self.node], self.equilibria),
+            points(end_gamma, end_postures),
+        )
+        return Held(self.node, tips, links, ends, end_tips, is_doubled, self.equilibria.frame)
 
-    def _put(self, nodes: Index, found: Equilibria) -> Index:
+    def _put(self, nodes: Index, equilibria: Equilibria) -> Index:
         """Numbers of postures at nodes, known ones or new; none where a node has too many."""
         numbers, left = np.full(len(nodes), _NONE), np.arange(len(nodes))
         while len(left):
             _, first = np.unique(nodes[left], return_index=True)
             now = left[first]
-            numbers[now] = self._put_one_each(nodes[now], found.of(now))
+            numbers[now] = self._put_one_each(nodes[now], equilibria.of(now))
             left = np.delete(left, first)
         return numbers
 
-    def _put_one_each(self, nodes: Index, found: Equilibria) -> Index:
+    def _put_one_each(self, nodes: Index, equilibria: Equilibria) -> Index:
         numbers, open_ = np.full(len(nodes), _NONE), np.arange(len(nodes))
         for place in range(_MOST):
             at = self.states[nodes[open_], place]
             same = at >= 0
-            old = self.found.of(at[same])
-            same[same] = are_same(found.of(open_[same]), old, self.length, _SAME)
+            old = self.equilibria.of(at[same])
+            same[same] = are_same(equilibria.of(open_[same]), old, self.length, _SAME)
             numbers[open_[same]] = at[same]
             new = open_[at < 0]
             numbers[new] = self.states[nodes[new], place] = len(self.node) + np.arange(len(new))
             self.node = np.concatenate([self.node, nodes[new]])
-            self.found = joined([self.found, found.of(new)])
+            self.equilibria = joined([self.equilibria, equilibria.of(new)])
             unknown = np.full((len(new), self.next.shape[1]), _UNKNOWN)
             self.next = np.concatenate([self.next, unknown])
             open_ = open_[(at >= 0) & ~same]
@@ -131,8 +134,8 @@ class _Grid:
     def _link_smooth(self, at: Index, flood: Flood | None) -> None:
         """Link neighbors on an edge in an uncut cell, or that goes on as that beside it does."""
         lost = np.where(at >= 0, 0.0, np.nan)[:, None]
-        frames = (self.found.frame[at] + lost).reshape(*self.sizes, -1)
-        tips = (self.found.tips[at] / self.length + lost).reshape(*self.sizes, 3)
+        frames = (self.equilibria.frame[at] + lost).reshape(*self.sizes, -1)
+        tips = (self.equilibria.tips[at] / self.length + lost).reshape(*self.sizes, 3)
         for axis in range(len(self.sizes)):
             low, high = edges_along(self.sizes, axis)
             smooth = smooth_edges(frames, tips, axis).ravel()
@@ -156,7 +159,7 @@ class _Grid:
 
     def _grow(self, twin: Solver, state: Index, to: Index, column: Index) -> None:
         ends, share = self._followed(twin, state, to, column)
-        good, before = ends.is_found.copy(), self.found.of(state)
+        good, before = ends.is_found.copy(), self.equilibria.of(state)
         numbers = self._put(to[good], ends.of(good))
         leaps = np.linalg.norm(ends.tips - before.tips, axis=1) > _LEAP * self.length
         ends.put(np.flatnonzero(leaps), before.of(leaps))
@@ -178,9 +181,9 @@ class _Grid:
 
         And the shares of the edges up to there.
         """
-        start = self.found.of(state)
+        start = self.equilibria.of(state)
         back = self.next[state, column ^ 1]
-        before = self.found.frame[np.maximum(back, 0)]
+        before = self.equilibria.frame[np.maximum(back, 0)]
         slopes = np.where((back >= 0)[:, None], start.frame - before, 0.0)
         ends, share = start.of(np.arange(len(state))), np.ones(len(state))
 

@@ -126,11 +126,11 @@ class Postures:
         at = np.arange(len(gamma))[rows]
         order, guesses = self._guesses(gamma[at])
         at = at[order]
-        found = self.solver.search(gamma[at], guesses)
-        good = found.margin > (_DOUBTFUL if self.flood is None else 0.0)
+        new = self.solver.search(gamma[at], guesses)
+        good = new.margin > (_DOUBTFUL if self.flood is None else 0.0)
         if self.flood is not None and guesses is not None:
-            good &= turn_between(found.frame, guesses) < _NEAR
-        self.solver.put(gamma, at, found.only(good), equilibria)
+            good &= turn_between(new.frame, guesses) < _NEAR
+        self.solver.put(gamma, at, new.only(good), equilibria)
 
     def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
         """Rows, and frames there of the flood, of the unloaded arm, or of one that hangs along it.
@@ -162,8 +162,8 @@ class Postures:
     def by_line(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """Postures at some rows along the straight lines from rest."""
         followed = self.followed(gamma[rows])
-        found = polished(self.solver, gamma[rows], followed.last, _POLISHED)
-        self.solver.put(gamma, rows, found, equilibria)
+        new = polished(self.solver, gamma[rows], followed.last, _POLISHED)
+        self.solver.put(gamma, rows, new, equilibria)
         snaps = followed.has_ended & (followed.last.margin < _LOST)
         gone = equilibria.status[rows] == TipStatus.UNDECIDED
         equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
@@ -172,10 +172,10 @@ class Postures:
 
     def _unstable(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
-        found = self.solver.search(gamma[rows], None)
+        new = self.solver.search(gamma[rows], None)
         at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
-        found = found.only(~found.is_stable | at_rest)  # no stable ones of others
-        self.solver.put(gamma, rows, found, equilibria)
+        new = new.only(~new.is_stable | at_rest)  # no stable ones of others
+        self.solver.put(gamma, rows, new, equilibria)
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin from nodes of the flood, or along lines from rest."""
@@ -271,8 +271,8 @@ class Postures:
         there = _azimuth(bent, tables.axes) - azimuth
         for turn in _TURNS:
             left = np.flatnonzero(bends & ~leaning.is_found)
-            found = twin.search(gamma[left], _turned(frame, there[left] + turn, tables.axes))
-            leaning.put(left[found.is_stable], found.of(found.is_stable))
+            new = twin.search(gamma[left], _turned(frame, there[left] + turn, tables.axes))
+            leaning.put(left[new.is_stable], new.of(new.is_stable))
         return leaning
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
@@ -298,9 +298,9 @@ class Postures:
 
 def polished(solver: Solver, gamma: Array, on_twin: Equilibria, within: float) -> Equilibria:
     """Stable equilibria of an arm beside those of its twin; found where they are so near [rad]."""
-    found = solver.search(gamma, on_twin.frame)
-    near = turn_between(found.frame, on_twin.frame) < within
-    return found.only(on_twin.is_found & found.is_stable & near)
+    new = solver.search(gamma, on_twin.frame)
+    near = turn_between(new.frame, on_twin.frame) < within
+    return new.only(on_twin.is_found & new.is_stable & near)
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,10 +101,10 @@ class PushingTip:
         held = Postures(self._solver(0.0, self.steps)).find(sample)
         while share < 1.0 and step > _SHORTEST:
             to = min(1.0, share + step)
-            found = self._solver(to * force, self.steps).near(sample, held)
-            turn = turn_between(found.frame, held.frame)[0]
-            if found.is_stable[0] and turn < _MOST_TURN:
-                held, share, step = found, to, 2.0 * step
+            new = self._solver(to * force, self.steps).near(sample, held)
+            turn = turn_between(new.frame, held.frame)[0]
+            if new.is_stable[0] and turn < _MOST_TURN:
+                held, share, step = new, to, 2.0 * step
             else:
                 step *= 0.5
         apart = float(np.linalg.norm(held.tips[0] - response.tip))

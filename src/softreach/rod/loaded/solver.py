@@ -140,8 +140,8 @@ class Solver:
         solve(*arm, limits, walks, shares, out)
         margin = out[:, -2]
         status = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)
-        found = Equilibria(out[:, :3], status, margin, out[:, 3:-2])
-        return found.only((out[:, -1] == kernels.FOUND) & np.isfinite(out[:, :-1]).all(axis=1))
+        ends = Equilibria(out[:, :3], status, margin, out[:, 3:-2])
+        return ends.only((out[:, -1] == kernels.FOUND) & np.isfinite(out[:, :-1]).all(axis=1))
 
     def _traced(self, gamma: Array, frames: Array, steps: StepTables) -> Array:
         """Sections between steps, tip first."""
@@ -170,14 +170,14 @@ class Solver:
         return equilibria
 
     def put(
-        self, gamma: Array, rows: slice | Index, found: Equilibria, equilibria: Equilibria
+        self, gamma: Array, rows: slice | Index, ends: Equilibria, equilibria: Equilibria
     ) -> None:
         """Put down what is found at some rows of all activations.
 
         No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out.
         """
-        tips = np.where(found.is_found[:, None], found.tips, np.nan)
-        equilibria.put(rows, found._replace(tips=tips))
+        tips = np.where(ends.is_found[:, None], ends.tips, np.nan)
+        equilibria.put(rows, ends._replace(tips=tips))
         if self.tables.phase.squeeze < 1.0:
             return
         z = self.tables.arm.profile.station(self.tables.edges(np.array([]), self.steps)[::-1])
@@ -291,9 +291,9 @@ class Solver:
         def fill(block: slice) -> None:
             at, lost = _found_rows(some := known.of(block))
             inner = gamma[block][at]
-            found = self._shot(inner, some.frame[at], table, (_WIDEST, _SMALL, 1e-12))
-            trace = self._traced(inner, found.frame, table)
-            tips = np.where((lost | ~found.is_found)[:, None], np.nan, found.tips)
+            ends = self._shot(inner, some.frame[at], table, (_WIDEST, _SMALL, 1e-12))
+            trace = self._traced(inner, ends.frame, table)
+            tips = np.where((lost | ~ends.is_found)[:, None], np.nan, ends.tips)
             at_block = _shapes_of(tips, trace, table, rows, stations)
             for values, new in zip(shapes, at_block, strict=True):
                 values[block] = new
