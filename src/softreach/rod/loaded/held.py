@@ -76,7 +76,7 @@ class _Grid:
             place = np.unravel_index(np.arange(len(where)), self.sizes)
             uncut = (np.stack(place) % _EVERY == 0).all(axis=0)
         nodes = np.flatnonzero(where & uncut)
-        known = postures.find_all(self.gamma[nodes], by_lines=by_lines)
+        known = postures.find(self.gamma[nodes], by_lines=by_lines)
         good = known.is_stable
         at = np.full(len(self.gamma), _NONE)
         at[nodes[good]] = self._put(nodes[good], known.of(good))

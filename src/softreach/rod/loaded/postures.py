@@ -97,17 +97,8 @@ class Postures:
         start = self.twin.search(gamma, None, np.zeros(1))
         return follow(self.twin, gamma, gamma, start, hangs=False)
 
-    def find(self, gamma: Array) -> Equilibria:
-        """Postures at activations (n, bundles), on the calling thread."""
-        equilibria = self.solver.empty(len(gamma))
-        self.direct(gamma, slice(None), equilibria)
-        rows = np.flatnonzero(~equilibria.is_stable)
-        if len(rows):
-            self.by_line(gamma, rows, equilibria)
-        return equilibria
-
-    def find_all(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
-        """The same on all threads, on request by lines where they are not found at once.
+    def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
+        """Postures at activations (n, bundles); where not found at once, by lines if wanted.
 
         What is to be searched again is gathered, so that kernels get whole blocks.
         """

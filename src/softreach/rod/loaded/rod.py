@@ -176,13 +176,15 @@ class LoadedRod(ArmRod):
         """Tips with their status, and the margin of stability."""
         self.prepare()
         gamma, lost = self.with_arms(self.box.check(activations))
-        equilibria = self.postures.find_all(gamma)
+        equilibria = self.postures.find(gamma)
         drop(lost, equilibria.status, equilibria.tips, equilibria.margin)
         return equilibria
 
     def fill(self, gamma: Array, out: TipOutputs) -> None:
         """Put tips, and what else is wanted, into place; each equilibrium is found once."""
-        self._fill(gamma, self.postures.find(gamma), out)
+        with parallel.undivided():
+            known = self.postures.find(gamma)
+        self._fill(gamma, known, out)
 
     def _fill(self, gamma: Array, known: Equilibria, out: TipOutputs) -> None:
         tips, slopes, twists, status, directions = out
@@ -237,7 +239,7 @@ class LoadedRod(ArmRod):
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
         self.prepare()
         gamma, solver = self.box.check(activations), self.solver
-        known, compliance = self.postures.find_all(gamma), np.empty((len(gamma), 3, 3))
+        known, compliance = self.postures.find(gamma), np.empty((len(gamma), 3, 3))
 
         def fill(rows: slice) -> None:
             compliance[rows] = solver.respond(gamma[rows], known.of(rows), compliance=True)[1]
@@ -252,7 +254,7 @@ class LoadedRod(ArmRod):
         """
         self.prepare()
         gamma = self.box.check(activations)
-        here, there = (side.find_all(gamma) for side in (self.postures, self._mirrored))
+        here, there = (side.find(gamma) for side in (self.postures, self._mirrored))
         apart = turn_between(here.frame, there.frame) > _SIDES
         return here.is_found & there.is_found & apart
 
