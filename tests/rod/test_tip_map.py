@@ -77,18 +77,19 @@ def test_an_arm_beyond_the_theory_is_refused_every_time(trunk):
 # Activations of different units are compared in their own ranges
 
 
-def test_strains_count_as_they_are(trunk):
-    np.testing.assert_array_equal(activation_measures(trunk), np.ones(trunk.bundles))
-    assert measured_bundles(as_tip_map(trunk)) is as_tip_map(trunk)
-
-
-def test_activations_of_one_unit_keep_their_proportions():
-    arm = arm_of(TENDONS).with_bounds(((0, 8), (0, 4), (0, 2)))
-    np.testing.assert_array_equal(activation_measures(arm), [8, 8, 8])
-
-
-def test_activations_of_different_units_count_in_their_ranges():
-    np.testing.assert_array_equal(activation_measures(arm_of(TENDONS, CHAMBER)), [8, 8, 8, 5e4])
+@pytest.mark.parametrize(
+    ("arm", "measures"),
+    [
+        (designs.minimal_trunk(), [1, 1, 1]),
+        (arm_of(TENDONS).with_bounds(((0, 8), (0, 4), (0, 2))), [8, 8, 8]),
+        (arm_of(TENDONS, CHAMBER), [8, 8, 8, 5e4]),
+    ],
+    ids=["strains as they are", "one unit in proportion", "different units in their ranges"],
+)
+def test_activations_are_counted_in_their_measures(arm, measures):
+    np.testing.assert_array_equal(activation_measures(arm), measures)
+    of_strains = measured_bundles(as_tip_map(arm)) is as_tip_map(arm)
+    assert of_strains == (max(measures) == 1)
 
 
 @pytest.mark.parametrize("held", [False, True])

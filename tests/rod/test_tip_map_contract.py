@@ -24,7 +24,7 @@ from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import ArmMap, as_tip_map
-from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs, TipStatus
+from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.kinds import fibers_and_a_tendon
@@ -297,20 +297,6 @@ def test_a_sample_alone_has_the_numbers_that_it_has_among_others(make, arm):
         (*shapes.frames, *shapes.strains), (*alone.frames, *alone.strains), strict=True
     ):
         np.testing.assert_array_equal(every[3:4], single)
-
-
-@of_designs
-def test_the_filling_of_tips_and_slopes_is_that_of_whole_batches(make, arm):
-    rod = make(arm, 1e-6)
-    gamma = activations(rod, 10)
-    tips, slopes = rod.tips_and_slopes(gamma)
-    filled = np.full_like(tips, np.nan)
-    rod.fill(gamma, TipOutputs(filled))
-    np.testing.assert_array_equal(filled, rod.tips(gamma))
-    filled_slopes = np.full_like(slopes, np.nan)
-    rod.fill(gamma, TipOutputs(filled, filled_slopes))
-    np.testing.assert_array_equal(filled, tips)
-    np.testing.assert_array_equal(filled_slopes, slopes)
 
 
 @of_designs

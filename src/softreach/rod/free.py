@@ -101,14 +101,9 @@ class ArmRod(TipMap):
         least, most = np.empty((2, len(gamma)))
         with np.errstate(all="ignore"):  # what overflows is no arm
             for block in parallel.blocks(len(gamma), 1024):
-                extension = eta = 1.0 + gamma[block] @ table.extension.T
-                if table.has_forces:
-                    eta = 1.0 + gamma[block] @ table.rest_length_factor.T
-                bend = np.linalg.norm(
-                    np.einsum("scb,nb->nsc", table.curvature, gamma[block]), axis=-1
-                )
+                bend, extension, eta = linear_strains(table, gamma[block])
                 least[block] = np.minimum(extension, eta).min(axis=1)
-                most[block] = (eta * bend * step).max(axis=1)
+                most[block] = (eta * np.linalg.norm(bend, axis=-1) * step).max(axis=1)
         return least, most
 
     def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:

@@ -280,8 +280,8 @@ class Solver:
             stations: Ascending Z [m]; there may be none.
             known: Their equilibria, with these steps or others.
         """
-        places, directors = (len(gamma), len(stations), 3), (len(gamma), len(stations), 3, 3)
-        shapes = LoadedShapes(*map(np.empty, (places, directors, places, places)))
+        position, moment, force = np.empty((3, len(gamma), len(stations), 3))
+        shapes = LoadedShapes(position, np.empty((*position.shape, 3)), moment, force)
         if not len(stations):
             return shapes
         edges = self.tables.edges(stations, self.steps)
