@@ -276,11 +276,9 @@ def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
 
 
 def _bending_corners(arm: Manipulator) -> Array:
-    """Corners of the unit cube that are extreme in bending, at each station and all along the arm.
+    """Corners of the unit cube that bend most toward headings, at stations and all along the arm.
 
-    The bending (u1, u2) that a box of activations reaches at a station is a zonogon, whose farthest
-    vertex toward a heading has every bundle at the bound that helps. Along the arm the heading
-    turns as the fibers of each bundle do, or not at all.
+    There every bundle is at the bound that helps. Along the arm headings turn as fibers do, or not.
     """
     ends = np.array([0.0, *arm.breakpoints, arm.length])
     z = np.linspace(0.0, arm.length, _PROBED_STATIONS)
@@ -300,10 +298,7 @@ def _bending_corners(arm: Manipulator) -> Array:
 def _worsened(
     error: Differences, pilot: Array, known: Array, box: ActivationBox
 ) -> tuple[Array, Array]:
-    """Activations of larger error, and that: one bundle at a time goes to a bound, from the worst.
-
-    The errors of the pilot are known.
-    """
+    """Activations of larger error, and that: one bundle at a time goes to a bound."""
     chosen = np.argsort(-known, kind="stable")[:_SEARCHED]
     gamma, worst = pilot[chosen].copy(), known[chosen].copy()
     free, rows = box.free, np.arange(len(chosen))

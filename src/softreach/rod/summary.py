@@ -246,10 +246,7 @@ def _chambers_outside(arm: Manipulator) -> Iterator[str]:
 
 
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
-    """Largest overlap of two sectors [rad] and the first Z where they overlap [m].
-
-    Between stations their angular distance is taken to be linear.
-    """
+    """Largest overlap of two sectors [rad] and the first Z where they overlap [m]."""
     pair = [first, second]
     shares = outline.acts[:, first] & outline.acts[:, second]
     if not shares.any():

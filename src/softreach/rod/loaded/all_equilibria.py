@@ -280,11 +280,7 @@ def _resolving(solver: Solver, gamma: Array) -> Solver:
 
 
 def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roots]:
-    """With steps halved until no tip moves by more than half of the tolerance.
-
-    Those to begin with are enough without loads. The steps of the tip map are those of the branch
-    that it follows anywhere in the box: others may bend more.
-    """
+    """With steps halved until no tip moves by half of the tolerance."""
     allowed = 0.5 * solver.tol * solver.tables.arm.length
     most = max(_MOST_STEPS, 2 * enough_for_all_breaks(solver.tables.arm))
     while 2 * solver.steps <= most:

@@ -175,10 +175,7 @@ class Flood:
         self.linked[axis[good], lower[good]] = True
 
     def _link(self) -> None:
-        """Tell edges on one branch from cuts: smooth ones at once, the others by following them.
-
-        Cells are whole whose corners are all known, and whose edges are all linked.
-        """
+        """Tell edges on one branch from cuts: smooth ones at once, the others by following them."""
         length = self.solver.tables.arm.length
         frames, tips = self.held.frame.reshape(*self.sizes, -1), self.held.tips / length
         whole = over_cells(self.held.is_found.reshape(self.sizes), np.logical_and)

@@ -177,10 +177,7 @@ class _Grid:
     def _followed(
         self, twin: Solver, state: Index, to: Index, column: Index
     ) -> tuple[Equilibria, Array]:
-        """Postures of the arm at the ends of branches of the twin, or where these end.
-
-        And the shares of the edges up to there.
-        """
+        """Postures of the arm where branches of the twin end, and shares of edges up to there."""
         start = self.equilibria.of(state)
         back = self.next[state, column ^ 1]
         before = self.equilibria.frame[np.maximum(back, 0)]

@@ -124,11 +124,8 @@ class Postures:
         self.solver.put(gamma, at, new.only(good), equilibria)
 
     def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
-        """Rows, and frames there of the flood, of the unloaded arm, or of one that hangs along it.
-
-        Those of uncut cells, rough ones last: lanes wait for the slowest among them.
-        """
-        if self.flood is not None:
+        """Rows, and frames there: of the flood, of the unloaded arm, or of one that hangs along."""
+        if self.flood is not None:  # uncut cells, rough ones last: lanes wait for the slowest
             frames, rough = self.flood.at(gamma)
             order = np.argsort(rough, kind="stable")[: (rough < CUT).sum()]
             return order, frames[order]
@@ -228,10 +225,7 @@ class Postures:
 
     @lazy
     def _ring(self) -> tuple[Array, float] | None:
-        """Frame of an arm of the ring that leans at rest, and the azimuth to which this one does.
-
-        None where there is none, loads have several directions, or are too heavy for a search.
-        """
+        """Frame of an arm of the ring that leans at rest, and its azimuth; None where none does."""
         solver, rest, tables = self.solver, self.rest_activation, self.solver.tables
         if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
             return None
@@ -250,11 +244,7 @@ class Postures:
         return frame, float(_azimuth(shapes.position[:, 0], tables.axes)[first])
 
     def _near_ring(self, frame: Array, azimuth: float, gamma: Array) -> Equilibria:
-        """Stable equilibria of the twin near the ring, under small activations (n, bundles).
-
-        They lean to about where the activations bend the unloaded arm; without a bend none is
-        found.
-        """
+        """Stable equilibria of the twin near the ring, about where it would bend without loads."""
         twin, tables = self.twin, self.twin.tables
         leaning = twin.search(gamma, None).only(np.zeros(len(gamma), bool))
         bent = FreeRod(tables.arm, 1e-6).tips(gamma)

@@ -317,10 +317,7 @@ def _found_rows(known: Equilibria) -> tuple[Index, Mask]:
 def _shapes_of(
     tips: Array, trace: Array, table: StepTables, rows: Index, stations: Array
 ) -> LoadedShapes:
-    """Shapes at stations Z [m] from the sections of walks on a table; NaN where a tip is.
-
-    The stations are the boundaries of steps with these rows, tip first.
-    """
+    """Shapes at stations Z [m], ends of steps with these rows, tip first; NaN where a tip is."""
     force = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])[rows]
     axes = _world(trace[:, -1])[:, None]
     trace = trace[:, rows]
