@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import LinearTaper, Manipulator, Material, Ring, Section, Tendon, designs
+from softreach.arm import Manipulator, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import compliance
 from softreach.cloud.curvature import strain_ranges
@@ -280,22 +279,16 @@ def heavy():
 
 def soft_tendons(share):
     """Three soft tendons that hang, of load number 25 with all of the load."""
-    tendons = [
-        Tendon(
-            name=f"t{k}",
-            distance=_DISTANCE,
-            offset=2 * math.pi * k / 3,
-            activation_bounds=(0.0, _TENSION),
-        )
-        for k in range(3)
-    ]
-    rubber = Material(young_modulus=_YOUNG, density=1000.0)
-    return Manipulator(
-        profile=LinearTaper(length=0.3, outer_radius=0.01833, taper=0.02369),
-        section=Section(rings=(Ring(inner_ratio=0.0, material=rubber),)),
-        actuators=tuple(tendons),
-        loads=Loads(gravity=(0.0, 0.0, share * 9.81), payload=0.61417),
+    arm = Manipulator.tapered(
+        length=0.3,
+        outer_radius=0.01833,
+        inner_radius=0.0,
+        taper=0.02369,
+        young_modulus=_YOUNG,
+        density=1000.0,
+        actuators=[Tendon(distance=_DISTANCE, bundles=3, activation_bounds=(0.0, _TENSION))],
     )
+    return arm.replace(loads=Loads(gravity=(0.0, 0.0, share * 9.81), payload=0.61417))
 
 
 def test_a_smooth_branch_is_not_lost_under_a_little_more_load():

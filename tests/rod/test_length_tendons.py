@@ -248,13 +248,15 @@ ONE, THIN, DENSITY, YOUNG = 1.0, 1e-4, 1000.0, 1e9
 
 def rod(loads=None, radius=THIN, density=DENSITY, young=YOUNG):
     """So thin that it does not stretch."""
-    material = sr.Material(young_modulus=young, density=density)
-    return sr.Manipulator(
-        profile=sr.LinearTaper(length=ONE, outer_radius=radius),
-        section=sr.Section(rings=(sr.Ring(inner_ratio=0.0, material=material),)),
+    arm = sr.Manipulator.tapered(
+        length=ONE,
+        outer_radius=radius,
+        inner_radius=0.0,
+        young_modulus=young,
+        density=density,
         actuators=(),
-        loads=loads,
     )
+    return arm.replace(loads=loads)
 
 
 THICK = rod(sr.Loads(gravity=(9.81, 0.0, 0.0)), radius=0.05, young=1e6)
