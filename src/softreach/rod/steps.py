@@ -87,9 +87,11 @@ class StepRule:
             η [-], shape (step, node, bundle); U [1/m], shape (step, node, 3, bundle).
         """
         edges = np.asarray(edges, float)
-        width = np.diff(edges)[:, None]
-        s = edges[:-1, None] + width * np.array(magnus.NODES)
-        z = self.arm.profile.station(s)
+        return self._nodes_of(edges[:-1], np.diff(edges))
+
+    def _nodes_of(self, starts: Array, widths: Array) -> tuple[Array, Array, Array, Array]:
+        width = widths[:, None]
+        z = self.arm.profile.station(starts[:, None] + width * np.array(magnus.NODES))
         at, measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
         return measure, at.extension, at.rest_length_factor, at.curvature
 
@@ -98,11 +100,12 @@ class StepRule:
         return read_only(rod.pack(*self.nodes(edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
-        """Packed tables of the steps, and of both halves of each."""
+        """Packed tables of the steps, and of both halves of each, computed together."""
         edges = self.edges(steps)
-        middles = 0.5 * (edges[:-1] + edges[1:])
-        halved = np.append(np.column_stack([edges[:-1], middles]).ravel(), edges[-1])
-        return self.packed(edges), self.packed(halved)
+        both = edges, np.insert(edges, np.arange(1, len(edges)), 0.5 * (edges[:-1] + edges[1:]))
+        starts, widths = np.concatenate([[each[:-1], np.diff(each)] for each in both], axis=1)
+        packed = read_only(rod.pack(*self._nodes_of(starts, widths)))
+        return packed[: len(edges) - 1], packed[len(edges) - 1 :]
 
     def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
         """Packed tables of steps that end at every station Z [m], and the steps up to each."""
