@@ -130,7 +130,7 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
     z = profile.station(at)
     # Steps without length stand where something ends: the inside of the arm decides.
     length = width[:, None] * profile.radius(z)
-    table, soft = tables_on(arm, z), np.zeros((*z.shape, 4))
+    (table,), soft = tables_on(arm, z), np.zeros((*z.shape, 4))
     if arm.loads is not None:
         axial, bending, torsion = compliance(arm, z)
         soft = np.stack([axial, bending, bending, torsion], axis=-1)

@@ -5,7 +5,7 @@ Steps are uniform in S, theory (15); how many is theory (27).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,11 +42,14 @@ _FEW_BREAKS = 64
 """Breakpoints at all of which steps end, however few the arm needs otherwise."""
 
 
-def tables_on(arm: Manipulator, z: Array) -> Tables:
+def tables_on(arm: Manipulator, *grids: Array) -> Iterator[Tables]:
     """Tables at the nodes of steps, Z [m] of shape (step, node), which lead their arrays."""
-    table = tables(arm, z.ravel())
-    values = table.extension, table.curvature, table.rest_length_factor
-    return Tables(z, *(value.reshape(*z.shape, *value.shape[1:]) for value in values))
+    table = tables(arm, np.concatenate([z.ravel() for z in grids]))
+    first = 0
+    for z in grids:
+        rows, first = slice(first, first + z.size), first + z.size
+        values = table.extension[rows], table.curvature[rows], table.rest_length_factor[rows]
+        yield Tables(z, *(value.reshape(*z.shape, *value.shape[1:]) for value in values))
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,7 @@ class StepRule:
     def _nodes_of(self, starts: Array, widths: Array) -> tuple[Array, Array, Array, Array]:
         width = widths[:, None]
         z = self.arm.profile.station(starts[:, None] + width * np.array(magnus.NODES))
-        at, measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
+        (at,), measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
         return measure, at.extension, at.rest_length_factor, at.curvature
 
     def packed(self, edges: Array) -> Array:

@@ -258,30 +258,25 @@ class LoadTables:
         z[:, 0], z[:, -1] = ends[:-1], ends[1:]
         # A hair inside their step, nodes at its ends take what jumps there from within.
         inward = z + 1e-9 * (z[:, :1] - z[:, -1:]) * np.array([-1.0, 0.0, 0.0, 0.0, 1.0])
-        at, measure = tables_on(self.arm, inward), width * profile.radius(inward)
+        wide = (width * np.diff(np.array(NODES))).reshape(-1, 1)  # of the pieces between nodes
+        between = profile.station(s[:, 1:].reshape(-1, 1) + wide * np.array(magnus.NODES))
+        at, inside = tables_on(self.arm, inward, between)
+        resting = inside.rest_length_factor  # only rotations are needed
+        pieces = rod.pack(wide * profile.radius(between), resting, resting, inside.curvature)
+        pieces[:, 3::4, -1] += self.twist  # u3 at rest
+        measure = width * profile.radius(inward)
         axial, bending, torsion = (c[..., None] for c in compliance(self.arm, inward))
         force = self._forces(z) @ self.axes.T
         scalars = np.concatenate([bending, torsion - bending, axial, force], axis=-1)
         inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
         return StepTables(
-            self._pieces(s, width),
+            pieces,
             rest_frames.pack_lengths(measure, at.extension, at.rest_length_factor),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature),
             self._moments(ends[:-1]),
             np.array([0, *inner, len(edges) - 1], np.int64),
         )
-
-    def _pieces(self, s: Array, width: Array) -> Array:
-        """Packed Magnus nodes between the nodes of steps."""
-        profile = self.arm.profile
-        wide = (width * np.diff(np.array(NODES))).reshape(-1, 1)
-        z = profile.station(s[:, 1:].reshape(-1, 1) + wide * np.array(magnus.NODES))
-        at = tables_on(self.arm, z)
-        resting = at.rest_length_factor  # only rotations are needed
-        pieces = rod.pack(wide * profile.radius(z), resting, resting, at.curvature)
-        pieces[:, 3::4, -1] += self.twist  # u3 at rest
-        return pieces
 
     def _forces(self, z: Array) -> Array:
         """Dead force n [N] at the nodes of steps, theory (60), (step, 5, 3)."""
