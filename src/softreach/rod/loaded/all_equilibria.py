@@ -39,7 +39,7 @@ from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
 from softreach.rod.tip_map import Frames, InvalidLoads, Strains, TipMap, TipStatus
-from softreach.support.arrays import Array, Mask, as_floats
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, counted, warn
 
 if TYPE_CHECKING:
@@ -181,8 +181,7 @@ def equilibria(
         SoftreachWarning: Some may be missing, or tips miss `tol`.
     """
     whole = of_tip(as_tip_map(arm, tol, warn=False))  # the degree says whether any is missing
-    gamma = as_floats("activations", activations)
-    gamma = whole.check_activations("activations", gamma[None] if gamma.ndim == 1 else gamma)
+    gamma = whole.check_activations("activations", activations)
     if len(gamma) != 1:
         allowed = f"({whole.box.bundles},) or (1, {whole.box.bundles}): one activation at a time"
         raise InvalidInput("activations.shape", gamma.shape, allowed)
@@ -286,13 +285,13 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
     while 2 * solver.steps <= most:
         finer = solver.judge()
         again = _again(finer, gamma, roots)
-        if len(again.directions) == len(roots.directions):
-            apart = _tips(finer, gamma, again) - _tips(solver, gamma, roots)
+        if len(again.directions) != len(roots.directions):
+            again = _search(finer, gamma, roots.directions)
+        else:
+            apart = _tips(finer, gamma, again)[0] - _tips(solver, gamma, roots)[0]
             if np.linalg.norm(apart, axis=1).max(initial=0.0) <= allowed:
                 return solver, roots
-            solver, roots = finer, again
-        else:
-            solver, roots = finer, _search(finer, gamma, roots.directions)
+        solver, roots = finer, again
     warn(f"tips of some equilibria miss tol = {solver.tol:g}")
     return solver, roots
 
@@ -304,22 +303,23 @@ def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
     return _isolated(polished, complete=roots.complete)
 
 
-def _tips(solver: Solver, gamma: Array, roots: _Roots) -> Array:
+def _tips(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Array, Array]:
+    """Tips in the frame of the base, and margins."""
     many = np.repeat(gamma, len(roots.directions), axis=0)
     stations = np.array([solver.tables.arm.length])
-    return solver.shapes_facing(many, roots.directions, stations)[0].position[:, 0]
+    shapes, margin = solver.shapes_facing(many, roots.directions, stations)
+    return shapes.position[:, 0], margin
 
 
 def _judged(
     rod: ArmMap, solver: Solver, gamma: Array, roots: _Roots, known: Array
 ) -> AllEquilibria:
-    axis, many = solver.tables.axes[0], np.repeat(gamma, len(roots.directions), axis=0)
-    shapes, margin = solver.shapes_facing(many, roots.directions, np.array([rod.length]))
+    tips, margin = _tips(solver, gamma, roots)
     margin = np.where(roots.is_ring & (margin > -NEUTRAL), 0.0, margin)
     stable = (roots.signs > 0) & np.where(roots.is_ring, margin == 0.0, margin > 0.0)
-    places = np.round(shapes.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
+    places = np.round(tips[:, ::-1] / rod.length, 6)  # part mirror images
     order = np.lexsort((*places.T, -np.round(margin, 6), ~stable))
-    followed = _nearest(roots, known, axis)
+    followed = _nearest(roots, known, solver.tables.axes[0])
     complete = roots.complete and (followed is not None or not len(known))
     if not complete:
         total = int(roots.signs[~roots.is_ring].sum())
@@ -328,7 +328,7 @@ def _judged(
         rod=rod,
         solver=solver,
         activation=gamma[0],
-        tips=rod.pose.to_world(shapes.position[order, 0]),
+        tips=rod.pose.to_world(tips[order]),
         status=np.where(stable, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)[order],
         margin=margin[order],
         directions=roots.directions[order],
