@@ -218,7 +218,7 @@ class MarkerModel:
 
 def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:
     """Offsets in the frame of the base, and places there, (n, marker, 3) each."""
-    offset = np.einsum("mk,nmka->nma", at.offsets, state.asked_directors)
+    offset = np.einsum("mk,nmka->nma", at.offsets, state.place_directors)
     return offset, state.position + offset
 
 
@@ -241,7 +241,7 @@ def _slopes(
     offset, place = _beyond(at, state)
     slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
     for k, change in enumerate(changes):
-        slopes[..., k] += np.einsum("mk,nmka->nma", change.offsets, state.asked_directors)
+        slopes[..., k] += np.einsum("mk,nmka->nma", change.offsets, state.place_directors)
     slopes = np.einsum("ab,nmbk->nmak", at.rotation, slopes)
     for k, change in enumerate(changes):
         slopes[..., k] += change.position + place @ change.rotation.T

@@ -91,7 +91,7 @@ class ArmRod(TipMap):
 
     @lazy
     def _tip_tol(self) -> float:
-        """Tolerance of the center of the section, with which the point is as accurate as asked."""
+        """Tolerance of the center of the section, with which the point is within `tol`."""
         return max(self.tol / (1.0 + _LEVER * self.reach / self.length), SMALLEST_TOL)
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
@@ -240,7 +240,7 @@ def linear_strains(table: Tables, gamma: Array) -> tuple[Array, Array, Array]:
     """Uγ, ζ = 1 + z·γ and η at the stations of a table: theory (7).
 
     Samples vary fastest in memory, so that all values at one station lie side by side. The sum runs
-    over the bundles in their order, whatever BLAS and its threads would do.
+    over the bundles in their order, so that BLAS and its threads do not decide the rounding.
 
     Args:
         table: z and U, and the part of z in η.

@@ -260,7 +260,7 @@ class Inputs:
 
     @property
     def kinks(self) -> list[Array]:
-        """Values of each x at which a tendon goes slack, whatever the others are."""
+        """Values of each x at which a tendon goes slack, for all values of the others."""
         if self.driving is None:
             return [np.empty(0)] * len(self.free)
         return [self.driving.kinks[j] / self.scale[j] for j in self.free]

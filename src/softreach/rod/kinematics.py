@@ -1,7 +1,7 @@
 """Forward kinematics: where the tip is, how it moves, what shape the arm takes.
 
-Clamped at Z = 0 by its base, whose z is the tangent d3 there; told in the world unless asked
-otherwise.
+The arm is clamped at Z = 0 by its base, whose z is the tangent d3 there. Places are in the frame of
+the world by default.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def tip_positions(
         activations: γ [-], shape (n, bundles), or (bundles,) for one; values outside the bounds are
             allowed, but `tol` is promised inside them.
         tol: Largest tip error, in L; it decides the number of steps.
-        frame: In which tips are told: that of the "world", or of the "base", whose z is along the
+        frame: Frame of the tips: that of the "world", or of the "base", whose z is along the
             straight arm.
 
     Returns:

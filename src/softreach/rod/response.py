@@ -1,8 +1,8 @@
 """Linear response of an arm in equilibrium: how places move when its tables change a little.
 
-Tables are those of the steps between all places where the arm is not smooth or is asked for. Each
-node stays at its share of its step while the arm changes, so that steps grow with the arm and no
-actuator ends inside one.
+Tables are those of the steps between wanted stations and all places where the arm is not smooth.
+Each node stays at its share of its step while the arm changes, so that steps grow with the arm and
+no actuator ends inside one.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class NodeTables(NamedTuple):
     """Of the payload in the directors of the tip [m], shape (3,)."""
     weight: Array
     """Force of the payload in the frame of the base [N], shape (3,)."""
-    asked: Array
-    """Z of the stations that were asked for [m], shape (station,)."""
+    places: Array
+    """Z of the wanted stations [m], shape (station,)."""
 
     def combined(self, others: list[NodeTables], factors: list[float]) -> NodeTables:
         """Σ factor x other, of differences."""
@@ -102,7 +102,7 @@ def step_grid(
 
     Args:
         arm: The inner arm.
-        stations: Z that are asked for [m], in any order.
+        stations: Wanted Z [m], in any order.
         steps: Even steps; a step should not turn the arm by much more than a third of a radian.
         moving_ends: Whether actuators that end at the base or at the tip may come to end before.
     """
@@ -145,7 +145,7 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         force=force,
         lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
         weight=weight,
-        asked=np.asarray(stations, float),
+        places=np.asarray(stations, float),
     )
 
 
@@ -193,8 +193,8 @@ class RodState(NamedTuple):
     moment: Array
     """m in the directors [N m], shape (n, step, 3, 3)."""
     position: Array
-    """r at the stations that are asked for [m], shape (n, station, 3)."""
-    asked_directors: Array
+    """r at the wanted stations [m], shape (n, station, 3)."""
+    place_directors: Array
     """Directors there, shape (n, station, 3, 3)."""
     tip_directors: Array
     """Directors of the tips, shape (n, 3, 3)."""
@@ -204,17 +204,17 @@ class RodState(NamedTuple):
 
 def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
     """Equilibria of a rod at activations of its arm, at the nodes of its tables."""
-    z = np.concatenate([table.stations.ravel(), table.asked, [rod.length]])
+    z = np.concatenate([table.stations.ravel(), table.places, [rod.length]])
     ascending, back = np.unique(np.clip(z, 0.0, rod.length), return_inverse=True)
     frames, moment, status = rod.with_moments(gamma, ascending)
     position, directors, moment = (values[:, back] for values in (*frames, moment))
-    steps, count, asked = table.stations.shape[0], table.stations.size, len(table.asked)
+    steps, count, wanted = table.stations.shape[0], table.stations.size, len(table.places)
     return RodState(
         gamma,
         directors[:, :count].reshape(-1, steps, 3, 3, 3),
         moment[:, :count].reshape(-1, steps, 3, 3),
-        position[:, count : count + asked],
-        directors[:, count : count + asked],
+        position[:, count : count + wanted],
+        directors[:, count : count + wanted],
         directors[:, -1],
         status,
     )
@@ -232,7 +232,7 @@ def linear_response(
         table: Tables of the inner arm at the nodes.
         state: Its equilibria.
         changes: Changes of the tables, one for each column after those of the activations.
-        unit_loads: M and N at the nodes whose work is asked for, shape (step, 3, 4, work).
+        unit_loads: M and N at the nodes whose work is wanted, shape (step, 3, 4, work).
     """
     n, bundles = state.gamma.shape
     if unit_loads is None:
@@ -243,8 +243,8 @@ def linear_response(
     for k, other in enumerate(changes, bundles):  # moment of the payload at the same directors
         moved = other.lever @ state.tip_directors
         tipping[..., k] = np.cross(lever, other.weight) + np.cross(moved, table.weight)
-    marks = np.searchsorted(table.stations[:, 1], np.sort(table.asked))
-    moves, turns = np.zeros((2, n, len(table.asked), 3, columns))
+    marks = np.searchsorted(table.stations[:, 1], np.sort(table.places))
+    moves, turns = np.zeros((2, n, len(table.places), 3, columns))
     works = np.zeros((n, unit_loads.shape[-1], columns))
 
     def fill(rows: slice) -> None:
@@ -255,7 +255,7 @@ def linear_response(
             respond(*per_arm, *given, *answers)
 
     parallel.run(partial(fill, block) for block in parallel.blocks(n, _TOGETHER))
-    back = np.argsort(np.argsort(table.asked, kind="stable"), kind="stable")
+    back = np.argsort(np.argsort(table.places, kind="stable"), kind="stable")
     return Response(moves[:, back], turns[:, back], works)
 
 

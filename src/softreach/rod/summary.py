@@ -132,7 +132,7 @@ def describe(arm: Manipulator) -> DesignSummary:
 
 
 def _of_matter(arm: Manipulator) -> dict[str, Any]:
-    """Stiffness, mass and load number, as far as moduli and densities are known."""
+    """Stiffness, mass and load number, where moduli and densities are known."""
     moduli, densities = arm.section.modulus_faults(""), arm.section.density_faults("")
     ends = np.array([0.0, arm.length])
     return {

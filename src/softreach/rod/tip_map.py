@@ -1,7 +1,7 @@
 """The tip map: from activations to where the tip is, and everything else that a rod can say.
 
 Left of it there is physics and no sample; right of it there are millions of samples and no physics.
-Whoever asks where an arm can go asks a tip map, never the fields of the arm.
+Code that needs to know where an arm can go calls a tip map, and reads no field of the arm.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ class TipStatus(IntEnum):
     STABLE = 0
     """A stable equilibrium."""
     UNSTABLE = 1
-    """An unstable equilibrium; its tip is NaN unless it is asked for."""
+    """An unstable equilibrium; its tip is NaN by default."""
     NO_EQUILIBRIUM = 2
     """There is no such arm: it would be shortened to nothing; the tip is NaN."""
     UNDECIDED = 3
-    """The branch was not followed to its end: nobody knows whether it leads there; the tip is
-    NaN."""
+    """The branch was not followed to its end, so that it is unknown whether it leads there; the tip
+    is NaN."""
     SNAPS = 4
     """The branch of stable postures from rest ends before: the arm snaps to another one; the tip is
     NaN."""
@@ -121,7 +121,7 @@ class TipMap(ABC):
         return self.arm.length
 
     pose: Base = UPRIGHT
-    """Pose of the clamped end in the frame in which the map tells places."""
+    """Pose of the clamped end in the frame of places."""
 
     @property
     def point(self) -> Marker | None:
@@ -130,7 +130,7 @@ class TipMap(ABC):
 
     @property
     def frame(self) -> Frame:
-        """The frame in which the map tells places and takes directions."""
+        """The frame of places and directions."""
         return "world"
 
     @lazy
@@ -145,7 +145,7 @@ class TipMap(ABC):
 
     @property
     def kinks(self) -> list[Array]:
-        """Values of each activation at which the map has a kink, whatever the others are."""
+        """Values of each activation at which the map has a kink, for all values of the others."""
         return [np.empty(0)] * self.box.bundles
 
     @property
@@ -426,7 +426,7 @@ class TipMotions(NamedTuple):
 
 
 def drop(lost: NDArray[np.intp], status: Status | None, *values: Array | None) -> None:
-    """Make rows NaN, with the status `NO_EQUILIBRIUM` where it is asked for."""
+    """Make rows NaN, and give them the status `NO_EQUILIBRIUM`."""
     for some in values:
         if some is not None:
             some[lost] = np.nan

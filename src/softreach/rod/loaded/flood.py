@@ -6,7 +6,7 @@ tip, and where the equilibrium is stable; otherwise it is tried at half its leng
 
 The grid over the activation box is flooded from rest, node after node along its edges, each step a
 branch that is followed. Neighbors that are not on one branch are cut: between them the arm snaps,
-or leans to either side. Cells without a cut tell where to begin within them.
+or leans to either side. In cells without a cut, their nodes give the frames to begin from.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ _SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
 CUT = 1e6
 """Roughness of cells that are cut."""
-PARTS = 64  # of a line, at which it is asked for cuts
+PARTS = 64  # of a line, at the ends of which cuts are looked for
 
 
 class Followed(NamedTuple):
-    """Branches as far as they were followed."""
+    """Branches up to where they were followed."""
 
     last: Equilibria
     """The last equilibrium; undecided where it is not that of the end of the way."""

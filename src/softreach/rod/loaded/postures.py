@@ -44,7 +44,7 @@ _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
 _PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
-_HANGING = 4.0  # [rad] of phase, from which on the unloaded arm tells nothing of one that hangs
+_HANGING = 4.0  # [rad] of phase, from which on the unloaded arm is no guess for one that hangs
 _TURNS = np.pi / 16 * np.array([0, *(sign * k for k in range(1, 17) for sign in (1, -1))])
 """Azimuths beside the one to which the unloaded arm bends, at which the arm is looked for."""
 _STRAIGHT = 1e-8  # [L], aside, of an arm that no activation leans to any side

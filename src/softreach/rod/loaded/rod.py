@@ -42,7 +42,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
 Differences = Callable[[Solver, Array, Equilibria], Array]
-"""Distances [m] between what a solver and its judge find, near known equilibria."""
+"""Distances [m] between results of a solver and of its judge, near known equilibria."""
 
 _BLOCK = BLOCK // 8  # samples per task
 _RESPONSE_STEPS = 48
@@ -191,14 +191,14 @@ class LoadedRod(ArmRod):
         if status is not None:
             status[:] = known.status
         is_moving = slopes is not None or twists is not None
+        has_directors = directions is not None or self.reach > 0.0
         if self.end < self.length:
             shapes = self._shape_solver.shapes(gamma, np.array([self.end]), known)
             tips[:], directors = shapes.position[:, 0], shapes.directors[:, 0]
             moved = self._section_twists(gamma) if is_moving else None
         else:
             tips[:], directors, moved = known.tips, None, None
-            if is_moving or directions is not None or self.reach > 0.0:
-                has_directors = directions is not None or self.reach > 0.0
+            if is_moving or has_directors:
                 moved, _, directors = self.solver.respond(gamma, known, directors=has_directors)
         if directors is not None and len(directors):
             add_offset(tips, self.offset, directors)

@@ -157,7 +157,7 @@ class LoadTables:
 
     @property
     def frame_size(self) -> int:
-        """Numbers by which the nodes of an arm tell how they see the world."""
+        """Numbers of a frame: how the nodes of an arm see the world."""
         return self.segments * (3 if self.one_direction else 6)
 
     @lazy
@@ -191,7 +191,7 @@ class LoadTables:
         """The phase that the loads give the tangents at most.
 
         Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the
-        sizes of all forces and moments beyond, added whatever their directions, and ζ̂ the largest
+        sizes of all forces and moments beyond, added as if along one line, and ζ̂ the largest
         within bounds, or η where that is larger.
         """
         arm, profile = self.arm, self.arm.profile
@@ -226,7 +226,7 @@ class LoadTables:
 
     @lazy
     def _made(self) -> dict[int, StepTables]:
-        """Tables by their number of steps; searches ask for the same ones again."""
+        """Tables by their number of steps; searches use the same ones again."""
         return {}
 
     def uniform(self, steps: int) -> StepTables:
