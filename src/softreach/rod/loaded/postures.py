@@ -155,15 +155,14 @@ class Postures:
         snaps = followed.has_ended & (followed.last.margin < _LOST)
         gone = equilibria.status[rows] == TipStatus.UNDECIDED
         equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
-        if not self.is_held_at_rest and gone.any():
-            self._unstable(gamma, rows[gone], equilibria)
-
-    def _unstable(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
-        """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
-        new = self.solver.search(gamma[rows], None)
-        at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
-        new = new.only(~new.is_stable | at_rest)  # no stable ones of others
-        self.solver.put(gamma, rows, new, equilibria)
+        if not self.is_held_at_rest and gone.any():  # unstable ones, which no activation leans
+            left = rows[gone]
+            new, at_rest = (
+                self.solver.search(gamma[left], None),
+                gamma[left] == self.rest_activation,
+            )
+            new = new.only(~new.is_stable | at_rest.all(axis=1))  # no stable ones of others
+            self.solver.put(gamma, left, new, equilibria)
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin from nodes of the flood, or along lines from rest."""
