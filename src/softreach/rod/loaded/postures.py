@@ -156,13 +156,9 @@ class Postures:
         gone = equilibria.status[rows] == TipStatus.UNDECIDED
         equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
         if not self.is_held_at_rest and gone.any():  # unstable ones, which no activation leans
-            left = rows[gone]
-            new, at_rest = (
-                self.solver.search(gamma[left], None),
-                gamma[left] == self.rest_activation,
-            )
-            new = new.only(~new.is_stable | at_rest.all(axis=1))  # no stable ones of others
-            self.solver.put(gamma, left, new, equilibria)
+            left, new = rows[gone], self.solver.search(gamma[rows[gone]], None)
+            at_rest = (gamma[left] == self.rest_activation).all(axis=1)
+            self.solver.put(gamma, left, new.only(~new.is_stable | at_rest), equilibria)
 
     def followed(self, gamma: Array) -> Followed:
         """Branches of the twin from nodes of the flood, or along lines from rest."""
