@@ -12,14 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.driving import Driving, inner_arm
+from softreach.arm.driving import Driving
 from softreach.arm.manipulator import Manipulator
 from softreach.support.arrays import Array, as_rows, labeled, read_only
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
-
-_OF_LENGTHS = 0.03
-"""Tolerance of shapes of which lengths are taken, over that of tips."""
 
 
 @dataclass(frozen=True)
@@ -189,22 +186,10 @@ class Inputs:
         return cls(own_box, driving, (1.0,) * own_box.bundles, tuple(range(own_box.bundles)))
 
     @classmethod
-    def of_drives(cls, arm: Manipulator, tol: float) -> Inputs:
+    def of_drives(cls, arm: Manipulator) -> Inputs:
         """Those of an arm whose inputs are not the activations of its sections."""
         driving = Driving(arm)
-        return cls.of(_bounds(driving), driving).to_tolerance(tol)
-
-    def to_tolerance(self, tol: float) -> Inputs:
-        """The same with tensions for a tolerance of tips [L]."""
-        driving = self.driving
-        if driving is None or driving.arm.loads is None or not driving.has_length_tendons:
-            return self
-        from softreach.rod.loaded.pulled import LoadedLengths
-        from softreach.rod.loaded.rod import LoadedRod
-
-        # A tip moves by far more than the length by which a tendon near the axis is off.
-        rod = LoadedRod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, 1e-12))
-        return replace(self, driving=replace(driving, lengths=LoadedLengths(driving.law, rod)))
+        return cls.of(_bounds(driving), driving)
 
     def effective(self) -> Inputs:
         """Inputs that begin beyond the dead zones of drives."""

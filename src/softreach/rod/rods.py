@@ -17,6 +17,7 @@ from softreach.kernels.rod.frames import move, turn
 from softreach.rod.free import ArmRod, FreeRod
 from softreach.rod.inputs import ActivationBox, Inputs
 from softreach.rod.tip_map import (
+    SMALLEST_TOL,
     Array,
     Frame,
     Frames,
@@ -33,6 +34,9 @@ from softreach.support.arguments import as_flag, as_given, as_instance, as_one_o
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
+
+_OF_LENGTHS = 0.03
+"""Tolerance of shapes of which lengths are taken, over that of tips."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -246,7 +250,7 @@ def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
     known = as_tip_map(tip_map)
     if not isinstance(known.rod, ArmRod):
         return tip_map
-    inputs = known.inputs.to_tolerance(tol)
+    inputs = _with_tensions(known.inputs, tol)
     return replace(known, rod=_known_rod(known.rod.arm, tol), inputs=inputs)
 
 
@@ -345,8 +349,20 @@ def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> ArmMap:
 
 
 def _made(arm: Manipulator, tol: float, frame: Frame, rod: ArmRod) -> ArmMap:
-    inputs = Inputs.of(rod.box) if arm.is_direct else Inputs.of_drives(arm, tol)
+    inputs = Inputs.of(rod.box) if arm.is_direct else _with_tensions(Inputs.of_drives(arm), tol)
     return ArmMap(rod, inputs, arm.base if frame == "world" else UPRIGHT)
+
+
+def _with_tensions(inputs: Inputs, tol: float) -> Inputs:
+    """The same with tensions under loads for a tolerance of tips [L]."""
+    driving = inputs.driving
+    if driving is None or driving.arm.loads is None or not driving.has_length_tendons:
+        return inputs
+    from softreach.rod.loaded.pulled import LoadedLengths
+
+    # A tip moves by far more than the length by which a tendon near the axis is off.
+    rod = _rod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, SMALLEST_TOL))
+    return replace(inputs, driving=replace(driving, lengths=LoadedLengths(driving.law, rod)))
 
 
 @lru_cache(maxsize=64)
