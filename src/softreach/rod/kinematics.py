@@ -195,19 +195,17 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
         arm: The design.
         stations: Number of stations, evenly spaced in Z.
     """
-    z = np.linspace(0.0, arm.length, stations)
-    straight = np.zeros((1, stations, 3))
-    straight[..., 2] = z
-    directors = np.tile(np.eye(3), (1, stations, 1, 1))
-    nodes = len(quadrature(body_of(arm))[0])
-    straight_lines = lengths_of_strains(arm, np.zeros((1, nodes, 3)), np.ones((1, nodes)))
-    lines: dict[str, Any] = {"line_length": straight_lines} if arm.bundles else {}
+    z, lines = np.linspace(0.0, arm.length, stations), dict[str, Any]()
+    if arm.bundles:
+        nodes = len(quadrature(body_of(arm))[0])
+        straight = np.zeros((1, nodes, 3)), np.ones((1, nodes))
+        lines["line_length"] = lengths_of_strains(arm, *straight)
     shape = schema.configuration_dataset(
         arm,
         np.zeros((1, arm.inputs)),
         z,
-        position=arm.base.to_world(straight),
-        directors=arm.base.directions_to_world(directors),
+        position=arm.base.to_world(z[None, :, None] * np.array([0.0, 0.0, 1.0])),
+        directors=arm.base.directions_to_world(np.tile(np.eye(3), (1, stations, 1, 1))),
         curvature=np.zeros((1, stations, 3)),
         extension=np.ones((1, stations)),
         radius=arm.profile.radius(z),

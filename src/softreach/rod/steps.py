@@ -71,13 +71,10 @@ class StepRule:
             steps: Uniform steps along the whole arm, if nothing breaks it.
             stations: Z [m] where steps end too, ascending; the last one then stands for the tip.
         """
-        profile = self.arm.profile
-        inside = profile.slender_coordinate(np.array(ends_of_steps(self.arm, steps)))
-        marks = np.array([0.0, *inside, profile.slender_length])
+        z = [0.0, *ends_of_steps(self.arm, steps), self.arm.length]
         if stations is not None:
-            s = profile.slender_coordinate(stations)
-            marks = np.unique(np.concatenate([marks[marks < s[-1]], s]))
-        return edges_between(profile, marks, steps)
+            z = [*(mark for mark in z if mark < stations[-1]), *stations]
+        return edges_between(self.arm.profile, np.unique(z), steps)
 
     def nodes(self, edges: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
@@ -205,7 +202,7 @@ class StepRule:
     def _shape_differences(self, steps: int) -> Differences:
         """Largest distances [m] along the centerlines with `steps` and with twice as many."""
         coarse, fine = self._halves(steps)
-        steps = len(self.edges(steps)) - 1
+        steps = len(coarse)
         ends = np.arange(1, steps + 1)
 
         def difference(gamma: Array) -> Array:
@@ -245,14 +242,15 @@ def enough_for_all_breaks(arm: Manipulator) -> int:
     return breaks if breaks > _FEW_BREAKS else 0
 
 
-def edges_between(profile: Profile, marks: Array, steps: int) -> Array:
-    """Step boundaries S [-] that hold all marks, with no step longer than `steps` uniform ones.
+def edges_between(profile: Profile, z: Array, steps: int) -> Array:
+    """Step boundaries S [-] that hold marks, with no step longer than `steps` uniform ones.
 
     Args:
         profile: Of the arm.
-        marks: Ascending S [-], the first and the last of which are the ends.
+        z: Ascending Z of the marks [m], the first and the last of which are the ends.
         steps: Uniform steps along the whole arm.
     """
+    marks = profile.slender_coordinate(z)
     gaps = np.diff(marks)
     # A gap that only rounding makes longer takes no more steps for it.
     counts = np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(int)

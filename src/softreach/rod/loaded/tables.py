@@ -245,10 +245,10 @@ class LoadTables:
 
         No step is longer in S than those of `steps` uniform ones.
         """
-        profile, points = self.arm.profile, [load.station for load in self.loads.point_loads]
+        points = [load.station for load in self.loads.point_loads]
         breaks = [0.0, self.arm.length, *ends_of_steps(self.arm, steps), *points]
         z = np.unique(np.concatenate([breaks, self.nodes, stations]))
-        return edges_between(profile, profile.slender_coordinate(z), steps)[::-1]
+        return edges_between(self.arm.profile, z, steps)[::-1]
 
     def of_edges(self, edges: Array) -> StepTables:
         """Tables of steps between boundaries S, tip first."""
