@@ -142,9 +142,9 @@ def test_activations_that_leave_no_arm_have_a_status_and_no_shape(make, gone):
     tips, status = rod.tips_and_status(gamma)
     lost = [False, True, False]
     assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
-    frames, strains, status = rod.shapes(gamma, [0.5], [0.5])
+    *shapes, status = rod.shapes(gamma, [0.5], [0.5])
     assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
-    for values in (tips, rod.tip_twists(gamma)[1], *frames, *strains):
+    for values in (tips, rod.tip_twists(gamma)[1], *shapes):
         assert np.isnan(values.reshape(3, -1)).all(axis=1).tolist() == lost
         assert np.isfinite(values).reshape(3, -1).all(axis=1).tolist() == [True, False, True]
 
@@ -293,9 +293,7 @@ def test_a_sample_alone_has_the_numbers_that_it_has_among_others(make, arm):
             np.testing.assert_array_equal(one[rows], other)
     z = rod.length * np.array([0.0, 0.5, 0.7, 1.0])
     shapes, alone = (rod.shapes(rows, z, z) for rows in (gamma, gamma[3:4]))
-    for every, single in zip(
-        (*shapes.frames, *shapes.strains), (*alone.frames, *alone.strains), strict=True
-    ):
+    for every, single in zip(shapes, alone, strict=True):
         np.testing.assert_array_equal(every[3:4], single)
 
 

@@ -18,4 +18,5 @@ from .tip_map import Shapes as Shapes
 from .tip_map import Strains as Strains
 from .tip_map import TipMap as TipMap
 from .tip_map import TipMotions as TipMotions
+from .tip_map import TipOutputs as TipOutputs
 from .tip_map import TipStatus as TipStatus

@@ -112,7 +112,7 @@ class ArmRod(TipMap):
         Without loads m is 0, shape (n, station, 3).
         """
         shapes = self.shapes(gamma, z, ())
-        return shapes.frames, np.zeros((len(gamma), len(z), 3)), shapes.status
+        return Frames(*shapes[:2]), np.zeros((len(gamma), len(z), 3)), shapes.status
 
     @abstractmethod
     def _prepare(self) -> None:
@@ -214,8 +214,8 @@ class FreeRod(ArmRod):
                 partial(frames.frames, *table, gamma[b], places[b], directors[b])
                 for b in parallel.blocks(len(gamma), 1024)
             )
-        shapes = Shapes(Frames(places, directors), strains, np.zeros(len(gamma), np.int8))
-        drop(lost, shapes.status, *shapes.frames, *shapes.strains)
+        shapes = Shapes(places, directors, *strains, np.zeros(len(gamma), np.int8))
+        drop(lost, shapes.status, *shapes[:4])
         return shapes
 
     @lazy

@@ -175,16 +175,17 @@ def configuration(
     z = stations_along(tip_map, stations)
     nodes = quadrature(body_of(tip_map.arm))[0] if tip_map.arm.bundles else np.empty(0)
     strained = np.union1d(z, nodes)
-    frames, strains, status = tip_map.shapes(gamma, z, strained)
+    shapes = tip_map.shapes(gamma, z, strained)
+    strains = Strains(shapes.curvature, shapes.extension)
     at_stations, on_lines = (
         Strains(*(values[:, np.searchsorted(strained, places)] for values in strains))
         for places in (z, nodes)
     )
     others = _lines(tip_map, gamma, on_lines)
     others["marker_position"] = _markers(tip_map, gamma)
-    dataset = shape_dataset(tip_map, gamma, z, frames, at_stations, **others)
+    dataset = shape_dataset(tip_map, gamma, z, Frames(*shapes[:2]), at_stations, **others)
     if tip_map.supports_unstable:
-        dataset = schema.with_status(dataset, status)
+        dataset = schema.with_status(dataset, shapes.status)
     return dataset.isel(sample=0) if values.ndim == 1 else dataset
 
 

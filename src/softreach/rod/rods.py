@@ -176,8 +176,8 @@ class ArmMap(TipMap):
     def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         inner, lost = self._known(self.inputs.activations(self.box.check(activations)))
         shapes = self.rod.shapes(inner, framed, strained)
-        shapes = shapes._replace(frames=self.placed(shapes.frames))
-        self._drop(lost, shapes.status, *shapes.frames, *shapes.strains)
+        shapes = shapes._replace(**self.placed(Frames(*shapes[:2]))._asdict())
+        self._drop(lost, shapes.status, *shapes[:4])
         return shapes
 
     def placed(self, frames: Frames) -> Frames:

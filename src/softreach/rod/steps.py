@@ -18,7 +18,7 @@ from softreach.arm.tables import Tables, both_sides, jumps, tables
 from softreach.kernels.rod import frames, magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.inputs import ActivationBox
-from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
+from softreach.rod.tip_map import MOST_TURN_OF_STEP
 from softreach.support import parallel
 from softreach.support.arrays import Array, read_only
 from softreach.support.errors import InvalidInput
@@ -126,9 +126,8 @@ class StepRule:
             tol: Largest tip error, in L.
 
         Raises:
-            InvalidInput: `tol` below 1e-12, or not reached within 4,096 steps.
+            InvalidInput: `tol` is not reached within 4,096 steps.
         """
-        check_tol(tol)
         at_all, turn = enough_for_all_breaks(self.arm), MOST_TURN_OF_STEP
         exact = self._fewest(tol, lambda steps: _tips_apart(*self._halves(steps)), turn, at_all)
         if not at_all:

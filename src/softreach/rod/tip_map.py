@@ -104,16 +104,16 @@ class TipMap(ABC):
 
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
-        return self.shapes(activations, self.check_stations(stations), ()).frames
+        return Frames(*self.shapes(activations, self.check_stations(stations), ())[:2])
 
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
         """Curvature and extension at stations Z [m], in any order."""
         z = self.check_stations(stations, ascending=False)
         ascending, back = np.unique(z, return_inverse=True)
-        strains = self.shapes(activations, (), ascending).strains
+        shapes = self.shapes(activations, (), ascending)
         if np.array_equal(z, ascending):
-            return strains
-        return Strains(strains.curvature[:, back], strains.extension[:, back])
+            return Strains(shapes.curvature, shapes.extension)
+        return Strains(shapes.curvature[:, back], shapes.extension[:, back])
 
     @property
     def length(self) -> float:
@@ -389,10 +389,14 @@ class Held(NamedTuple):
 class Shapes(NamedTuple):
     """Arms at stations."""
 
-    frames: Frames
-    """At those for centerline and directors."""
-    strains: Strains
-    """At those for curvature and extension."""
+    position: Array
+    """Centerline r [m], shape (n, framed station, 3)."""
+    directors: Array
+    """d1, d2, d3 as rows, shape (n, framed station, 3, 3)."""
+    curvature: Array
+    """u in the directors, per unit of activated arclength [1/m], (n, strained station, 3)."""
+    extension: Array
+    """ζ [-], shape (n, strained station)."""
     status: Status
     """`TipStatus`, shape (n,)."""
 

@@ -270,7 +270,7 @@ class LoadedRod(ArmRod):
         frames = walked.frames
         if not np.array_equal(z, at):
             walked, status = self._walked(gamma, known._replace(status=status), at)
-        return Shapes(frames, self._shape_solver.strains_under(gamma, at, walked), status)
+        return Shapes(*frames, *self._shape_solver.strains_under(gamma, at, walked), status)
 
     def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
         walked, status = self._walked(gamma, self.equilibria(gamma), z)
