@@ -48,9 +48,6 @@ class Mapped(TipMap):
             moved[:, k] += 1j * STEP
             out.slopes[:, :, k] = np.imag(self.of(moved)) / STEP
 
-    def shapes(self, activations, framed, strained):
-        raise NotImplementedError
-
 
 def columns(*each: np.ndarray) -> np.ndarray:
     return np.stack(each, axis=1)

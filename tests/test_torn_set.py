@@ -61,9 +61,6 @@ class Shifted(TipMap):
         if status is not None:
             status[:] = np.where(lost, TipStatus.NO_EQUILIBRIUM, TipStatus.STABLE)
 
-    def shapes(self, activations, framed, strained):
-        raise NotImplementedError
-
 
 def outside_ball(gamma: np.ndarray) -> np.ndarray:
     return np.linalg.norm(gamma - [0.53, 0.48, 0.51], axis=1) > 0.3

@@ -92,7 +92,6 @@ class TipMap(ABC):
             out: Arrays to be filled.
         """
 
-    @abstractmethod
     def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         """Arms at stations along them; each equilibrium is found once.
 
@@ -101,6 +100,7 @@ class TipMap(ABC):
             framed: Z of centerline and directors [m], ascending; there may be none.
             strained: Z of curvature and extension [m], likewise.
         """
+        raise NotImplementedError
 
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import ArmMap
-from softreach.rod.tip_map import Shapes, TipMap, TipOutputs
+from softreach.rod.tip_map import TipMap, TipOutputs
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace.grid import components, cube_grid, share_of_box
@@ -103,9 +102,6 @@ class AllPostures(TipMap):
                 out.slopes[rows] = np.pad(along, ((0, 0), (0, 0), (0, 1)))
             if out.status is not None:
                 out.status[rows] = kept
-
-    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
-        raise NotImplementedError
 
 
 def all_postures(tip_map: TipMap, cells: int | None = None) -> AllPostures | None:
