@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from softreach.arm import Loads, Manipulator, designs
-from softreach.arm.tables import tables
+from softreach.arm import Loads, Manipulator, Measured, designs
+from softreach.arm.tables import compliance, tables
 from softreach.rod.loaded.postures import Postures
-from softreach.rod.loaded.shooting import Equilibria
-from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, LoadTables
+from softreach.rod.loaded.solver import Equilibria, Solver
+from softreach.rod.loaded.tables import LoadTables
 from tests.oracles import rod
 
 _DEGREE = 40
+# The base frame stands upright; seen from it, gravity pulls back (up), aside, or ahead (down).
+UP, SIDE, DOWN = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (0.0, 0.0, 9.81)
 
 
 def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 1000.0):
@@ -29,48 +29,45 @@ def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 
     return arm.replace(section=section, loads=loads)
 
 
-def weighed(arm: Manipulator, load: float, gravity=(0.0, 0.0, -9.81), **loads) -> Manipulator:
-    """The arm with E such that its load number is `load`."""
+def weighed(arm: Manipulator, load: float, gravity=UP, **loads) -> Manipulator:
+    """The arm with E such that its load number ρgL³/(E R2²) is `load`."""
     young = 1000 * 9.81 * arm.length**3 / (load * arm.profile.outer_radius**2)
     return rubber(arm, Loads(gravity=gravity, **loads), young)
 
 
-def straight(body, loads: Loads, length=1.0, steps=32) -> Solver:
-    """The solver of a straight passive rod."""
-    arm = designs.minimal_trunk(taper=0.0, length=length)
-    return Solver(LoadTables(arm, loads, body), steps, 1e-10)
+def uniform(bending, axial=1e12, torsion=None, mass=0.0) -> Measured:
+    """An untapered rod by its stiffnesses and its mass per length."""
+    return Measured(
+        axial_stiffness=axial,
+        bending_stiffness=bending,
+        torsion_stiffness=torsion or bending,
+        mass_per_length=mass,
+    )
+
+
+def of_body(arm: Manipulator, body: Measured, loads: Loads) -> Manipulator:
+    """The arm of rubber but for these stiffnesses and masses, under loads."""
+    arm = rubber(arm.replace(loads=None), None)
+    return arm.replace(section=arm.section.replace(measured=body), loads=loads)
+
+
+def straight(body: Measured, loads: Loads, steps=32) -> Solver:
+    """The solver of a straight passive rod of 1 m."""
+    arm = designs.minimal_trunk(taper=0.0).with_bounds(np.zeros((3, 2)))
+    return Solver(LoadTables(arm=of_body(arm, body, loads)), steps, 1e-10)
 
 
 def by_lines(solver: Solver, gamma: np.ndarray) -> Equilibria:
     """Postures found along lines from rest alone."""
     equilibria = solver.empty(len(gamma))
-    Postures.of(solver).by_line(gamma, np.arange(len(gamma)), equilibria)
+    Postures(solver).by_line(gamma, np.arange(len(gamma)), equilibria)
     return equilibria
 
 
-@dataclass(frozen=True)
-class Uniform:
-    """The same everywhere."""
-
-    yields: tuple[float, float, float]
-    mass: float
-
-    def compliance(self, z):
-        return tuple(np.full(np.shape(z), c) for c in self.yields)
-
-    def mass_per_length(self, z):
-        return np.full(np.shape(z), self.mass)
-
-
-def uniform(bending, axial=np.inf, torsion=None, mass=0.0):
-    """The body of an untapered rod from its stiffnesses."""
-    return Uniform((1.0 / axial, 1.0 / bending, 1.0 / (torsion or bending)), mass)
-
-
-def oracle_rod(arm: Manipulator, body: ArmBody, gamma, loads: Loads) -> tuple[rod.Rod, rod.Loads]:
+def oracle_rod(arm: Manipulator, gamma, loads: Loads) -> tuple[rod.Rod, rod.Loads]:
     """An activated arm and its loads as the oracles take them."""
     breaks = tuple(arm.breakpoints)
-    at = _polynomials(lambda z: _sections(arm, body, gamma, z), sorted({0.0, *breaks, arm.length}))
+    at = _polynomials(lambda z: _sections(arm, gamma, z), sorted({0.0, *breaks, arm.length}))
     return rod.Rod(
         length=arm.length,
         axial=lambda z: at(z)[0],
@@ -97,13 +94,16 @@ def oracle_rod(arm: Manipulator, body: ArmBody, gamma, loads: Loads) -> tuple[ro
     )
 
 
-def _sections(arm: Manipulator, body: ArmBody, gamma, z):
+def _sections(arm: Manipulator, gamma, z):
     """K0, K1, K3, mass per length, ζ̂, η and û at stations, shape (station, 9)."""
-    table, yields = tables(arm, z), body.compliance(z)
+    table, yields = tables(arm, z), compliance(arm, z)
     stiff = [1.0 / np.maximum(one, 1e-300) for one in yields]
     stretch, eta = 1.0 + table.extension @ gamma, 1.0 + table.rest_length_factor @ gamma
     bend = table.curvature @ gamma
-    return np.column_stack([*stiff, body.mass_per_length(z), stretch, eta, bend])
+    mass = np.zeros(len(z))
+    if any(arm.loads.gravity):
+        mass = arm.section.mass_per_length_at(arm.profile, z)
+    return np.column_stack([*stiff, mass, stretch, eta, bend])
 
 
 def _polynomials(values: Callable, ends: list[float]) -> Callable:
@@ -129,4 +129,4 @@ def _coefficients(values: Callable, middle: float, half: float):
 
 def posture_shapes(solver, gamma, stations):
     """Shapes of the postures of activations."""
-    return solver.shapes(gamma, stations, Postures.of(solver).find(gamma))
+    return solver.shapes(gamma, stations, Postures(solver).find(gamma))

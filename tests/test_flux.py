@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from softreach.arm import Loads, Manipulator, designs
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import volume_gradient
@@ -39,17 +39,14 @@ class Mapped(TipMap):
     def box(self):
         return ActivationBox.between(((0.0, 1.0),) * 3, tuple("abc"))
 
-    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
-        tips[:] = self.of(gamma)
-        if slopes is None:
+    def fill(self, gamma, out):
+        out.tips[:] = self.of(gamma)
+        if out.slopes is None:
             return
         for k in range(3):
             moved = gamma.astype(complex)
             moved[:, k] += 1j * STEP
-            slopes[:, :, k] = np.imag(self.of(moved)) / STEP
-
-    def shapes(self, activations, framed, strained, status=None):
-        raise NotImplementedError
+            out.slopes[:, :, k] = np.imag(self.of(moved)) / STEP
 
 
 def columns(*each: np.ndarray) -> np.ndarray:

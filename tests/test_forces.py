@@ -115,9 +115,9 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
     def gap(x):
         """The tip of the posture, with twice the steps."""
         acting = tuple(np.array(arm.loads.tip_force) - x[-1] * force * d)
-        tables = LoadTables(arm, arm.loads.replace(tip_force=acting), rod.rod.body)
+        tables = LoadTables(arm=arm.replace(loads=arm.loads.replace(tip_force=acting)))
         gamma = arm.bounds[:, 0] + x[:-1] * width
-        found = Postures.of(Solver(tables, 2 * rod.steps, rod.tol)).find(gamma[None])
+        found = Postures(Solver(tables, 2 * rod.steps, rod.tol)).find(gamma[None])
         return (found.tips[0] - place) / arm.length
 
     start = np.append((gamma - arm.bounds[:, 0]) / width, 0.9)

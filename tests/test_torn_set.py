@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from softreach.arm import Loads, Manipulator, designs
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held, TipMap, TipStatus
 from softreach.support.errors import InvalidInput
@@ -48,7 +48,8 @@ class Shifted(TipMap):
     def box(self):
         return ActivationBox.between(self.bounds, tuple("abcdef"[: len(self.bounds)]))
 
-    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
+    def fill(self, gamma, out):
+        tips, slopes, _, status, _ = out
         tips[:] = 0.0
         columns = min(3, gamma.shape[1])
         tips[:, :columns] = gamma[:, :columns]
@@ -59,9 +60,6 @@ class Shifted(TipMap):
             slopes[:] = np.eye(3, gamma.shape[1])
         if status is not None:
             status[:] = np.where(lost, TipStatus.NO_EQUILIBRIUM, TipStatus.STABLE)
-
-    def shapes(self, activations, framed, strained, status=None):
-        raise NotImplementedError
 
 
 def outside_ball(gamma: np.ndarray) -> np.ndarray:
@@ -86,10 +84,10 @@ class Cusp(Shifted):
 
     bounds: tuple = ((-1.0, 1.1), (-1.0, 1.05), (0.0, 1.0))
 
-    def fill(self, gamma, tips, slopes=None, **more):
-        super().fill(gamma, tips, slopes, **more)
+    def fill(self, gamma, out):
+        super().fill(gamma, out)
         if gamma.shape[1] == 2:
-            tips[:, 2] = gamma[:, 1] ** 2
+            out.tips[:, 2] = gamma[:, 1] ** 2
 
     def held(self, gamma, sizes):
         at_node = [stable_roots(b, a) for b, a, *_ in gamma]
@@ -209,7 +207,8 @@ class FlatCusp(Cusp):
     def continued_from(self, gamma, frames=None):
         return replace(self, at=gamma, x=frames[:, 0])
 
-    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
+    def fill(self, gamma, out):
+        tips, slopes, _, status, _ = out
         near = np.linalg.norm(gamma[:, None] - self.at, axis=2).argmin(axis=1)
         x, way = followed(self.x[near], self.at[near], gamma, parts=20)
         lost = way < 1.0

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.loaded.pushing_tip import PushingTip, TipResponse
 from softreach.support.arrays import Array, Mask
 from softreach.support.lazy import lazy

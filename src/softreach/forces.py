@@ -148,7 +148,7 @@ def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | N
         activation[k], begun[k] = end.fixed.gamma[:bundles], start[:bundles]
     of_axes, of_bundles = ("place", "axis"), ("place", "bundle")
     units = activation_attributes(rod.arm)
-    dead = np.array(yielding_rod(rod).loads.tip_force)
+    dead = np.array(yielding_rod(rod).tables.loads.tip_force)
     acting = rod.pose.directions_to_world(dead) - force[:, None] * directions
 
     def about(meaning: str, unit: str = "1") -> dict[str, str]:

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.support.errors import InvalidInput
 
 # Differences of these do not overflow; subnormal numbers and zeros of both signs are among them.

@@ -11,19 +11,26 @@ from softreach.arm import Base, Chamber, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.cloud.curvature import stream_statistics
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded import postures
-from softreach.rod.loaded import solver as equilibrium
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import by_lines, oracle_rod, posture_shapes, rubber, straight, uniform
+from tests.bodies import (
+    DOWN,
+    SIDE,
+    UP,
+    by_lines,
+    oracle_rod,
+    posture_shapes,
+    rubber,
+    straight,
+    uniform,
+    weighed,
+)
 from tests.laws import differences
-from tests.oracles import column, elastica, loaded_rod
+from tests.oracles import elastica, loaded_rod
 
 TRUNK = designs.minimal_trunk()
-# The base frame stands upright; seen from it, gravity pulls back (up), aside, or ahead (down).
-UP, SIDE, DOWN = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (0.0, 0.0, 9.81)
 GAMMA = np.array([[-1.2, -0.3, -0.8], [-0.2, -1.5, 0.0], [-1.6, -1.6, -1.6], [0.0, 0.0, -0.4]])
 
 KINDS = {
@@ -69,31 +76,12 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
     shapes = posture_shapes(Solver(found.tables, found.steps, 1e-9), gamma, stations)
     tips = found.tips(gamma)
     for k, one in enumerate(gamma):
-        expected = loaded_rod.equilibrium(
-            *oracle_rod(TRUNK, found.body, one, loads), stations, rtol=1e-10
-        )
+        expected = loaded_rod.equilibrium(*oracle_rod(found.arm, one, loads), stations, rtol=1e-10)
         moment = np.einsum("sd,sdc->sc", shapes.moment[k], shapes.frames.directors[k])
         np.testing.assert_allclose(tips[k], expected.tip, atol=1e-9)
         np.testing.assert_allclose(shapes.frames.position[k], expected.place, atol=2e-9)
         np.testing.assert_allclose(shapes.frames.directors[k], expected.frame, atol=1e-8)
         np.testing.assert_allclose(moment, expected.moment, atol=5e-8)
-
-
-@of_kinds
-def test_a_shooting_from_the_base_finds_an_arm_of_fibers_and_forces(loads):
-    """Curvature counts by the length that the fiber gives; tendon and chamber leave that."""
-    actuators = (
-        TRUNK.actuators[0],
-        Tendon(distance_ratio=0.8, revolution=1.0, offset=2.0, activation_bounds=(0, 60)),
-        Chamber(distance_ratio=0.4, radius_ratio=0.3, offset=4.0, activation_bounds=(0, 1e5)),
-    )
-    trunk = TRUNK.replace(actuators=())
-    rod = loaded(loads, arm=rubber(trunk, loads).replace(actuators=actuators))
-    gamma = np.array([[-0.8, 60.0, 5e4]])
-    expected = loaded_rod.equilibrium(
-        *oracle_rod(rod.arm, rod.body, gamma[0], loads), [0.0, 1.0], rtol=1e-10
-    )
-    np.testing.assert_allclose(rod.tips(gamma)[0], expected.tip, atol=1e-9)
 
 
 PULLS = {
@@ -140,33 +128,27 @@ def test_a_parallel_tendon_or_chamber_is_the_forces_that_it_puts_on_a_passive_ar
     assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.02)
 
 
-@pytest.mark.parametrize("load", [1.0, 10.0])
-def test_a_tip_force_bends_an_elastica(load):
-    found = straight(uniform(1.0), Loads(gravity=(0, 0, 0), tip_force=(load, 0, 0)))
-    tip = Postures.of(found).find(np.zeros((1, 3))).tips[0]
-    np.testing.assert_allclose(tip[[0, 2]], elastica.tip_loaded(load), atol=1e-9)
+@pytest.mark.parametrize("load", [1.0, 10.0, 60.0, 140.0, 300.0])
+def test_a_tip_force_bends_an_elastica_however_heavy_it_is(load):
+    """Under the largest the tip hardly turns any more, and the base must tell when it is found."""
+    loads = Loads(gravity=(0, 0, 0), tip_force=(load, 0, 0))
+    found = straight(uniform(1.0), loads, steps=32 if load < 60.0 else 64)
+    tip = Postures(found).find(np.zeros((1, 3))).tips[0]
+    atol = 1e-9 if load < 60.0 else 1e-7
+    np.testing.assert_allclose(tip[[0, 2]], elastica.tip_loaded(load), atol=atol)
 
 
 @pytest.mark.parametrize("load", [1.0, 4.0, 10.0, 50.0])
 def test_a_heavy_cantilever_drops_as_published(load):
     found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, load, 0)), steps=48)
-    tip = Postures.of(found).find(np.zeros((1, 3))).tips[0]
+    tip = Postures(found).find(np.zeros((1, 3))).tips[0]
     np.testing.assert_allclose(tip[[1, 2]], elastica.heavy(load), atol=1e-9)
-
-
-def test_a_column_is_stable_up_to_its_own_greatest_height():
-    greatest = column.greenhill()
-    for share, status in ((0.999, TipStatus.STABLE), (1.001, TipStatus.UNSTABLE)):
-        found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, 0, -share * greatest)))
-        of_column = Postures.of(found).find(np.zeros((1, 3)))
-        assert of_column.status[0] == status
-        np.testing.assert_allclose(of_column.tips[0], [0, 0, 1], atol=1e-12)
 
 
 def test_a_hanging_rod_stretches_by_the_weight_beyond_each_section():
     loads = Loads(gravity=(0, 0, 10.0), payload=0.4)
     found = straight(uniform(1.0, axial=40.0, mass=1.5), loads)
-    tip = Postures.of(found).find(np.zeros((1, 3))).tips[0]
+    tip = Postures(found).find(np.zeros((1, 3))).tips[0]
     np.testing.assert_allclose(tip, [0, 0, 1 + (7.5 + 4.0) / 40.0], atol=1e-12)
 
 
@@ -242,19 +224,6 @@ def test_a_rod_alone_has_the_equilibrium_that_it_has_among_others(arm, gamma, st
         np.testing.assert_array_equal(rod.compliance(alone), compliance[row : row + 1])
 
 
-def test_shapes_do_not_depend_on_the_blocks_they_are_found_in(monkeypatch):
-    rod, stations = loaded(KINDS["along the arm"], 1e-6), [0.0, 0.5, 0.7, 1.0]
-    together, strains = rod.frames(GAMMA, stations), rod.strains(GAMMA, stations)
-    monkeypatch.setattr(equilibrium, "_TRACED", 1)
-    monkeypatch.setattr(postures, "_AT_ONCE", 1)
-    for found, expected in zip(rod.frames(GAMMA, stations), together, strict=True):
-        np.testing.assert_array_equal(found, expected)
-    for found, expected in zip(rod.strains(GAMMA, stations), strains, strict=True):
-        np.testing.assert_array_equal(found, expected)
-    alone = [rod.tip_twists(gamma[None])[1][0] for gamma in GAMMA]
-    np.testing.assert_array_equal(rod.tip_twists(GAMMA)[1], alone)
-
-
 def test_what_acts_on_the_base_section_moves_nothing():
     at_base = PointLoad(station=0.0, force=(0.0, 50.0, 0.0), moment=(0.0, 50.0, 0.0))
     without = loaded(Loads(gravity=SIDE))
@@ -281,10 +250,9 @@ def test_statistics_of_strains_count_only_arms_that_have_an_equilibrium(monkeypa
 
 @pytest.mark.parametrize("gravity", [DOWN, SIDE])
 def test_what_is_found_at_once_is_what_is_followed_from_rest(gravity):
-    young = 1000 * 9.81 / (5.0 * TRUNK.profile.outer_radius**2)
-    solver = Solver(loaded(Loads(gravity=gravity), young=young).tables, 16, 1e-8)
+    solver = Solver(LoadedRod(weighed(TRUNK, 5.0, gravity)).tables, 16, 1e-8)
     gamma = np.random.default_rng(2).uniform(-5 / 3, 0, (128, 3))
-    found, followed = Postures.of(solver).find(gamma), by_lines(solver, gamma)
+    found, followed = Postures(solver).find(gamma), by_lines(solver, gamma)
     assert (followed.status == TipStatus.STABLE).mean() > 0.95
     np.testing.assert_allclose(found.tips, followed.tips, atol=1e-7)
     np.testing.assert_array_equal(found.status, followed.status)

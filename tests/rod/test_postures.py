@@ -16,7 +16,6 @@ from softreach.arm.loads import Loads
 from softreach.rod.loaded import flood
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.tables import ArmBody
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import by_lines, oracle_rod
@@ -74,7 +73,7 @@ def pulled_chain(arm, rod, gamma, links=40, steps=10):
     """The tip of a chain of links that hangs, is pulled step by step, and comes to rest in each."""
     twist, q = np.array([0.0, 0.0, TWIST / arm.length]), None
     for share in np.linspace(0.0, 1.0, steps + 1):
-        one, loads = oracle_rod(arm, ArmBody(arm), share * gamma, rod.loads)
+        one, loads = oracle_rod(arm, share * gamma, rod.tables.loads)
         chain = Chain(replace(one, curvature=lambda z, u=one.curvature: u(z) + twist), loads, links)
         scale = 1.0 / chain.stiffness.max()
         ways = [
@@ -112,7 +111,7 @@ def test_a_chain_that_hangs_and_is_pulled_comes_to_rest_in_the_posture(name, sam
 def test_a_hanging_arm_leans_to_a_side_where_its_plane_of_symmetry_loses_its_stability():
     """At a pitchfork: continuously, and to the other side with the other twist."""
     rod = as_tip_map(example("tentacle", 0.02), 1e-8)
-    postures = Postures.of(rod.rod.solver)
+    postures = Postures(rod.rod.solver)
     planar = postures.find(np.array([[6.25, 6.25]]))
     assert planar.status[0] == TipStatus.STABLE
     assert abs(planar.tips[0, 1]) < 1e-9

@@ -148,44 +148,37 @@ def in_mirror_order(arm, gamma):
     return gamma[:, order]
 
 
+def rotation(angle):
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+
+
+def all_turned(arm, gamma, angle):
+    other = arm.replace(actuators=tuple(turned(each, angle) for each in arm.actuators))
+    return other, gamma, rotation(angle)
+
+
+def all_mirrored(arm, gamma, _):
+    other = arm.replace(actuators=tuple(mirrored(each) for each in arm.actuators))
+    return other, in_mirror_order(arm, gamma), np.diag([1.0, -1.0, 1.0])
+
+
+def bundles_exchanged(arm, gamma, _):
+    """Bundles lie evenly: giving each the activation of the one before turns by 2π/n."""
+    return arm, np.roll(gamma, 1, axis=1), rotation(2 * math.pi / arm.bundles)
+
+
+@pytest.mark.parametrize("change", [all_turned, all_mirrored, bundles_exchanged])
 @pytest.mark.parametrize("kind", KINDS)
-def test_turning_all_actuators_turns_the_tips(kind):
+def test_what_turns_or_mirrors_all_actuators_does_so_to_the_tips(kind, change):
     @given(arm=any_arms(kind), angle=st.floats(-4, 4))
     def law(arm, angle):
+        if change is bundles_exchanged:
+            arm = arm.replace(actuators=arm.actuators[:1])
         gamma = in_box(arm, 5)
-        other = arm.replace(actuators=tuple(turned(one, angle) for one in arm.actuators))
-        c, s = math.cos(angle), math.sin(angle)
-        expected = sr.tip_positions(arm, gamma, tol=1e-9) @ [[c, s, 0], [-s, c, 0], [0, 0, 1]]
-        found = sr.tip_positions(other, gamma, tol=1e-9)
-        np.testing.assert_allclose(found, expected, atol=3e-9 * arm.length)
-
-    law()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_mirroring_all_actuators_mirrors_the_tips(kind):
-    @given(arm=any_arms(kind))
-    def law(arm):
-        gamma = in_box(arm, 5)
-        other = arm.replace(actuators=tuple(mirrored(one) for one in arm.actuators))
-        expected = sr.tip_positions(arm, gamma, tol=1e-9) * [1, -1, 1]
-        found = sr.tip_positions(other, in_mirror_order(arm, gamma), tol=1e-9)
-        np.testing.assert_allclose(found, expected, atol=3e-9 * arm.length)
-
-    law()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_exchanging_bundles_turns_what_they_do(kind):
-    """Bundles lie evenly: giving each the activation of the one before turns by 2π/n."""
-
-    @given(arm=any_arms(kind))
-    def law(arm):
-        arm = arm.replace(actuators=arm.actuators[:1])
-        n, gamma = arm.bundles, in_box(arm, 5)
-        c, s = math.cos(2 * math.pi / n), math.sin(2 * math.pi / n)
-        expected = sr.tip_positions(arm, gamma, tol=1e-9) @ [[c, s, 0], [-s, c, 0], [0, 0, 1]]
-        found = sr.tip_positions(arm, np.roll(gamma, 1, axis=1), tol=1e-9)
+        other, moved, matrix = change(arm, gamma, angle)
+        expected = sr.tip_positions(arm, gamma, tol=1e-9) @ matrix
+        found = sr.tip_positions(other, moved, tol=1e-9)
         np.testing.assert_allclose(found, expected, atol=3e-9 * arm.length)
 
     law()

@@ -49,11 +49,11 @@ def test_a_grid_with_given_stations_has_no_longer_steps(arm):
     rule = FreeRod(arm).rule
     stations = arm.length * np.array([0.0, 0.11, 0.11, 0.5, 0.93])
     edges = rule.edges(7, stations)
-    nodes, ends = rule.nodes(edges), rule.packed_stations(stations, 7)[1]
-    reached = [nodes.measure[:end].sum(axis=0) @ [5 / 18, 8 / 18, 5 / 18] for end in ends]
+    measure, ends = rule.nodes(edges)[0], rule.packed_stations(stations, 7)[1]
+    reached = [measure[:end].sum(axis=0) @ [5 / 18, 8 / 18, 5 / 18] for end in ends]
     np.testing.assert_allclose(reached, stations, atol=1e-6 * arm.length)  # Gauss's rule
-    assert len(nodes.measure) == ends[-1]
-    starts = np.concatenate([[0], np.cumsum(nodes.measure @ [5 / 18, 8 / 18, 5 / 18])])
+    assert len(measure) == ends[-1]
+    starts = np.concatenate([[0], np.cumsum(measure @ [5 / 18, 8 / 18, 5 / 18])])
     widths = np.diff(arm.profile.slender_coordinate(starts))
     assert (widths <= arm.profile.slender_length / 7 * (1 + 1e-6)).all()
 

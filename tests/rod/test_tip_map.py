@@ -77,18 +77,19 @@ def test_an_arm_beyond_the_theory_is_refused_every_time(trunk):
 # Activations of different units are compared in their own ranges
 
 
-def test_strains_count_as_they_are(trunk):
-    np.testing.assert_array_equal(activation_measures(trunk), np.ones(trunk.bundles))
-    assert measured_bundles(as_tip_map(trunk)) is as_tip_map(trunk)
-
-
-def test_activations_of_one_unit_keep_their_proportions():
-    arm = arm_of(TENDONS).with_bounds(((0, 8), (0, 4), (0, 2)))
-    np.testing.assert_array_equal(activation_measures(arm), [8, 8, 8])
-
-
-def test_activations_of_different_units_count_in_their_ranges():
-    np.testing.assert_array_equal(activation_measures(arm_of(TENDONS, CHAMBER)), [8, 8, 8, 5e4])
+@pytest.mark.parametrize(
+    ("arm", "measures"),
+    [
+        (designs.minimal_trunk(), [1, 1, 1]),
+        (arm_of(TENDONS).with_bounds(((0, 8), (0, 4), (0, 2))), [8, 8, 8]),
+        (arm_of(TENDONS, CHAMBER), [8, 8, 8, 5e4]),
+    ],
+    ids=["strains as they are", "one unit in proportion", "different units in their ranges"],
+)
+def test_activations_are_counted_in_their_measures(arm, measures):
+    np.testing.assert_array_equal(activation_measures(arm), measures)
+    of_strains = measured_bundles(as_tip_map(arm)) is as_tip_map(arm)
+    assert of_strains == (max(measures) == 1)
 
 
 @pytest.mark.parametrize("held", [False, True])
@@ -97,26 +98,19 @@ def test_a_held_bundle_has_a_measure_too(held):
     assert (activation_measures(arm_of(TENDONS, CHAMBER).with_bounds(bounds)) > 0).all()
 
 
-def test_the_map_is_the_same_in_other_measures():
-    rod = as_tip_map(arm_of(TENDONS, CHAMBER))
-    other, gamma = measured_bundles(rod), in_box(rod.arm, 20)
-    shares = gamma / activation_measures(rod.arm)
-    np.testing.assert_allclose(other.tips(shares), rod.tips(gamma), atol=1e-14)
-    slopes = rod.tips_and_slopes(gamma)[1] * activation_measures(rod.arm)
-    np.testing.assert_allclose(other.tips_and_slopes(shares)[1], slopes, atol=1e-12)
-    assert (other.box.widths <= 1.0).all()
-
-
-def test_held_and_measured_bundles_of_a_loaded_arm_keep_its_status():
+@pytest.mark.parametrize("loads", [None, Loads(gravity=(0, 0, 0), tip_force=(0.02, 0, 0))])
+def test_the_map_of_free_bundles_in_other_measures_is_the_same(loads):
     arm = arm_of(TENDONS, CHAMBER).with_bounds(((0, 8), (0, 4), (3, 3), (0, 5e4)))
-    whole = as_tip_map(arm.replace(loads=Loads(gravity=(0, 0, 0), tip_force=(0.02, 0, 0))))
-    restricted = free_bundles(measured_bundles(whole))
-    assert restricted.supports_unstable
-    assert not as_tip_map(arm).supports_unstable
-    gamma = in_box(arm, 5)
-    shares = (gamma / activation_measures(arm))[:, whole.box.free]
+    whole, free = as_tip_map(arm.replace(loads=loads)), [0, 1, 3]
+    restricted, gamma = free_bundles(measured_bundles(whole)), in_box(arm, 20)
+    measures = activation_measures(arm)[free]
+    shares = gamma[:, free] / measures
+    assert restricted.supports_unstable == (loads is not None)
     np.testing.assert_array_equal(restricted.status(shares), whole.status(gamma))
     np.testing.assert_allclose(restricted.tips(shares), whole.tips(gamma), atol=1e-12)
+    slopes = whole.tips_and_slopes(gamma)[1][..., free] * measures
+    np.testing.assert_allclose(restricted.tips_and_slopes(shares)[1], slopes, atol=1e-12)
+    assert (restricted.box.widths <= 1.0).all()
 
 
 def test_a_large_unit_does_not_drown_the_others():

@@ -142,11 +142,9 @@ def test_activations_that_leave_no_arm_have_a_status_and_no_shape(make, gone):
     tips, status = rod.tips_and_status(gamma)
     lost = [False, True, False]
     assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
-    status[:] = -1
-    frames = rod.frames(gamma, [0.5], status)
+    *shapes, status = rod.shapes(gamma, [0.5], [0.5])
     assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
-    strains = rod.strains(gamma, [0.5])
-    for values in (tips, rod.tip_twists(gamma)[1], *frames, *strains):
+    for values in (tips, rod.tip_twists(gamma)[1], *shapes):
         assert np.isnan(values.reshape(3, -1)).all(axis=1).tolist() == lost
         assert np.isfinite(values).reshape(3, -1).all(axis=1).tolist() == [True, False, True]
 
@@ -293,22 +291,10 @@ def test_a_sample_alone_has_the_numbers_that_it_has_among_others(make, arm):
         )
         for one, other in zip(whole, alone, strict=True):
             np.testing.assert_array_equal(one[rows], other)
-    frames, alone = (rod.frames(rows, [rod.length]) for rows in (gamma, gamma[3:4]))
-    np.testing.assert_array_equal(frames.directors[3:4], alone.directors)
-
-
-@of_designs
-def test_the_filling_of_tips_and_slopes_is_that_of_whole_batches(make, arm):
-    rod = make(arm, 1e-6)
-    gamma = activations(rod, 10)
-    tips, slopes = rod.tips_and_slopes(gamma)
-    filled = np.full_like(tips, np.nan)
-    rod.fill(gamma, filled)
-    np.testing.assert_array_equal(filled, rod.tips(gamma))
-    filled_slopes = np.full_like(slopes, np.nan)
-    rod.fill(gamma, filled, filled_slopes)
-    np.testing.assert_array_equal(filled, tips)
-    np.testing.assert_array_equal(filled_slopes, slopes)
+    z = rod.length * np.array([0.0, 0.5, 0.7, 1.0])
+    shapes, alone = (rod.shapes(rows, z, z) for rows in (gamma, gamma[3:4]))
+    for every, single in zip(shapes, alone, strict=True):
+        np.testing.assert_array_equal(every[3:4], single)
 
 
 @of_designs
@@ -325,32 +311,25 @@ def test_every_sample_has_a_status(make, arm):
     assert rod.supports_unstable or (status == TipStatus.STABLE).all()
 
 
+ASK = {
+    "tips": lambda rod, gamma: rod.tips(gamma),
+    "slopes": lambda rod, gamma: rod.tips_and_slopes(gamma)[1],
+    "twists": lambda rod, gamma: rod.tip_twists(gamma)[1],
+    "directions": lambda rod, gamma: rod.tip_directions(gamma),
+    "frames": lambda rod, gamma: rod.frames(gamma, [0.0]).position,
+    "strains": lambda rod, gamma: rod.strains(gamma, [0.0]).curvature,
+    "status": lambda rod, gamma: rod.status(gamma),
+}
+
+
 @of_designs
 def test_no_activations_give_empty_results(make, arm):
     rod, m = make(arm, 1e-6), arm.bundles
-    none = np.empty((0, m))
-    assert rod.tips(none).shape == (0, 3)
-    assert rod.tips_and_slopes(none)[1].shape == (0, 3, m)
-    assert rod.tip_twists(none)[1].shape == (0, 6, m)
-    assert rod.tip_directions(none).shape == (0, 3)
-    assert rod.frames(none, [0.0]).position.shape == (0, 1, 3)
-    assert rod.strains(none, [0.0]).curvature.shape == (0, 1, 3)
-    assert rod.status(none).shape == (0,)
+    shapes = [(0, 3), (0, 3, m), (0, 6, m), (0, 3), (0, 1, 3), (0, 1, 3), (0,)]
+    assert [ask(rod, np.empty((0, m))).shape for ask in ASK.values()] == shapes
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda rod, gamma: rod.tips(gamma),
-        lambda rod, gamma: rod.tips_and_slopes(gamma),
-        lambda rod, gamma: rod.tip_twists(gamma),
-        lambda rod, gamma: rod.tip_directions(gamma),
-        lambda rod, gamma: rod.frames(gamma, [0.5]),
-        lambda rod, gamma: rod.strains(gamma, [0.5]),
-        lambda rod, gamma: rod.status(gamma),
-    ],
-    ids=["tips", "slopes", "twists", "directions", "frames", "strains", "status"],
-)
+@pytest.mark.parametrize("ask", ASK.values(), ids=ASK)
 def test_activations_are_checked_by_every_question(make, ask, trunk):
     rod = make(trunk, 1e-6)
     for gamma, message in (

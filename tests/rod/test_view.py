@@ -19,18 +19,16 @@ from softreach.arm import (
     Section,
     designs,
 )
-from softreach.arm.loads import Loads
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles, refined, with_unstable
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import rubber
+from tests.bodies import weighed
 from tests.laws import in_box
 
 TRUNK = designs.minimal_trunk().with_bounds(((-5 / 3, 0), (-0.5, -0.5), (-5 / 3, 0)))
-YOUNG = 1000 * 9.81 / (12.0 * TRUNK.profile.outer_radius**2)
-HEAVY = rubber(TRUNK, Loads(gravity=(0.0, 0.0, -9.81)), young=YOUNG)
+HEAVY = weighed(TRUNK, 12.0)
 
 
 @pytest.fixture(scope="module")

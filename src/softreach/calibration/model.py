@@ -7,7 +7,7 @@ equilibrium; all that follows from them, how the arm moves, is the linear respon
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -27,16 +27,16 @@ from softreach.rod.response import (
     NodeTables,
     RodState,
     StepGrid,
-    dead_force,
+    dead_forces,
     linear_response,
     node_tables,
-    payload_weight,
     rod_state,
     step_grid,
 )
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import rows as table_rows
 
 _BLOCK = 1024  # samples at once: their shapes at all nodes are kept
 _TOL = 1e-6
@@ -186,8 +186,7 @@ class MarkerModel:
         known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
         changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
         result = np.full((*places.shape, len(changes)), np.nan)
-        some = RodState(*(getattr(state, name)[known] for name in RodState.__dataclass_fields__))
-        result[known] = _slopes(rod.arm, at, some, changes, known)
+        result[known] = _slopes(rod.arm, at, table_rows(state, known), changes, known)
         return places, result, state.status
 
     def _change(
@@ -201,8 +200,8 @@ class MarkerModel:
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
             if isinstance(other, Base):  # gravity alone is another one in its frame
-                force = dead_force(arm, other, at.table.stations, at.table.length)
-                table = replace(at.table, force=force, weight=payload_weight(arm, other))
+                force, weight = dead_forces(arm, other, at.table.stations, at.table.length)
+                table = at.table._replace(force=force, weight=weight)
                 place = np.array(other.position)
                 each.append(at._replace(table=table, rotation=other.rotation, position=place))
             elif any(getattr(arm, part) != getattr(other, part) for part in _BODY):
@@ -219,7 +218,7 @@ class MarkerModel:
 
 def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:
     """Offsets in the frame of the base, and places there, (n, marker, 3) each."""
-    offset = np.einsum("mk,nmka->nma", at.offsets, state.asked_directors)
+    offset = np.einsum("mk,nmka->nma", at.offsets, state.place_directors)
     return offset, state.position + offset
 
 
@@ -242,7 +241,7 @@ def _slopes(
     offset, place = _beyond(at, state)
     slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
     for k, change in enumerate(changes):
-        slopes[..., k] += np.einsum("mk,nmka->nma", change.offsets, state.asked_directors)
+        slopes[..., k] += np.einsum("mk,nmka->nma", change.offsets, state.place_directors)
     slopes = np.einsum("ab,nmbk->nmak", at.rotation, slopes)
     for k, change in enumerate(changes):
         slopes[..., k] += change.position + place @ change.rotation.T

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import all_inputs, as_tip_map, with_unstable
-from softreach.rod.tip_map import BLOCK, Frame, TipMap
+from softreach.rod.tip_map import BLOCK, Frame, TipMap, TipOutputs
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
@@ -175,7 +175,7 @@ def _fill(
     progress: Progress | None,
 ) -> None:
     def fill(gamma: Array, tips: Array, kept: NDArray[np.int8] | None) -> None:
-        tip_map.fill(gamma, tips, status=kept)
+        tip_map.fill(gamma, TipOutputs(tips, status=kept))
         if progress:
             progress(len(gamma))
 

@@ -17,7 +17,7 @@ from softreach.arm.driving import pilot
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import Tables, ends_over, tables
 from softreach.cloud.clouds import tip_map_of
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import Strains, TipMap, no_equilibrium

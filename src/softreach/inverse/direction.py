@@ -13,7 +13,7 @@ from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots
 from softreach.kernels.box.bounded_descent import box_steps
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.search import Nearest

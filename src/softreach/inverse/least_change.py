@@ -28,7 +28,7 @@ from softreach.kernels.box.sequential_projection import (
     next_trials,
 )
 from softreach.kernels.branches.spread import choose_apart
-from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows
 
@@ -341,7 +341,7 @@ def _searched(
         running.penalty[new], running.multiplier[new] = penalty, 0.0
         running.reach[new] = LONGEST_STEP
         n, begun = n + more, begun + more
-        tip_map.fill(running.trial[:n], tips[:n], ahead[:n])
+        tip_map.fill(running.trial[:n], TipOutputs(tips[:n], ahead[:n]))
         if tip_map.supports_unstable:
             lost = np.isnan(tips[:n, 0])
             tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from softreach.kernels.box.box_projection import near_cells, project
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import TipMap, TipOutputs
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
 
@@ -120,7 +120,7 @@ def _distances(tip_map: TipMap, half: Array, center: Array, targets: Array) -> A
     """Least distance of each target from its cell's image, negative if it may be in it."""
     n, m = center.shape
     tips, slopes = np.empty((n, 3)), np.empty((n, 3, m))
-    tip_map.fill(center, tips, slopes)
+    tip_map.fill(center, TipOutputs(tips, slopes))
     away, slopes = targets - tips, slopes * half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
     inside, force = np.empty((n, m)), np.zeros((n, 3))

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Index, as_floats, check_finite

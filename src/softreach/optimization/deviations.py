@@ -13,6 +13,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters, shifted
 from softreach.arm.tables import check_extension
 from softreach.requirements.requirements import Requirements, Target
+from softreach.rod.tip_map import InvalidLoads
 from softreach.support import parallel
 from softreach.support.arguments import as_mapping, as_number
 from softreach.support.arrays import Array
@@ -183,9 +184,7 @@ class FirstOrder:
             return self.solid, self.boundary
         try:
             solid = reachable_set(arm, accuracy=self.accuracy)
-        except InvalidInput as error:
-            if error.name != "loads":
-                raise
+        except InvalidLoads:
             return None
         if solid.dimension < 3:
             payload = arm.loads.payload if arm.loads else 0.0

@@ -15,12 +15,13 @@ from softreach.inverse.solve import solve_inverse
 from softreach.optimization.deviations import TOL, FirstOrder, Spread, deviations_of
 from softreach.requirements.requirements import Requirements, Target
 from softreach.rod.rods import as_tip_map
+from softreach.rod.tip_map import InvalidLoads
 from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
-from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, counted, no_warnings
+from softreach.support.errors import InvalidDesign, NotPossible, counted, no_warnings
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES, reachable_set
 from softreach.workspace.reachable import ReachableSet
@@ -317,11 +318,7 @@ def _made(
                 return None
             pairs = zip(first.targets, starts, strict=True)
             return [ask(arm, solid) for ask in asked], [_reached(arm, first, *x) for x in pairs]
-        except InvalidDesign:
-            return None
-        except InvalidInput as error:
-            if error.name != "loads":
-                raise
+        except (InvalidDesign, InvalidLoads):
             return None
 
 

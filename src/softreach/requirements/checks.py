@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -26,10 +27,11 @@ from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.bending import bending_over_bounds
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map, in_steps
+from softreach.rod.tip_map import InvalidLoads
 from softreach.schema import AXES, provenance
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
-from softreach.support.errors import InvalidInput, NotPossible, Range, counted, no_warnings
+from softreach.support.errors import NotPossible, Range, counted, no_warnings
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.report import Report, Reported, Section
@@ -322,7 +324,7 @@ def _coverage(
         inside = (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
     else:
         inside = np.zeros(count, bool)
-        try:
+        with suppress(InvalidLoads):
             reached = sets(rules.arm)
             if reached.dimension == 3 and not target.within:
                 inside = reached.contains(places)
@@ -330,9 +332,6 @@ def _coverage(
                 rod = reached.tip_map
                 least = rod.tol * rod.length if reached.dimension < 3 else 0.0
                 inside = reached.distance(places) <= max(target.within, least)
-        except InvalidInput as error:
-            if error.name != "loads":
-                raise
         step(count)
     share = float(inside.mean())
     # of a share of 0 or 1, what one place more or less makes of it

@@ -20,11 +20,11 @@ from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import InvalidLoads, TipMap
 from softreach.sampling import sample_cube
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
-from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.errors import no_warnings
 from softreach.support.progress import Progress
 from softreach.workspace.search import nearest_tips
 
@@ -276,9 +276,7 @@ def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
         with no_warnings():
             prepared = prepared_map(arm, TOL, cells=_CELLS)
             solutions = solve_inverse(prepared, places, from_rest=True)
-    except InvalidInput as error:
-        if error.name != "loads":
-            raise
+    except InvalidLoads:
         return _without_equilibrium(rules, places)
     best, reached = _best(rules, solutions), solutions.statuses == Status.REACHED
     rows = np.flatnonzero((best.excess.sum(axis=1) > 0.0) & reached)

@@ -1,4 +1,4 @@
-"""The rod: activation box, tip map, and the kinematics that a user asks."""
+"""The rod: activation box, tip map, and kinematics."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-from .activation_box import ActivationBox as ActivationBox
+from .inputs import ActivationBox as ActivationBox
 from .kinematics import configuration as configuration
 from .kinematics import marker_positions as marker_positions
 from .kinematics import tip_jacobian as tip_jacobian
@@ -6,7 +6,7 @@ from .kinematics import tip_positions as tip_positions
 from .loaded.all_equilibria import AllEquilibria as AllEquilibria
 from .loaded.all_equilibria import equilibria as equilibria
 from .loaded.rod import LoadedRod as LoadedRod
-from .loaded.shooting import Equilibria as Equilibria
+from .loaded.solver import Equilibria as Equilibria
 from .rods import ArmMap as ArmMap
 from .rods import as_tip_map as as_tip_map
 from .rods import free_bundles as free_bundles
@@ -18,4 +18,5 @@ from .tip_map import Shapes as Shapes
 from .tip_map import Strains as Strains
 from .tip_map import TipMap as TipMap
 from .tip_map import TipMotions as TipMotions
+from .tip_map import TipOutputs as TipOutputs
 from .tip_map import TipStatus as TipStatus

@@ -112,10 +112,10 @@ def worst_inputs(
     for k in range(_ROUNDS):
         moves = draws[:, k] * 0.25 * _SHRINK**k * box.widths
         tried = box.clip(gamma[:, None] + moves)
-        found = of(tried.reshape(math.prod(shape), box.bundles)).reshape(*shape, -1)
-        found = found[columns, :, :, columns]  # each measure's own, (column, around, start)
-        top = found.argmax(axis=1)[:, None]
-        ahead = np.take_along_axis(found, top, axis=1)[:, 0]
+        outcomes = of(tried.reshape(math.prod(shape), box.bundles)).reshape(*shape, -1)
+        outcomes = outcomes[columns, :, :, columns]  # each measure's own, (column, around, start)
+        top = outcomes.argmax(axis=1)[:, None]
+        ahead = np.take_along_axis(outcomes, top, axis=1)[:, 0]
         place = np.take_along_axis(tried, top[..., None], axis=1)[:, 0]
         gamma = np.where((ahead > value)[..., None], place, gamma)
         value = np.maximum(value, ahead)

@@ -17,7 +17,7 @@ from softreach.arm.tables import Tables, check_extension, strain_stations, table
 from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import slopes as derivatives
 from softreach.kernels.rod import tips as rod
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
 from softreach.rod.tip_map import (
@@ -28,6 +28,7 @@ from softreach.rod.tip_map import (
     Status,
     Strains,
     TipMap,
+    TipOutputs,
     TipStatus,
     check_tol,
     drop,
@@ -90,32 +91,28 @@ class ArmRod(TipMap):
 
     @lazy
     def _tip_tol(self) -> float:
-        """Tolerance of the center of the section, with which the point is as accurate as asked."""
+        """Tolerance of the center of the section, with which the point is within `tol`."""
         return max(self.tol / (1.0 + _LEVER * self.reach / self.length), SMALLEST_TOL)
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         """A step turns the arm by η |Uγ| R2 dS."""
-        table, profile = tables_at(self.arm, strain_stations(self.arm)), self.arm.profile
+        table, profile = tables_at(self.arm, strain_stations(self.arm).tobytes()), self.arm.profile
         step = profile.radius(table.stations) * (profile.slender_length / self.steps)
         least, most = np.empty((2, len(gamma)))
         with np.errstate(all="ignore"):  # what overflows is no arm
             for block in parallel.blocks(len(gamma), 1024):
-                extension = eta = 1.0 + gamma[block] @ table.extension.T
-                if table.has_forces:
-                    eta = 1.0 + gamma[block] @ table.rest_length_factor.T
-                bend = np.linalg.norm(
-                    np.einsum("scb,nb->nsc", table.curvature, gamma[block]), axis=-1
-                )
+                bend, extension, eta = linear_strains(table, gamma[block])
                 least[block] = np.minimum(extension, eta).min(axis=1)
-                most[block] = (eta * bend * step).max(axis=1)
+                most[block] = (eta * np.linalg.norm(bend, axis=-1) * step).max(axis=1)
         return least, most
 
-    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
-        """Frames at ascending stations Z [m], and m in the directors there [N m], (n, station, 3).
+    def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
+        """Frames at ascending stations Z [m], m in the directors there [N m], and the status.
 
-        Without loads there is none.
+        Without loads m is 0, shape (n, station, 3).
         """
-        return self.frames(gamma, z, status), np.zeros((len(gamma), len(z), 3))
+        shapes = self.shapes(gamma, z, ())
+        return Frames(*shapes[:2]), np.zeros((len(gamma), len(z), 3)), shapes.status
 
     @abstractmethod
     def _prepare(self) -> None:
@@ -166,17 +163,9 @@ class FreeRod(ArmRod):
     def _prepare(self) -> None:
         self._table  # noqa: B018
 
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-    ) -> None:
-        """Put tips, and what else is asked for, into place: theory (25) and (31)."""
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
+        """Put tips, and what else is wanted, into place: theory (25) and (31)."""
+        tips, slopes, twists, status, directions = out
         has_offset = self.reach > 0.0
         if has_offset and slopes is not None and twists is None:
             twists = np.empty((len(gamma), 6, gamma.shape[1]))
@@ -211,35 +200,23 @@ class FreeRod(ArmRod):
     def _linearization(self) -> Linearization:
         return Linearization(self.arm, self.box, self.end, self.reach)
 
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
+    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         """Centerlines and directors, and u = Uγ η/ζ and ζ = 1 + z·γ: theory (7)."""
         gamma, lost = self.with_arms(self.box.check(activations))
         z, at = np.asarray(framed, float), np.asarray(strained, float)
-        strains = per_length(*linear_strains(tables_at(self.arm, at), gamma))
-        shapes = Shapes(*self._frames(gamma, z), *strains)
-        if status is not None:
-            status[:] = TipStatus.STABLE
-        drop(lost, status, *shapes)
+        strains = per_length(*linear_strains(tables_at(self.arm, at.tobytes()), gamma))
+        places, directors = np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3))
+        if len(z):
+            is_tip = len(z) == 1 and z[0] == self.end
+            packed = self.rule.packed_stations
+            table = self._tip_table if is_tip else packed(z, self._shape_steps)
+            parallel.run(
+                partial(frames.frames, *table, gamma[b], places[b], directors[b])
+                for b in parallel.blocks(len(gamma), 1024)
+            )
+        shapes = Shapes(places, directors, *strains, np.zeros(len(gamma), np.int8))
+        drop(lost, shapes.status, *shapes[:4])
         return shapes
-
-    def _frames(self, gamma: Array, z: Array) -> Frames:
-        result = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
-        if not len(z):
-            return result
-        is_tip = len(z) == 1 and z[0] == self.end
-        packed = self.rule.packed_stations
-        table, ends = self._tip_table if is_tip else packed(z, self._shape_steps)
-        parallel.run(
-            partial(frames.frames, table, ends, gamma[b], result.position[b], result.directors[b])
-            for b in parallel.blocks(len(gamma), 1024)
-        )
-        return result
 
     @lazy
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
@@ -253,13 +230,9 @@ def add_offset(tips: Array, offset: Array, directors: Array) -> None:
         tips += offset[k] * directors[:, k]
 
 
-def tables_at(arm: Manipulator, stations: Array) -> Tables:
-    """Tables at stations [m], kept for the next block of activations."""
-    return _tables_at(arm, stations.tobytes())
-
-
 @lru_cache(maxsize=64)
-def _tables_at(arm: Manipulator, stations: bytes) -> Tables:
+def tables_at(arm: Manipulator, stations: bytes) -> Tables:
+    """Tables at the stations [m] of these bytes, kept for the next block of activations."""
     return tables(arm, np.frombuffer(stations))
 
 
@@ -267,7 +240,7 @@ def linear_strains(table: Tables, gamma: Array) -> tuple[Array, Array, Array]:
     """Uγ, ζ = 1 + z·γ and η at the stations of a table: theory (7).
 
     Samples vary fastest in memory, so that all values at one station lie side by side. The sum runs
-    over the bundles in their order, whatever BLAS and its threads would do.
+    over the bundles in their order, so that BLAS and its threads do not decide the rounding.
 
     Args:
         table: z and U, and the part of z in η.

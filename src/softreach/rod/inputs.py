@@ -1,4 +1,4 @@
-"""Inputs of a tip map: γ(x), the activations of a rod at what a user or a search changes.
+"""Inputs of a tip map: their bounds, and γ(x), the activations of a rod at what a search changes.
 
 x are some inputs in other units, so that changes of different kinds compare. Drives, tendons that
 are driven by length and a shape at rest lead from inputs to activations.
@@ -10,16 +10,161 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.driving import Driving, inner_arm
+from softreach.arm.driving import Driving
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.activation_box import ActivationBox
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, as_rows, labeled, read_only
+from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
-_OF_LENGTHS = 0.03
-"""Tolerance of shapes of which lengths are taken, over that of tips."""
+
+@dataclass(frozen=True)
+class ActivationBox:
+    """Bounds of activations; a bundle whose bounds are equal is fixed, the others are free.
+
+    Raises:
+        InvalidInput: No pair lower <= upper of finite numbers and no name for each bundle.
+    """
+
+    bounds: tuple[tuple[float, float], ...]
+    """(lower, upper) for each bundle, in its own unit."""
+    names: tuple[str, ...]
+    """A name for each bundle."""
+
+    def __post_init__(self) -> None:
+        if not all(-np.inf < low <= high < np.inf for low, high in self.bounds):
+            raise InvalidInput("bounds", self.bounds, "pairs of finite numbers, lower <= upper")
+        if len(self.names) != len(self.bounds):
+            raise InvalidInput("names", self.names, f"{len(self.bounds)}: one for each bundle")
+
+    @classmethod
+    def between(cls, bounds: ArrayLike, names: Sequence[str]) -> ActivationBox:
+        """The box of an array of bounds, shape (bundles, 2)."""
+        pairs = as_rows(
+            "bounds", bounds, 2, "(lower, upper) of each bundle, shape (bundles, 2)"
+        ).tolist()
+        return cls(tuple((low, high) for low, high in pairs), tuple(names))
+
+    @property
+    def bundles(self) -> int:
+        """Number of bundles, free or fixed."""
+        return len(self.bounds)
+
+    @lazy
+    def low(self) -> Array:
+        """Lower bounds, shape (bundles,)."""
+        return read_only(np.array([low for low, _ in self.bounds]))
+
+    @lazy
+    def high(self) -> Array:
+        """Upper bounds, shape (bundles,)."""
+        return read_only(np.array([high for _, high in self.bounds]))
+
+    @lazy
+    def widths(self) -> Array:
+        """Upper minus lower bounds, shape (bundles,)."""
+        return read_only(self.high - self.low)
+
+    @lazy
+    def scales(self) -> Array:
+        """`widths`, with 1 for fixed bundles: the measure of changes of activation."""
+        return read_only(np.where(self.widths > 0, self.widths, 1.0))
+
+    @lazy
+    def is_free(self) -> NDArray[np.bool_]:
+        """Mask of the bundles that can move, shape (bundles,)."""
+        return self.widths > 0
+
+    @lazy
+    def free(self) -> NDArray[np.intp]:
+        """Indices of the bundles that can move, shape (dimension,)."""
+        return np.flatnonzero(self.is_free)
+
+    @property
+    def dimension(self) -> int:
+        """Number of free bundles."""
+        return len(self.free)
+
+    @property
+    def volume(self) -> float:
+        """Product of the widths of the free bundles; 1 if none is."""
+        return float(np.prod(self.widths[self.free]))
+
+    def from_cube(self, cube: Array, out: Array | None = None) -> Array:
+        """Activations of points of the unit cube that has an axis for every bundle.
+
+        Args:
+            cube: Points in [0, 1], shape (n, bundles).
+            out: Array to put them into; `cube` itself is allowed.
+
+        Returns:
+            Activations, shape (n, bundles), never outside the bounds.
+        """
+        gamma = np.multiply(cube, self.widths, out=out)
+        gamma += self.low
+        return np.minimum(gamma, self.high, out=gamma) if self._overshoots else gamma
+
+    @lazy
+    def _overshoots(self) -> bool:
+        """True if rounding carries some low + width past its bound, where 1 would then lie."""
+        return bool((self.low + self.widths > self.high).any())
+
+    def from_free_cube(self, cube: Array) -> Array:
+        """Activations of points of the unit cube of the free bundles; the others stay fixed.
+
+        Args:
+            cube: Points in [0, 1], shape (n, dimension).
+        """
+        every = np.zeros((len(cube), self.bundles))
+        every[:, self.free] = cube
+        return self.from_cube(every, out=every)
+
+    def with_fixed(self, activations: Array) -> Array:
+        """Activations of all bundles from those of the free ones; the others stay fixed.
+
+        Args:
+            activations: Shape (n, dimension).
+        """
+        if self.dimension == self.bundles:
+            return activations
+        every = np.tile(self.low, (len(activations), 1))
+        every[:, self.free] = activations
+        return every
+
+    def to_cube(self, activations: Array) -> Array:
+        """Points of the unit cube of activations, shape (n, bundles); fixed bundles at 0."""
+        return (activations - self.low) / self.scales
+
+    def check(self, activations: ArrayLike) -> Array:
+        """The activations as an (n, bundles) float array, inside the bounds or not.
+
+        Raises:
+            InvalidInput: Another shape, or values that are not finite.
+        """
+        allowed = f"an array of numbers of shape (n, {self.bundles}), one column per bundle"
+        gamma = labeled("activations", activations, self.names)
+        return as_rows("activations", gamma, self.bundles, allowed)
+
+    def clip(self, activations: Array) -> Array:
+        """Activations (n, bundles) moved to the nearest bounds where they are outside."""
+        return np.clip(activations, self.low, self.high)
+
+    def excess(self, activations: Array) -> Array:
+        """Distance of each bundle beyond its bounds, in `scales`, (n, bundles); negative inside."""
+        return np.maximum(self.low - activations, activations - self.high) / self.scales
+
+    def margin(self, activations: Array) -> Array:
+        """Distance to the nearest bound of a free bundle, in widths, shape (n,); 0 if none is."""
+        if not self.dimension:
+            return np.zeros(len(activations))
+        room = np.minimum(activations - self.low, self.high - activations)
+        return (room[:, self.free] / self.widths[self.free]).min(axis=1)
+
+    def corners(self) -> Array:
+        """All corners, shape (2^bundles, bundles), the last bundle varying fastest."""
+        upper = np.indices((2,) * self.bundles).reshape(self.bundles, 2**self.bundles).T
+        return np.where(upper, self.high, self.low)
 
 
 @dataclass(frozen=True)
@@ -41,22 +186,10 @@ class Inputs:
         return cls(own_box, driving, (1.0,) * own_box.bundles, tuple(range(own_box.bundles)))
 
     @classmethod
-    def of_drives(cls, arm: Manipulator, tol: float) -> Inputs:
+    def of_drives(cls, arm: Manipulator) -> Inputs:
         """Those of an arm whose inputs are not the activations of its sections."""
         driving = Driving(arm)
-        return cls.of(_bounds(driving), driving).to_tolerance(tol)
-
-    def to_tolerance(self, tol: float) -> Inputs:
-        """The same with tensions for a tolerance of tips [L]."""
-        driving = self.driving
-        if driving is None or driving.arm.loads is None or not driving.has_length_tendons:
-            return self
-        from softreach.rod.loaded.pulled import LoadedLengths
-        from softreach.rod.loaded.rod import LoadedRod
-
-        # A tip moves by far more than the length by which a tendon near the axis is off.
-        rod = LoadedRod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, 1e-12))
-        return replace(self, driving=replace(driving, lengths=LoadedLengths(driving.law, rod)))
+        return cls.of(_bounds(driving), driving)
 
     def effective(self) -> Inputs:
         """Inputs that begin beyond the dead zones of drives."""
@@ -112,7 +245,7 @@ class Inputs:
 
     @property
     def kinks(self) -> list[Array]:
-        """Values of each x at which a tendon goes slack, whatever the others are."""
+        """Values of each x at which a tendon goes slack, for all values of the others."""
         if self.driving is None:
             return [np.empty(0)] * len(self.free)
         return [self.driving.kinks[j] / self.scale[j] for j in self.free]

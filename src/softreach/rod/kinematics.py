@@ -1,7 +1,7 @@
 """Forward kinematics: where the tip is, how it moves, what shape the arm takes.
 
-Clamped at Z = 0 by its base, whose z is the tangent d3 there; told in the world unless asked
-otherwise.
+The arm is clamped at Z = 0 by its base, whose z is the tangent d3 there. Places are in the frame of
+the world by default.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from softreach.arm.lines import lengths_of_strains
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import quadrature
 from softreach.rod.rods import ArmMap, as_tip_map, with_unstable
-from softreach.rod.tip_map import Frame, Frames, Shapes, TipMap
+from softreach.rod.tip_map import Frame, Frames, Strains, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import Array, as_floats
@@ -44,7 +44,7 @@ def tip_positions(
         activations: γ [-], shape (n, bundles), or (bundles,) for one; values outside the bounds are
             allowed, but `tol` is promised inside them.
         tol: Largest tip error, in L; it decides the number of steps.
-        frame: In which tips are told: that of the "world", or of the "base", whose z is along the
+        frame: Frame of the tips: that of the "world", or of the "base", whose z is along the
             straight arm.
 
     Returns:
@@ -172,17 +172,20 @@ def configuration(
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
     values = as_floats("activation", activation)
     gamma = tip_map.check_activations("activation", np.atleast_2d(values))
-    z, status = stations_along(tip_map, stations), np.empty(len(gamma), np.int8)
+    z = stations_along(tip_map, stations)
     nodes = quadrature(body_of(tip_map.arm))[0] if tip_map.arm.bundles else np.empty(0)
     strained = np.union1d(z, nodes)
-    position, directors, curvature, extension = tip_map.shapes(gamma, z, strained, status)
-    at, on_lines = np.searchsorted(strained, z), np.searchsorted(strained, nodes)
-    others = _lines(tip_map, gamma, curvature[:, on_lines], extension[:, on_lines])
+    shapes = tip_map.shapes(gamma, z, strained)
+    strains = Strains(shapes.curvature, shapes.extension)
+    at_stations, on_lines = (
+        Strains(*(values[:, np.searchsorted(strained, places)] for values in strains))
+        for places in (z, nodes)
+    )
+    others = _lines(tip_map, gamma, on_lines)
     others["marker_position"] = _markers(tip_map, gamma)
-    shapes = Shapes(position, directors, curvature[:, at], extension[:, at])
-    dataset = shape_dataset(tip_map, gamma, z, shapes, **others)
+    dataset = shape_dataset(tip_map, gamma, z, Frames(*shapes[:2]), at_stations, **others)
     if tip_map.supports_unstable:
-        dataset = schema.with_status(dataset, status)
+        dataset = schema.with_status(dataset, shapes.status)
     return dataset.isel(sample=0) if values.ndim == 1 else dataset
 
 
@@ -193,19 +196,17 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
         arm: The design.
         stations: Number of stations, evenly spaced in Z.
     """
-    z = np.linspace(0.0, arm.length, stations)
-    straight = np.zeros((1, stations, 3))
-    straight[..., 2] = z
-    directors = np.tile(np.eye(3), (1, stations, 1, 1))
-    nodes = len(quadrature(body_of(arm))[0])
-    straight_lines = lengths_of_strains(arm, np.zeros((1, nodes, 3)), np.ones((1, nodes)))
-    lines: dict[str, Any] = {"line_length": straight_lines} if arm.bundles else {}
+    z, lines = np.linspace(0.0, arm.length, stations), dict[str, Any]()
+    if arm.bundles:
+        nodes = len(quadrature(body_of(arm))[0])
+        straight = np.zeros((1, nodes, 3)), np.ones((1, nodes))
+        lines["line_length"] = lengths_of_strains(arm, *straight)
     shape = schema.configuration_dataset(
         arm,
         np.zeros((1, arm.inputs)),
         z,
-        position=arm.base.to_world(straight),
-        directors=arm.base.directions_to_world(directors),
+        position=arm.base.to_world(z[None, :, None] * np.array([0.0, 0.0, 1.0])),
+        directors=arm.base.directions_to_world(np.tile(np.eye(3), (1, stations, 1, 1))),
         curvature=np.zeros((1, stations, 3)),
         extension=np.ones((1, stations)),
         radius=arm.profile.radius(z),
@@ -215,7 +216,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
 
 
 def shape_dataset(
-    tip_map: TipMap, gamma: Array, z: Array, shapes: Shapes, **others: Array
+    tip_map: TipMap, gamma: Array, z: Array, frames: Frames, strains: Strains, **others: Array
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
     return schema.configuration_dataset(
@@ -224,20 +225,22 @@ def shape_dataset(
         z,
         names=tip_map.box.names,
         frame=tip_map.frame,
-        **shapes._asdict(),
+        **frames._asdict(),
+        **strains._asdict(),
         radius=tip_map.radius(z),
         **{name: values for name, values in others.items() if values.shape[1]},
     )
 
 
-def _lines(tip_map: ArmMap, gamma: Array, curvature: Array, extension: Array) -> dict[str, Array]:
+def _lines(tip_map: ArmMap, gamma: Array, strains: Strains) -> dict[str, Array]:
     """Lengths of the lines of bundles, and what drives and displacements activate there."""
     arm, length = tip_map.arm, np.empty((len(gamma), tip_map.arm.bundles))
     if not arm.bundles:
         return {}
     for b in parallel.blocks(len(gamma), _LINES_TOGETHER):
-        turn = curvature[b] * extension[b, :, None]
-        length[b] = lengths_of_strains(arm, turn, extension[b])
+        extension = strains.extension[b]
+        turn = strains.curvature[b] * extension[..., None]
+        length[b] = lengths_of_strains(arm, turn, extension)
     if arm.is_direct:
         return {"line_length": length}
     activation = tip_map.inputs.activations(gamma)[:, : arm.bundles]

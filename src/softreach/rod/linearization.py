@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import Tables, both_sides, tables
 from softreach.kernels.rod.frames import relative_strains
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 

@@ -1,24 +1,25 @@
 """Linear response of an arm in equilibrium: how places move when its tables change a little.
 
-Tables are those of the steps between all places where the arm is not smooth or is asked for. Each
-node stays at its share of its step while the arm changes, so that steps grow with the arm and no
-actuator ends inside one.
+Tables are those of the steps between wanted stations and all places where the arm is not smooth.
+Each node stays at its share of its step while the arm changes, so that steps grow with the arm and
+no actuator ends inside one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import compliance, tables
+from softreach.arm.tables import compliance
 from softreach.kernels.rod.linear_response import GAUSS, NODES, WEIGHTS, respond
 from softreach.rod.free import ArmRod
+from softreach.rod.steps import tables_on
+from softreach.rod.tip_map import InvalidLoads
 from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -27,8 +28,7 @@ _TOGETHER = 64
 """Samples to a task."""
 
 
-@dataclass(frozen=True, eq=False)
-class StepGrid:
+class StepGrid(NamedTuple):
     """Steps of an arm between the places where something begins or ends."""
 
     counts: NDArray[np.intp]
@@ -37,8 +37,7 @@ class StepGrid:
     """True if what ends at the base or at the tip may come to end before."""
 
 
-@dataclass(frozen=True, eq=False)
-class NodeTables:
+class NodeTables(NamedTuple):
     """Tables of an arm at the nodes of its steps, base first."""
 
     stations: Array
@@ -59,22 +58,17 @@ class NodeTables:
     """Of the payload in the directors of the tip [m], shape (3,)."""
     weight: Array
     """Force of the payload in the frame of the base [N], shape (3,)."""
-    asked: Array
-    """Z of the stations that were asked for [m], shape (station,)."""
+    places: Array
+    """Z of the wanted stations [m], shape (station,)."""
 
-    def combined(self, others: list[Self], factors: list[float]) -> Self:
+    def combined(self, others: list[NodeTables], factors: list[float]) -> NodeTables:
         """Σ factor x other, of differences."""
-        values: dict[str, Any] = {
-            field.name: sum(
-                f * getattr(o, field.name) for f, o in zip(factors, others, strict=True)
-            )
-            for field in fields(self)
-        }
-        return type(self)(**values)
+        columns = zip(*others, strict=True)
+        weighted = (map(np.multiply, factors, column) for column in columns)
+        return NodeTables(*(np.asarray(sum(terms)) for terms in weighted))
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
+class Response(NamedTuple):
     """Changes of places per unit of each column, in the frame of the base."""
 
     moves: Array
@@ -108,7 +102,7 @@ def step_grid(
 
     Args:
         arm: The inner arm.
-        stations: Z that are asked for [m], in any order.
+        stations: Wanted Z [m], in any order.
         steps: Even steps; a step should not turn the arm by much more than a third of a radian.
         moving_ends: Whether actuators that end at the base or at the tip may come to end before.
     """
@@ -136,50 +130,45 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
     z = profile.station(at)
     # Steps without length stand where something ends: the inside of the arm decides.
     length = width[:, None] * profile.radius(z)
-    table = tables(arm, z.ravel())
-    soft = np.zeros((*z.shape, 4))
+    (table,), soft = tables_on(arm, z), np.zeros((*z.shape, 4))
     if arm.loads is not None:
-        axial, bending, torsion = (c.reshape(z.shape) for c in compliance(arm, z.ravel()))
+        axial, bending, torsion = compliance(arm, z)
         soft = np.stack([axial, bending, bending, torsion], axis=-1)
-    shape, bundles = z.shape, arm.bundles
+    force, weight = dead_forces(arm, arm.base, z, length)
     return NodeTables(
         stations=z,
         length=length,
-        extension=table.extension.reshape(*shape, bundles),
-        rest_length_factor=table.rest_length_factor.reshape(*shape, bundles),
-        curvature=table.curvature.reshape(*shape, 3, bundles),
+        extension=table.extension,
+        rest_length_factor=table.rest_length_factor,
+        curvature=table.curvature,
         compliance=soft,
-        force=dead_force(arm, arm.base, z, length),
+        force=force,
         lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
-        weight=payload_weight(arm, arm.base),
-        asked=np.asarray(stations, float),
+        weight=weight,
+        places=np.asarray(stations, float),
     )
 
 
-def payload_weight(arm: Manipulator, base: Base) -> Array:
-    """Force of the payload in the frame of a base [N], shape (3,)."""
-    if arm.loads is None:
-        return np.zeros(3)
-    return arm.loads.payload * np.array(arm.loads.seen_from(base).gravity)
-
-
-def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
-    """n [N] at the nodes in the frame of a base, shape (step, 3, 3): dead forces beyond, (60).
+def dead_forces(arm: Manipulator, base: Base, z: Array, length: Array) -> tuple[Array, Array]:
+    """Dead force n beyond the nodes, theory (60), and that of the payload in the frame of a base.
 
     Args:
         arm: The arm, wherever its own base is.
         base: Pose of the base.
         z: Z of the nodes [m], shape (step, 3).
         length: dZ there [m], likewise.
+
+    Returns:
+        [N], shape (step, 3, 3) and (3,).
     """
     if arm.loads is None:
-        return np.zeros((*z.shape, 3))
+        return np.zeros((*z.shape, 3)), np.zeros(3)
     loads = arm.loads.seen_from(base)
     others = [loads.follower_force, loads.follower_moment, loads.tip_moment]
     others += [load.moment for load in loads.point_loads]
     if any(map(any, others)):
         allowed = "gravity, a payload and dead forces: moments and forces that follow have none"
-        raise InvalidInput("loads", "others", allowed)
+        raise InvalidLoads("loads", "others", allowed)
     gravity = np.array(loads.gravity)
     mass = np.zeros(z.shape)
     if gravity.any():
@@ -191,11 +180,10 @@ def dead_force(arm: Manipulator, base: Base, z: Array, length: Array) -> Array:
     force = force + (arm.length - z)[..., None] * np.array(loads.force_per_length)
     for load in loads.point_loads:
         force = force + np.where((z < load.station)[..., None], np.array(load.force), 0.0)
-    return force
+    return force, loads.payload * gravity
 
 
-@dataclass(frozen=True, eq=False)
-class RodState:
+class RodState(NamedTuple):
     """Shapes of one arm in equilibrium at the nodes of its steps, in the frame of the base."""
 
     gamma: Array
@@ -205,8 +193,8 @@ class RodState:
     moment: Array
     """m in the directors [N m], shape (n, step, 3, 3)."""
     position: Array
-    """r at the stations that are asked for [m], shape (n, station, 3)."""
-    asked_directors: Array
+    """r at the wanted stations [m], shape (n, station, 3)."""
+    place_directors: Array
     """Directors there, shape (n, station, 3, 3)."""
     tip_directors: Array
     """Directors of the tips, shape (n, 3, 3)."""
@@ -216,22 +204,17 @@ class RodState:
 
 def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
     """Equilibria of a rod at activations of its arm, at the nodes of its tables."""
-    z = np.concatenate([table.stations.ravel(), table.asked, [rod.length]])
-    order = np.argsort(z, kind="stable")
-    back = np.empty_like(order)
-    back[order] = np.arange(len(z))
-    status = np.zeros(len(gamma), np.int8)
-    ascending = np.clip(z[order], 0.0, rod.length)
-    frames, moment = rod.with_moments(gamma, ascending, status)
-    moment = moment[:, back]
-    position, directors = frames.position[:, back], frames.directors[:, back]
-    steps, count, asked = table.stations.shape[0], table.stations.size, len(table.asked)
+    z = np.concatenate([table.stations.ravel(), table.places, [rod.length]])
+    ascending, back = np.unique(np.clip(z, 0.0, rod.length), return_inverse=True)
+    frames, moment, status = rod.with_moments(gamma, ascending)
+    position, directors, moment = (values[:, back] for values in (*frames, moment))
+    steps, count, wanted = table.stations.shape[0], table.stations.size, len(table.places)
     return RodState(
         gamma,
         directors[:, :count].reshape(-1, steps, 3, 3, 3),
         moment[:, :count].reshape(-1, steps, 3, 3),
-        position[:, count : count + asked],
-        directors[:, count : count + asked],
+        position[:, count : count + wanted],
+        directors[:, count : count + wanted],
         directors[:, -1],
         status,
     )
@@ -249,18 +232,19 @@ def linear_response(
         table: Tables of the inner arm at the nodes.
         state: Its equilibria.
         changes: Changes of the tables, one for each column after those of the activations.
-        unit_loads: M and N at the nodes whose work is asked for, shape (step, 3, 4, work).
+        unit_loads: M and N at the nodes whose work is wanted, shape (step, 3, 4, work).
     """
     n, bundles = state.gamma.shape
     if unit_loads is None:
         unit_loads = np.zeros((*table.length.shape, 4, 0))
     unit_loads = np.ascontiguousarray(unit_loads)
-    change = _at_rest_and_per_activation(table, changes)
-    lever = np.einsum("c,nca->na", table.lever, state.tip_directors)
-    tipping = _tipping(table, state, changes)
-    marks = np.searchsorted(table.stations[:, 1], np.sort(table.asked))
-    asked, columns = len(table.asked), bundles + len(changes)
-    moves, turns = np.zeros((2, n, asked, 3, columns))
+    change, columns = _changed_tables(table, changes), bundles + len(changes)
+    lever, tipping = table.lever @ state.tip_directors, np.zeros((n, 3, columns))
+    for k, other in enumerate(changes, bundles):  # moment of the payload at the same directors
+        moved = other.lever @ state.tip_directors
+        tipping[..., k] = np.cross(lever, other.weight) + np.cross(moved, table.weight)
+    marks = np.searchsorted(table.stations[:, 1], np.sort(table.places))
+    moves, turns = np.zeros((2, n, len(table.places), 3, columns))
     works = np.zeros((n, unit_loads.shape[-1], columns))
 
     def fill(rows: slice) -> None:
@@ -271,38 +255,16 @@ def linear_response(
             respond(*per_arm, *given, *answers)
 
     parallel.run(partial(fill, block) for block in parallel.blocks(n, _TOGETHER))
-    back = np.argsort(np.argsort(table.asked, kind="stable"), kind="stable")
+    back = np.argsort(np.argsort(table.places, kind="stable"), kind="stable")
     return Response(moves[:, back], turns[:, back], works)
 
 
-def _tipping(table: NodeTables, state: RodState, changes: list[NodeTables]) -> Array:
-    """Change of the moment of the payload at the same directors, (n, 3, column)."""
-    n, bundles = state.gamma.shape
-    result = np.zeros((n, 3, bundles + len(changes)))
-    arm = np.einsum("c,nca->na", table.lever, state.tip_directors)
-    for k, change in enumerate(changes):
-        moved = np.einsum("c,nca->na", change.lever, state.tip_directors)
-        tipping = np.cross(arm, change.weight) + np.cross(moved, table.weight)
-        result[..., bundles + k] = tipping
-    return result
+def _changed_tables(table: NodeTables, changes: list[NodeTables]) -> tuple[Array, ...]:
+    """Changes of ζ̂ dZ, η dZ, U, compliance and force by column.
 
+    Those of products are per activation, (..., column, bundle + 1), the last place at rest.
+    """
 
-class _Changes(NamedTuple):
-    """Changes of tables: rows of columns; the last place of a product is its value at rest."""
-
-    stretch: Array
-    """Of ζ̂ dZ, shape (step, 3, column, bundle + 1)."""
-    rest_length: Array
-    """Of η dZ, likewise."""
-    curvature: Array
-    """Of U, shape (step, 3, 3, column, bundle)."""
-    compliance: Array
-    """Shape (step, 3, 4, column)."""
-    force: Array
-    """Shape (step, 3, 3, column)."""
-
-
-def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) -> _Changes:
     def stacked(name: str, axis: int) -> Array:
         whole = getattr(table, name)
         if not changes:
@@ -316,21 +278,16 @@ def _at_rest_and_per_activation(table: NodeTables, changes: list[NodeTables]) ->
         by = length * getattr(table, name)[:, :, None] + each * stacked(name, -2)
         return np.concatenate([by, length], axis=-1)
 
-    return _Changes(
-        product("extension"),
-        product("rest_length_factor"),
-        stacked("curvature", -2),
-        stacked("compliance", -1),
-        stacked("force", -1),
-    )
+    products = product("extension"), product("rest_length_factor")
+    return *products, stacked("curvature", -2), stacked("compliance", -1), stacked("force", -1)
 
 
 def _per_arm(
-    table: NodeTables, change: _Changes, gamma: Array, d: Array, moment: Array
+    table: NodeTables, change: tuple[Array, ...], gamma: Array, d: Array, moment: Array
 ) -> tuple[Array, ...]:
     """What the kernel wants of one arm."""
-    length = table.length
-    whole = np.append(gamma, 1.0)
+    by_stretch, by_rest_length, by_curvature, by_compliance, by_force = change
+    length, whole = table.length, np.append(gamma, 1.0)
     axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
     thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
     squeeze = axial * thrust  # n3/K0
@@ -338,18 +295,18 @@ def _per_arm(
     stretch = length * (1.0 + table.extension @ gamma) + rest_length * squeeze
     bend = table.curvature @ gamma + bending * moment
     each = length[..., None]
-    grown, stretched = change.rest_length @ whole, change.stretch @ whole
-    bent = change.curvature @ gamma + change.compliance[..., 1:, :] * moment[..., None]
+    grown, stretched = by_rest_length @ whole, by_stretch @ whole
+    bent = by_curvature @ gamma + by_compliance[..., 1:, :] * moment[..., None]
     of_activations = (each * table.rest_length_factor)[:, :, None] * bend[..., None]
     of_activations += rest_length[..., None, None] * table.curvature
     of_changes = grown[:, :, None] * bend[..., None] + rest_length[..., None, None] * bent
     turning = np.concatenate([of_activations, of_changes], axis=-1)
     of_activations = each * (table.extension + table.rest_length_factor * squeeze[..., None])
     of_changes = stretched + grown * squeeze[..., None]
-    of_changes += rest_length[..., None] * change.compliance[..., 0, :] * thrust[..., None]
+    of_changes += rest_length[..., None] * by_compliance[..., 0, :] * thrust[..., None]
     pushing = np.concatenate([of_activations, of_changes], axis=-1)
     yielding = np.zeros((*table.force.shape, turning.shape[-1]))
-    yielding[..., len(gamma) :] = change.force
+    yielding[..., len(gamma) :] = by_force
     return (
         rest_length,
         stretch,

@@ -14,10 +14,10 @@ from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
 from softreach.kernels.rod.frames import move, turn
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import ArmRod, FreeRod
-from softreach.rod.inputs import Inputs
+from softreach.rod.inputs import ActivationBox, Inputs
 from softreach.rod.tip_map import (
+    SMALLEST_TOL,
     Array,
     Frame,
     Frames,
@@ -25,6 +25,7 @@ from softreach.rod.tip_map import (
     Shapes,
     Status,
     TipMap,
+    TipOutputs,
     TipStatus,
     check_tol,
     drop,
@@ -33,6 +34,9 @@ from softreach.support.arguments import as_flag, as_given, as_instance, as_one_o
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
+
+_OF_LENGTHS = 0.03
+"""Tolerance of shapes of which lengths are taken, over that of tips."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,41 +114,31 @@ class ArmMap(TipMap):
             return self
         return replace(self, rod=rod, inputs=self.inputs.continued_from(activation, frames))
 
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-    ) -> None:
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
         is_whole = self.unstable or not self.supports_unstable
         if is_whole and self.inputs.are_activations and self.pose.is_identity:
-            others = {"twists": twists, "status": status, "directions": directions}
-            self.rod.fill(gamma, tips, slopes, **others)
+            self.rod.fill(gamma, out)
             return
-        wanted, of_drives = (slopes, twists), None
-        if slopes is None and twists is None:
-            inner = self.inputs.activations(gamma)
-        else:
+        moved = {"slopes": out.slopes, "twists": out.twists}
+        moved, of_drives = {name: v for name, v in moved.items() if v is not None}, None
+        if moved:
             inner, of_drives = self.inputs.with_slopes(gamma)
-        rooms = [  # for derivatives along the activations of the rod
-            values
-            if values is None or self.inputs.are_activations
-            else np.empty((*values.shape[:2], inner.shape[1]))
-            for values in wanted
-        ]
+        else:
+            inner = self.inputs.activations(gamma)
+        room = out
+        if not self.inputs.are_activations:  # derivatives along the activations of the rod
+            room = out._replace(
+                **{k: np.empty((*v.shape[:2], inner.shape[1])) for k, v in moved.items()}
+            )
+        if out.status is None and not is_whole:
+            room = room._replace(status=np.empty(len(gamma), np.int8))
         inner, lost = self._known(inner)
-        status = self._status(len(gamma), status)
-        self.rod.fill(inner, tips, rooms[0], twists=rooms[1], status=status, directions=directions)
-        if not self.pose.is_identity:
-            self._place(tips, rooms[0], rooms[1], directions)
-        for room, values in zip(rooms, wanted, strict=True):
-            if room is not None and values is not None and room is not values:
-                self.inputs.along_x(room, of_drives, values)
-        self._drop(lost, status, tips, slopes, twists, directions)
+        self.rod.fill(inner, room)
+        self._place(room)
+        for name, values in moved.items():
+            if (along_rod := getattr(room, name)) is not values:
+                self.inputs.along_x(along_rod, of_drives, values)
+        self._drop(lost, room.status, out.tips, out.slopes, out.twists, out.directions)
 
     def _known(self, inner: Array) -> tuple[Array, NDArray[np.intp]]:
         """Activations with the lower bounds where no tensions were found, and their rows."""
@@ -153,12 +147,8 @@ class ArmMap(TipMap):
             inner[lost] = self.rod.box.low
         return inner, lost
 
-    def _status(self, n: int, status: Status | None) -> Status | None:
-        is_needed = status is None and self.supports_unstable and not self.unstable
-        return np.empty(n, np.int8) if is_needed else status
-
     def _drop(self, lost: NDArray[np.intp], status: Status | None, *values: Array | None) -> None:
-        """Make NaN what has no tensions, and what is not stable unless it is asked for."""
+        """Make NaN what has no tensions, and what is not stable unless that is wanted."""
         drop(lost, None, *values)
         if status is None:
             return
@@ -166,35 +156,28 @@ class ArmMap(TipMap):
         if not self.unstable:
             drop(np.flatnonzero(status != TipStatus.STABLE), None, *values)
 
-    def _place(
-        self, tips: Array, slopes: Array | None, twists: Array | None, directions: Array | None
-    ) -> None:
+    def _place(self, out: TipOutputs) -> None:
         """Take to the world what is in the frame of the base: r = r(0) + R r'."""
+        if self.pose.is_identity:
+            return
         rotation, position = np.array(self.pose.rotation), np.array(self.pose.position)
-        move(tips, rotation, position)
-        if slopes is not None:
-            turn(slopes, rotation)
-        if directions is not None:
-            move(directions, rotation, np.zeros(3))
-        if twists is not None:
-            turn(twists, rotation)
+        move(out.tips, rotation, position)
+        if out.slopes is not None:
+            turn(out.slopes, rotation)
+        if out.directions is not None:
+            move(out.directions, rotation, np.zeros(3))
+        if out.twists is not None:
+            turn(out.twists, rotation)
             if position.any():  # v is that of the origin, which is another point now
-                v, w = twists[:, :3], twists[:, 3:]
+                v, w = out.twists[:, :3], out.twists[:, 3:]
                 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
                     v[:, i] += position[j] * w[:, k] - position[k] * w[:, j]
 
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
+    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         inner, lost = self._known(self.inputs.activations(self.box.check(activations)))
-        status = self._status(len(inner), status)
-        position, directors, *strains = self.rod.shapes(inner, framed, strained, status)
-        shapes = Shapes(*self.placed(Frames(position, directors)), *strains)
-        self._drop(lost, status, *shapes)
+        shapes = self.rod.shapes(inner, framed, strained)
+        shapes = shapes._replace(**self.placed(Frames(*shapes[:2]))._asdict())
+        self._drop(lost, shapes.status, *shapes[:4])
         return shapes
 
     def placed(self, frames: Frames) -> Frames:
@@ -209,9 +192,9 @@ class ArmMap(TipMap):
 
     def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held | None:
         held = self.rod.held(self.inputs.activations(gamma), sizes)
-        if held is not None and not self.pose.is_identity:
+        if held is not None:
             for places in (held.tips, held.end_tips):
-                self._place(places, None, None, None)
+                self._place(TipOutputs(places))
         return held
 
     def farthest(self) -> float:
@@ -257,17 +240,17 @@ def as_tip_map(
     if isinstance(arm, TipMap):
         known = arm if isinstance(arm, ArmMap) else ArmMap.of(arm)
         return replace(known, pose=UPRIGHT) if frame == "base" != known.frame else known
-    found = _of_arm(arm.at_point(point), check_tol(tol), frame)
+    made = _of_arm(arm.at_point(point), check_tol(tol), frame)
     if as_flag("warn", warn) and arm.loads is not None:
         _warn_of_large_loads(arm)
-    return found
+    return made
 
 
 def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
     known = as_tip_map(tip_map)
     if not isinstance(known.rod, ArmRod):
         return tip_map
-    inputs = known.inputs.to_tolerance(tol)
+    inputs = _with_tensions(known.inputs, tol)
     return replace(known, rod=_known_rod(known.rod.arm, tol), inputs=inputs)
 
 
@@ -356,8 +339,8 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
         like: A tip map whose tolerance, frame and effective inputs it has.
     """
     driving = as_tip_map(like).inputs.driving
-    found = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
-    return effective(found) if driving is not None and driving.is_effective else found
+    made = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
+    return effective(made) if driving is not None and driving.is_effective else made
 
 
 @lru_cache(maxsize=64)
@@ -366,8 +349,20 @@ def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> ArmMap:
 
 
 def _made(arm: Manipulator, tol: float, frame: Frame, rod: ArmRod) -> ArmMap:
-    inputs = Inputs.of(rod.box) if arm.is_direct else Inputs.of_drives(arm, tol)
+    inputs = Inputs.of(rod.box) if arm.is_direct else _with_tensions(Inputs.of_drives(arm), tol)
     return ArmMap(rod, inputs, arm.base if frame == "world" else UPRIGHT)
+
+
+def _with_tensions(inputs: Inputs, tol: float) -> Inputs:
+    """The same with tensions under loads for a tolerance of tips [L]."""
+    driving = inputs.driving
+    if driving is None or driving.arm.loads is None or not driving.has_length_tendons:
+        return inputs
+    from softreach.rod.loaded.pulled import LoadedLengths
+
+    # A tip moves by far more than the length by which a tendon near the axis is off.
+    rod = _rod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, SMALLEST_TOL))
+    return replace(inputs, driving=replace(driving, lengths=LoadedLengths(driving.law, rod)))
 
 
 @lru_cache(maxsize=64)

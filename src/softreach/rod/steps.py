@@ -5,9 +5,8 @@ Steps are uniform in S, theory (15); how many is theory (27).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.driving import cube_corners
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.profile import Profile
-from softreach.arm.tables import both_sides, jumps, tables
+from softreach.arm.tables import Tables, both_sides, jumps, tables
 from softreach.kernels.rod import frames, magnus
 from softreach.kernels.rod import tips as rod
-from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
+from softreach.rod.inputs import ActivationBox
+from softreach.rod.tip_map import MOST_TURN_OF_STEP
 from softreach.support import parallel
 from softreach.support.arrays import Array, read_only
 from softreach.support.errors import InvalidInput
@@ -43,17 +42,14 @@ _FEW_BREAKS = 64
 """Breakpoints at all of which steps end, however few the arm needs otherwise."""
 
 
-class Nodes(NamedTuple):
-    """Tables at the three Gauss nodes of every step, what a rod kernel reads."""
-
-    measure: Array
-    """Length of the step as each node sees it [m], shape (step, node)."""
-    stretch: Array
-    """z [-], shape (step, node, bundle)."""
-    rest_length_factor: Array
-    """Its part in η [-], shape (step, node, bundle)."""
-    curvature: Array
-    """U [1/m], shape (step, node, 3, bundle)."""
+def tables_on(arm: Manipulator, *grids: Array) -> Iterator[Tables]:
+    """Tables at the nodes of steps, Z [m] of shape (step, node), which lead their arrays."""
+    table = tables(arm, np.concatenate([z.ravel() for z in grids]))
+    first = 0
+    for z in grids:
+        rows, first = slice(first, first + z.size), first + z.size
+        values = table.extension[rows], table.curvature[rows], table.rest_length_factor[rows]
+        yield Tables(z, *(value.reshape(*z.shape, *value.shape[1:]) for value in values))
 
 
 @dataclass(frozen=True)
@@ -75,42 +71,41 @@ class StepRule:
             steps: Uniform steps along the whole arm, if nothing breaks it.
             stations: Z [m] where steps end too, ascending; the last one then stands for the tip.
         """
-        profile = self.arm.profile
-        inside = profile.slender_coordinate(np.array(ends_of_steps(self.arm, steps)))
-        marks = np.array([0.0, *inside, profile.slender_length])
+        z = [0.0, *ends_of_steps(self.arm, steps), self.arm.length]
         if stations is not None:
-            s = profile.slender_coordinate(stations)
-            marks = np.unique(np.concatenate([marks[marks < s[-1]], s]))
-        return edges_between(profile, marks, steps)
+            z = [*(mark for mark in z if mark < stations[-1]), *stations]
+        return edges_between(self.arm.profile, np.unique(z), steps)
 
-    def nodes(self, edges: ArrayLike) -> Nodes:
+    def nodes(self, edges: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
 
         Args:
             edges: Step boundaries S [-], ascending, shape (step + 1,).
+
+        Returns:
+            Length of the step as each node sees it [m], shape (step, node); z [-] and its part in
+            η [-], shape (step, node, bundle); U [1/m], shape (step, node, 3, bundle).
         """
         edges = np.asarray(edges, float)
-        width = np.diff(edges)[:, None]
-        s = edges[:-1, None] + width * np.array(magnus.NODES)
-        z = self.arm.profile.station(s)
-        table = tables(self.arm, z.ravel())
-        return Nodes(
-            width * self.arm.profile.radius(z),  # dZ = R2 dS
-            table.extension.reshape(*s.shape, self.arm.bundles),
-            table.rest_length_factor.reshape(*s.shape, self.arm.bundles),
-            table.curvature.reshape(*s.shape, 3, self.arm.bundles),
-        )
+        return self._nodes_of(edges[:-1], np.diff(edges))
+
+    def _nodes_of(self, starts: Array, widths: Array) -> tuple[Array, Array, Array, Array]:
+        width = widths[:, None]
+        z = self.arm.profile.station(starts[:, None] + width * np.array(magnus.NODES))
+        (at,), measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
+        return measure, at.extension, at.rest_length_factor, at.curvature
 
     def packed(self, edges: Array) -> Array:
         """Packed tables of the steps between edges, read-only."""
         return read_only(rod.pack(*self.nodes(edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
-        """Packed tables of the steps, and of both halves of each."""
+        """Packed tables of the steps, and of both halves of each, computed together."""
         edges = self.edges(steps)
-        middles = 0.5 * (edges[:-1] + edges[1:])
-        halved = np.append(np.column_stack([edges[:-1], middles]).ravel(), edges[-1])
-        return self.packed(edges), self.packed(halved)
+        both = edges, np.insert(edges, np.arange(1, len(edges)), 0.5 * (edges[:-1] + edges[1:]))
+        starts, widths = np.concatenate([[each[:-1], np.diff(each)] for each in both], axis=1)
+        packed = read_only(rod.pack(*self._nodes_of(starts, widths)))
+        return packed[: len(edges) - 1], packed[len(edges) - 1 :]
 
     def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
         """Packed tables of steps that end at every station Z [m], and the steps up to each."""
@@ -131,15 +126,10 @@ class StepRule:
             tol: Largest tip error, in L.
 
         Raises:
-            InvalidInput: `tol` below 1e-12, or not reached within 4,096 steps.
+            InvalidInput: `tol` is not reached within 4,096 steps.
         """
-        check_tol(tol)
-        at_all = enough_for_all_breaks(self.arm)
-
-        def halving(steps: int) -> Differences:
-            return _tips_apart(*self._halves(steps))
-
-        exact = self._fewest(tol, halving, MOST_TURN_OF_STEP, at_all)
+        at_all, turn = enough_for_all_breaks(self.arm), MOST_TURN_OF_STEP
+        exact = self._fewest(tol, lambda steps: _tips_apart(*self._halves(steps)), turn, at_all)
         if not at_all:
             return exact
         fine = self.packed(self.edges(exact))
@@ -147,7 +137,7 @@ class StepRule:
         def from_fine(steps: int) -> Differences:
             return _tips_apart(self.packed(self.edges(steps)), fine)
 
-        return self._search(tol, from_fine, MOST_TURN_OF_STEP, 0, at_all - 1) or exact
+        return self._search(tol, from_fine, turn, 0, at_all - 1) or exact
 
     def steps_for_shapes(self, tol: float) -> int:
         """As `steps_for`, for the largest error of the centerline anywhere along the arm."""
@@ -164,12 +154,7 @@ class StepRule:
         raise InvalidInput("tol", tol, f"reachable within {most} steps", "use a larger one")
 
     def _search(
-        self,
-        tol: float,
-        halving: Callable[[int], Differences],
-        turn: float,
-        least: int,
-        most: int,
+        self, tol: float, halving: Callable[[int], Differences], turn: float, least: int, most: int
     ) -> int | None:
         """The fewest steps whose differences on the pilot, and on what it leads to, are allowed."""
         allowed = tol * self.arm.length / _SAFETY
@@ -216,19 +201,18 @@ class StepRule:
     def _shape_differences(self, steps: int) -> Differences:
         """Largest distances [m] along the centerlines with `steps` and with twice as many."""
         coarse, fine = self._halves(steps)
-        steps = len(self.edges(steps)) - 1
+        steps = len(coarse)
         ends = np.arange(1, steps + 1)
 
-        def of_block(gamma: Array) -> Array:
-            places = np.empty((2, len(gamma), steps, 3))
-            directors = np.empty((len(gamma), steps, 3, 3))
-            frames.frames(coarse, ends, gamma, places[0], directors)
-            frames.frames(fine, 2 * ends, gamma, places[1], directors)
-            return np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
-
         def difference(gamma: Array) -> Array:
-            rows = parallel.blocks(len(gamma), _SHAPES)
-            return np.concatenate([of_block(gamma[block]) for block in rows])
+            errors = np.empty(len(gamma))
+            for block in parallel.blocks(len(gamma), _SHAPES):
+                places = np.empty((2, len(errors[block]), steps, 3))
+                directors = np.empty((*places.shape[1:], 3))
+                frames.frames(coarse, ends, gamma[block], places[0], directors)
+                frames.frames(fine, 2 * ends, gamma[block], places[1], directors)
+                errors[block] = np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
+            return errors
 
         return difference
 
@@ -257,14 +241,15 @@ def enough_for_all_breaks(arm: Manipulator) -> int:
     return breaks if breaks > _FEW_BREAKS else 0
 
 
-def edges_between(profile: Profile, marks: Array, steps: int) -> Array:
-    """Step boundaries S [-] that hold all marks, with no step longer than `steps` uniform ones.
+def edges_between(profile: Profile, z: Array, steps: int) -> Array:
+    """Step boundaries S [-] that hold marks, with no step longer than `steps` uniform ones.
 
     Args:
         profile: Of the arm.
-        marks: Ascending S [-], the first and the last of which are the ends.
+        z: Ascending Z of the marks [m], the first and the last of which are the ends.
         steps: Uniform steps along the whole arm.
     """
+    marks = profile.slender_coordinate(z)
     gaps = np.diff(marks)
     # A gap that only rounding makes longer takes no more steps for it.
     counts = np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(int)
@@ -294,11 +279,9 @@ def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
 
 
 def _bending_corners(arm: Manipulator) -> Array:
-    """Corners of the unit cube that are extreme in bending, at each station and all along the arm.
+    """Corners of the unit cube that bend most toward headings, at stations and all along the arm.
 
-    The bending (u1, u2) that a box of activations reaches at a station is a zonogon, whose farthest
-    vertex toward a heading has every bundle at the bound that helps. Along the arm the heading
-    turns as the fibers of each bundle do, or not at all.
+    There every bundle is at the bound that helps. Along the arm headings turn as fibers do, or not.
     """
     ends = np.array([0.0, *arm.breakpoints, arm.length])
     z = np.linspace(0.0, arm.length, _PROBED_STATIONS)
@@ -318,10 +301,7 @@ def _bending_corners(arm: Manipulator) -> Array:
 def _worsened(
     error: Differences, pilot: Array, known: Array, box: ActivationBox
 ) -> tuple[Array, Array]:
-    """Activations of larger error, and that: one bundle at a time goes to a bound, from the worst.
-
-    The errors of the pilot are known.
-    """
+    """Activations of larger error, and that: one bundle at a time goes to a bound."""
     chosen = np.argsort(-known, kind="stable")[:_SEARCHED]
     gamma, worst = pilot[chosen].copy(), known[chosen].copy()
     free, rows = box.free, np.arange(len(chosen))

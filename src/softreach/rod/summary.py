@@ -8,7 +8,6 @@ from itertools import combinations, groupby
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
@@ -133,7 +132,7 @@ def describe(arm: Manipulator) -> DesignSummary:
 
 
 def _of_matter(arm: Manipulator) -> dict[str, Any]:
-    """Stiffness, mass and load number, as far as moduli and densities are known."""
+    """Stiffness, mass and load number, where moduli and densities are known."""
     moduli, densities = arm.section.modulus_faults(""), arm.section.density_faults("")
     ends = np.array([0.0, arm.length])
     return {
@@ -175,9 +174,7 @@ def design_warnings(arm: Manipulator) -> tuple[str, ...]:
         *scale_warnings(arm),
         *_overlaps(arm),
         *_chambers_outside(arm),
-        *_sharp_bending(arm),
-        *_large_activations(arm),
-        *_large_loads(arm),
+        *_beyond_theory(arm),
         *filter(None, [law_warning(arm)]),
     )
 
@@ -191,7 +188,7 @@ def _bending(arm: Manipulator) -> BendingRange:
         return BendingRange(unknown, unknown, unknown, Extreme(unknown, 0.0), exact=False)
 
 
-def _sharp_bending(arm: Manipulator) -> Iterator[str]:
+def _beyond_theory(arm: Manipulator) -> Iterator[str]:
     sharpest = _bending(arm).sharpest
     if sharpest.value >= 1:
         place = f"Z = {sharpest.station / arm.length:.2f} L"
@@ -199,18 +196,12 @@ def _sharp_bending(arm: Manipulator) -> Iterator[str]:
             f"bending reaches |κ| R2 = {sharpest.value:.2f} at {place}: the inner side would fold "
             "where it is 1 or more, and the theory ends there"
         )
-
-
-def _large_activations(arm: Manipulator) -> Iterator[str]:
     largest = max((float(np.abs(fiber.bounds).max()) for fiber in arm.fibers), default=0.0)
     if largest > 1:
         yield (
             f"activations reach |γ| = {largest:.3g}: above 1 a fiber would shorten by more than "
             "its length, so γ is a load on the matrix there, not a strain of the fiber"
         )
-
-
-def _large_loads(arm: Manipulator) -> Iterator[str]:
     if not load_number_faults(arm) and is_overloaded(arm):
         yield (
             f"the load number is {load_number(arm):.3g}: shapes under loads were verified up to "
@@ -255,10 +246,7 @@ def _chambers_outside(arm: Manipulator) -> Iterator[str]:
 
 
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
-    """Largest overlap of two sectors [rad] and the first Z where they overlap [m].
-
-    Between stations their angular distance is taken to be linear.
-    """
+    """Largest overlap of two sectors [rad] and the first Z where they overlap [m]."""
     pair = [first, second]
     shares = outline.acts[:, first] & outline.acts[:, second]
     if not shares.any():
@@ -271,15 +259,9 @@ def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float
     passes = (np.diff(np.sign(apart - 2 * np.pi * turns)) != 0) & (np.diff(turns) == 0)
     deepest = np.where(np.append(passes, False), extent, depth)
     deepest[~shares] = -np.inf
-    return float(deepest.max()), _first_contact(z, depth, shares)
-
-
-def _first_contact(z: Array, depth: Array, shares: NDArray[np.bool_]) -> float:
-    """Z at which the overlap begins [m]."""
-    here = shares & (depth > 0)
-    if not here.any():
-        return float(z[shares][0])
-    first = int(np.argmax(here))
-    if first == 0 or not shares[first - 1]:
-        return float(z[first])
-    return float(np.interp(0.0, depth[first - 1 : first + 1], z[first - 1 : first + 1]))
+    touching = shares & (depth > 0)
+    first = int(np.argmax(touching if touching.any() else shares))
+    begins = float(z[first])
+    if touching[first] and first > 0 and shares[first - 1]:
+        begins = float(np.interp(0.0, depth[first - 1 : first + 1], z[first - 1 : first + 1]))
+    return float(deepest.max()), begins

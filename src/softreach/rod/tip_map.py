@@ -1,7 +1,7 @@
 """The tip map: from activations to where the tip is, and everything else that a rod can say.
 
 Left of it there is physics and no sample; right of it there are millions of samples and no physics.
-Whoever asks where an arm can go asks a tip map, never the fields of the arm.
+Code that needs to know where an arm can go calls a tip map, and reads no field of the arm.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.support import parallel
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, as_floats
@@ -43,12 +43,12 @@ class TipStatus(IntEnum):
     STABLE = 0
     """A stable equilibrium."""
     UNSTABLE = 1
-    """An unstable equilibrium; its tip is NaN unless it is asked for."""
+    """An unstable equilibrium; its tip is NaN by default."""
     NO_EQUILIBRIUM = 2
     """There is no such arm: it would be shortened to nothing; the tip is NaN."""
     UNDECIDED = 3
-    """The branch was not followed to its end: nobody knows whether it leads there; the tip is
-    NaN."""
+    """The branch was not followed to its end, so that it is unknown whether it leads there; the tip
+    is NaN."""
     SNAPS = 4
     """The branch of stable postures from rest ends before: the arm snaps to another one; the tip is
     NaN."""
@@ -57,6 +57,10 @@ class TipStatus(IntEnum):
 def has_tip(status: Status) -> NDArray[np.bool_]:
     """Mask of each `TipStatus` that is an equilibrium's, stable or not."""
     return status <= TipStatus.UNSTABLE
+
+
+class InvalidLoads(InvalidInput):
+    """Loads under which an arm has no equilibrium, or none that can be computed."""
 
 
 class TipMap(ABC):
@@ -78,52 +82,29 @@ class TipMap(ABC):
         """The activations within bounds."""
 
     @abstractmethod
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-    ) -> None:
-        """Put tips, and what else is asked for, into place, on the calling thread.
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
+        """Put tips, and what else is wanted, into place, on the calling thread.
 
         Whoever calls it from several threads calls `prepare` before.
 
         Args:
             gamma: Checked activations, shape (n, bundles).
-            tips: r [m], shape (n, 3); NaN without an equilibrium.
-            slopes: ∂r/∂γ [m], shape (n, 3, bundles).
-            twists: (v, ω) of the tip frame per unit of each activation [m, rad], (n, 6, bundles).
-            status: `TipStatus`, shape (n,).
-            directions: Tangents d3 [-], shape (n, 3).
+            out: Arrays to be filled.
         """
 
-    @abstractmethod
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
+    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         """Arms at stations along them; each equilibrium is found once.
 
         Args:
             activations: Shape (n, bundles).
             framed: Z of centerline and directors [m], ascending; there may be none.
             strained: Z of curvature and extension [m], likewise.
-            status: `TipStatus`, shape (n,), which is put into place.
         """
+        raise NotImplementedError
 
-    def frames(
-        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
-    ) -> Frames:
-        """Centerline and directors at ascending stations Z [m]; `status` (n,) is put into place."""
-        shapes = self.shapes(activations, self.check_stations(stations), (), status)
-        return Frames(shapes.position, shapes.directors)
+    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+        return Frames(*self.shapes(activations, self.check_stations(stations), ())[:2])
 
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
         """Curvature and extension at stations Z [m], in any order."""
@@ -140,7 +121,7 @@ class TipMap(ABC):
         return self.arm.length
 
     pose: Base = UPRIGHT
-    """Pose of the clamped end in the frame in which the map tells places."""
+    """Pose of the clamped end in the frame of places."""
 
     @property
     def point(self) -> Marker | None:
@@ -149,7 +130,7 @@ class TipMap(ABC):
 
     @property
     def frame(self) -> Frame:
-        """The frame in which the map tells places and takes directions."""
+        """The frame of places and directions."""
         return "world"
 
     @lazy
@@ -164,7 +145,7 @@ class TipMap(ABC):
 
     @property
     def kinks(self) -> list[Array]:
-        """Values of each activation at which the map has a kink, whatever the others are."""
+        """Values of each activation at which the map has a kink, for all values of the others."""
         return [np.empty(0)] * self.box.bundles
 
     @property
@@ -288,7 +269,7 @@ class TipMap(ABC):
 
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""
-        return self._filled(activations)["tips"]
+        return self._filled(activations)[0]
 
     def status(self, activations: ArrayLike) -> Status:
         """`TipStatus` of each activation, shape (n,)."""
@@ -296,13 +277,11 @@ class TipMap(ABC):
 
     def tips_and_status(self, activations: ArrayLike) -> tuple[Array, Status]:
         """Tips [m], shape (n, 3), NaN without an equilibrium, and their `TipStatus`, (n,)."""
-        filled = self._filled(activations, "status")
-        return filled["tips"], filled["status"]
+        return self._filled(activations, "status")
 
     def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
-        filled = self._filled(activations, "slopes")
-        return filled["tips"], filled["slopes"]
+        return self._filled(activations, "slopes")
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation.
@@ -310,22 +289,22 @@ class TipMap(ABC):
         Returns:
             Tips, shape (n, 3); (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
         """
-        filled = self._filled(activations, "twists")
-        return filled["tips"], filled["twists"]
+        return self._filled(activations, "twists")
 
     def tip_motions(self, activations: ArrayLike) -> TipMotions:
         """Positions and directions of the tips with their derivatives."""
-        filled = self._filled(activations, "slopes", "twists", "directions")
-        rotations = filled["twists"][:, 3:]
-        return TipMotions(filled["tips"], filled["slopes"], filled["directions"], rotations)
+        tips, slopes, twists, directions = self._filled(
+            activations, "slopes", "twists", "directions"
+        )
+        return TipMotions(tips, slopes, directions, twists[:, 3:])
 
     def tip_directions(self, activations: ArrayLike) -> Array:
         """Tangents d3 of the tips [-], shape (n, 3)."""
         end = self.length if self.point is None else self.point.station_at("station", self.length)
         return np.ascontiguousarray(self.frames(activations, [end]).directors[:, 0, 2])
 
-    def _filled(self, activations: ArrayLike, *wanted: str) -> dict[str, Any]:
-        """Results of `fill` by name: tips and what else is wanted, on all threads."""
+    def _filled(self, activations: ArrayLike, *wanted: str) -> tuple[Any, ...]:
+        """Tips, and what else of `TipOutputs` is wanted, on all threads."""
         gamma, lost = self.with_arms(self.box.check(activations))
         n, m = gamma.shape
         room: dict[str, Any] = {"tips": np.empty((n, 3))}
@@ -337,11 +316,11 @@ class TipMap(ABC):
             size //= 16 if self.supports_unstable else 8  # an equilibrium takes a search
         self.prepare()
         parallel.run(
-            partial(self.fill, gamma[b], **{name: values[b] for name, values in room.items()})
+            partial(self.fill, gamma[b], TipOutputs(**{name: room[name][b] for name in room}))
             for b in parallel.blocks(n, size)
         )
         drop(lost, room.get("status"), *(room[name] for name in room if name != "status"))
-        return room
+        return tuple(room.values())
 
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""
@@ -418,6 +397,23 @@ class Shapes(NamedTuple):
     """u in the directors, per unit of activated arclength [1/m], (n, strained station, 3)."""
     extension: Array
     """ζ [-], shape (n, strained station)."""
+    status: Status
+    """`TipStatus`, shape (n,)."""
+
+
+class TipOutputs(NamedTuple):
+    """Arrays for n activations that a tip map fills; None for what is not wanted."""
+
+    tips: Array
+    """r [m], shape (n, 3); NaN without an equilibrium."""
+    slopes: Array | None = None
+    """∂r/∂γ [m], shape (n, 3, bundles)."""
+    twists: Array | None = None
+    """(v, ω) of the tip frame per unit of each activation [m, rad], shape (n, 6, bundles)."""
+    status: Status | None = None
+    """`TipStatus`, shape (n,)."""
+    directions: Array | None = None
+    """Tangents d3 [-], shape (n, 3)."""
 
 
 class TipMotions(NamedTuple):
@@ -434,7 +430,7 @@ class TipMotions(NamedTuple):
 
 
 def drop(lost: NDArray[np.intp], status: Status | None, *values: Array | None) -> None:
-    """Make rows NaN, with the status `NO_EQUILIBRIUM` where it is asked for."""
+    """Make rows NaN, and give them the status `NO_EQUILIBRIUM`."""
     for some in values:
         if some is not None:
             some[lost] = np.nan
@@ -471,7 +467,7 @@ def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> 
     return f"none of {tried} activations tried has {sought}"
 
 
-def no_equilibrium(tried: int, sought: str = "a stable equilibrium") -> InvalidInput:
+def no_equilibrium(tried: int, sought: str = "a stable equilibrium") -> InvalidLoads:
     """Error of loads under which none of so many activations has what is sought."""
     missing = no_equilibrium_message(tried, sought)
-    return InvalidInput("loads", missing, "such that some have one", "lighten the load")
+    return InvalidLoads("loads", missing, "such that some have one", "lighten the load")

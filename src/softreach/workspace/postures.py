@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import ArmMap
-from softreach.rod.tip_map import Shapes, Status, TipMap
+from softreach.rod.tip_map import TipMap, TipOutputs
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 from softreach.workspace.grid import components, cube_grid, share_of_box
@@ -86,41 +85,23 @@ class AllPostures(TipMap):
         for tip_map in (self.from_rest, *(sheet.tip_map for sheet in self.sheets)):
             tip_map.prepare()
 
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-    ) -> None:
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
         """Put tips, slopes and status into place; the others are not known."""
-        assert twists is None
-        assert directions is None
+        assert out.twists is None
+        assert out.directions is None
         number = np.rint(gamma[:, -1])
         for k, tip_map in enumerate([self.from_rest, *(sheet.tip_map for sheet in self.sheets)]):
             if not len(rows := np.flatnonzero(number == k)):
                 continue
             inner = np.ascontiguousarray(gamma[rows, :-1])
             at, kept = np.empty((len(rows), 3)), np.empty(len(rows), np.int8)
-            along = None if slopes is None else np.empty((len(rows), 3, inner.shape[1]))
-            tip_map.fill(inner, at, along, status=kept)
-            tips[rows] = at
-            if slopes is not None and along is not None:
-                slopes[rows] = np.pad(along, ((0, 0), (0, 0), (0, 1)))
-            if status is not None:
-                status[rows] = kept
-
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
-        raise NotImplementedError
+            along = None if out.slopes is None else np.empty((len(rows), 3, inner.shape[1]))
+            tip_map.fill(inner, TipOutputs(at, along, status=kept))
+            out.tips[rows] = at
+            if out.slopes is not None and along is not None:
+                out.slopes[rows] = np.pad(along, ((0, 0), (0, 0), (0, 1)))
+            if out.status is not None:
+                out.status[rows] = kept
 
 
 def all_postures(tip_map: TipMap, cells: int | None = None) -> AllPostures | None:

@@ -17,7 +17,7 @@ from softreach.kernels.box.bounded_descent import (
 )
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
-from softreach.rod.tip_map import BLOCK, TipMap, no_equilibrium
+from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs, no_equilibrium
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, rows
 from softreach.support.progress import Progress, silent
@@ -215,7 +215,7 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
         running.trial[new], running.damping[new] = nearest.gamma[old], FIRST_DAMPING
         n, begun = n + more, begun + more
-        tip_map.fill(running.trial[:n], tips[:n], ahead[:n])
+        tip_map.fill(running.trial[:n], TipOutputs(tips[:n], ahead[:n]))
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
         n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)

@@ -8,7 +8,6 @@ odd.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,7 +18,6 @@ from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.sphere_maps import (
-    Map,
     Roots,
     icosphere,
     is_axisymmetric,
@@ -40,8 +38,8 @@ from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map, of_tip, with_unstable
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import Shapes, TipMap, TipStatus, has_tip
-from softreach.support.arrays import Array, Mask, as_floats
+from softreach.rod.tip_map import Frames, InvalidLoads, Strains, TipMap, TipStatus
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, counted, warn
 
 if TYPE_CHECKING:
@@ -92,17 +90,18 @@ class AllEquilibria:
             stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
-        if self.solver is None or not isinstance(loaded := rod.rod, LoadedRod):
+        if self.solver is None:
             return configuration(rod, gamma, stations)
         z, inner = stations_along(rod, stations), rod.inputs.activations(gamma)
         together = np.union1d(z, marker_sections(rod.arm))
         shapes = self.solver.shapes_facing(inner, self.directions, together)[0]
         frames = rod.placed(shapes.frames)
-        strains = loaded.strains_under(inner, together, shapes)
+        strains = self.solver.strains_under(inner, together, shapes)
         places = marked(rod.arm, together, frames)
         rows = np.searchsorted(together, z)
-        shapes = Shapes(*(values[:, rows] for values in (*frames, *strains)))
-        return shape_dataset(rod, gamma, z, shapes, marker_position=places)
+        frames = Frames(*(values[:, rows] for values in frames))
+        strains = Strains(*(values[:, rows] for values in strains))
+        return shape_dataset(rod, gamma, z, frames, strains, marker_position=places)
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `equilibrium` and `axis`."""
@@ -181,37 +180,30 @@ def equilibria(
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
     """
-    asked = of_tip(as_tip_map(arm, tol, warn=False))  # the degree tells whether any is missing
-    gamma = asked.inputs.every(_one(asked, activations))
-    rod = with_unstable(all_inputs(asked))
+    whole = of_tip(as_tip_map(arm, tol, warn=False))  # the degree says whether any is missing
+    gamma = whole.check_activations("activations", activations)
+    if len(gamma) != 1:
+        allowed = f"({whole.box.bundles},) or (1, {whole.box.bundles}): one activation at a time"
+        raise InvalidInput("activations.shape", gamma.shape, allowed)
+    gamma, rod = whole.inputs.every(gamma), with_unstable(all_inputs(whole))
     if not rod.supports_unstable:
-        return _one_of(rod, gamma, np.full((1, 3), np.nan), np.ones(1), complete=True)
+        return _single(rod, gamma, np.full((1, 3), np.nan), np.ones(1), complete=True)
     loaded, at = rod.rod, rod.inputs.activations(gamma)
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     if not loaded.tables.one_direction:
-        crossing = ", ".join(_crossing(loaded.loads, loaded.tables.axes[0]))
+        crossing = ", ".join(_crossing(loaded.tables.loads, loaded.tables.axes[0]))
         allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
-        raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
+        raise InvalidLoads("loads", crossing, allowed, "ask the tip map for the branch alone")
     posture = loaded.equilibria(at)
     if loaded.tables.phase.entire > SHOT_AT_ONCE:
         warn("the posture alone is listed: the loads are too heavy for a search of all others")
-        return _one_of(rod, gamma, posture.frame[:, :3], posture.margin, complete=False)
-    known = posture.frame[has_tip(posture.status), :3]  # as the tip sees it
+        return _single(rod, gamma, posture.frame[:, :3], posture.margin, complete=False)
+    known = posture.frame[posture.is_found, :3]  # as the tip sees it
     solver = Solver(loaded.tables.in_one_segment, loaded.unloaded_steps, rod.tol)
     solver = _resolving(solver, at)
     solver, roots = _accurate(solver, at, _search(solver, at, known))
-    result = _judged(rod, solver, at, roots, known)
-    return replace(result, activation=gamma[0])
-
-
-def _one(rod: TipMap, activations: ArrayLike) -> Array:
-    gamma = as_floats("activations", activations)
-    gamma = rod.check_activations("activations", gamma[None] if gamma.ndim == 1 else gamma)
-    if len(gamma) != 1:
-        allowed = f"({rod.box.bundles},) or (1, {rod.box.bundles}): one activation at a time"
-        raise InvalidInput("activations.shape", gamma.shape, allowed)
-    return gamma
+    return replace(_judged(rod, solver, at, roots, known), activation=gamma[0])
 
 
 def _crossing(loads: Loads, direction: Array) -> list[str]:
@@ -231,7 +223,7 @@ def _crossing(loads: Loads, direction: Array) -> list[str]:
     ]
 
 
-def _one_of(
+def _single(
     rod: ArmMap, gamma: Array, directions: Array, margin: Array, *, complete: bool
 ) -> AllEquilibria:
     return AllEquilibria(
@@ -250,34 +242,27 @@ def _one_of(
 
 
 def _search(solver: Solver, gamma: Array, known: Array) -> _Roots:
-    """All of them; the known ones are tried first."""
+    """All of them, searched more finely if the degree is not 1; the known ones are tried first."""
     image, axis = solver.base_map(gamma), solver.tables.axes[0]
     if is_axisymmetric(image, axis, SYMMETRIC):
         rings = pole_rings(image, axis, known[0] if len(known) else axis)
         directions = np.concatenate([axis[None], rings.points])
         is_ring = np.arange(len(directions)) > 0
         return _Roots(directions, np.append(1, rings.signs), is_ring, rings.complete)
-    return _isolated(image, axis, known, _MOST_WALKED // solver.steps)
+    most, tries = _MOST_WALKED // solver.steps, list[_Roots]()
+    for levels, caution in _SEARCHES:
+        roots, was_cut = sphere_roots(
+            image, axis, levels=levels, caution=caution, starts=known, most=most
+        )
+        tries.append(_isolated(roots, complete=was_cut))
+        if tries[-1].complete:
+            break
+    return tries[-1]
 
 
-def _isolated(
-    image: Map,
-    axis: Array,
-    known: Array,
-    most: int,
-    searches: Sequence[tuple[int, float]] = _SEARCHES,
-) -> _Roots:
-    """Those of an arm that is not axisymmetric, searched more finely if the degree is not 1."""
-    (levels, caution), *finer = searches
-    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known, most=most)
-    complete = cut and int(np.sign(roots.determinants).sum()) == 1
-    if complete or not finer:
-        return _of_roots(roots, complete=complete)
-    return _isolated(image, axis, known, most, finer)
-
-
-def _of_roots(roots: Roots, *, complete: bool) -> _Roots:
+def _isolated(roots: Roots, *, complete: bool) -> _Roots:
     signs = np.sign(roots.determinants).astype(np.int8)
+    complete = complete and int(signs.sum()) == 1
     return _Roots(roots.points, signs, np.zeros(len(signs), bool), complete)
 
 
@@ -294,23 +279,19 @@ def _resolving(solver: Solver, gamma: Array) -> Solver:
 
 
 def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roots]:
-    """With steps halved until no tip moves by more than half of the tolerance.
-
-    Those to begin with are enough without loads. The steps of the tip map are those of the branch
-    that it follows anywhere in the box: others may bend more.
-    """
+    """With steps halved until no tip moves by half of the tolerance."""
     allowed = 0.5 * solver.tol * solver.tables.arm.length
     most = max(_MOST_STEPS, 2 * enough_for_all_breaks(solver.tables.arm))
     while 2 * solver.steps <= most:
         finer = solver.judge()
         again = _again(finer, gamma, roots)
-        if len(again.directions) == len(roots.directions):
-            apart = _tips(finer, gamma, again) - _tips(solver, gamma, roots)
+        if len(again.directions) != len(roots.directions):
+            again = _search(finer, gamma, roots.directions)
+        else:
+            apart = _tips(finer, gamma, again)[0] - _tips(solver, gamma, roots)[0]
             if np.linalg.norm(apart, axis=1).max(initial=0.0) <= allowed:
                 return solver, roots
-            solver, roots = finer, again
-        else:
-            solver, roots = finer, _search(finer, gamma, roots.directions)
+        solver, roots = finer, again
     warn(f"tips of some equilibria miss tol = {solver.tol:g}")
     return solver, roots
 
@@ -318,26 +299,27 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
 def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
     if roots.is_ring.any():
         return _search(solver, gamma, roots.directions[1:])
-    image, axis = solver.base_map(gamma), solver.tables.axes[0]
-    return _of_roots(polished_roots(image, axis, roots.directions), complete=roots.complete)
+    polished = polished_roots(solver.base_map(gamma), solver.tables.axes[0], roots.directions)
+    return _isolated(polished, complete=roots.complete)
 
 
-def _tips(solver: Solver, gamma: Array, roots: _Roots) -> Array:
+def _tips(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Array, Array]:
+    """Tips in the frame of the base, and margins."""
     many = np.repeat(gamma, len(roots.directions), axis=0)
     stations = np.array([solver.tables.arm.length])
-    return solver.shapes_facing(many, roots.directions, stations)[0].frames.position[:, 0]
+    shapes, margin = solver.shapes_facing(many, roots.directions, stations)
+    return shapes.position[:, 0], margin
 
 
 def _judged(
     rod: ArmMap, solver: Solver, gamma: Array, roots: _Roots, known: Array
 ) -> AllEquilibria:
-    axis, many = solver.tables.axes[0], np.repeat(gamma, len(roots.directions), axis=0)
-    shapes, margin = solver.shapes_facing(many, roots.directions, np.array([rod.length]))
+    tips, margin = _tips(solver, gamma, roots)
     margin = np.where(roots.is_ring & (margin > -NEUTRAL), 0.0, margin)
     stable = (roots.signs > 0) & np.where(roots.is_ring, margin == 0.0, margin > 0.0)
-    places = np.round(shapes.frames.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
+    places = np.round(tips[:, ::-1] / rod.length, 6)  # part mirror images
     order = np.lexsort((*places.T, -np.round(margin, 6), ~stable))
-    followed = _nearest(roots, known, axis)
+    followed = _nearest(roots, known, solver.tables.axes[0])
     complete = roots.complete and (followed is not None or not len(known))
     if not complete:
         total = int(roots.signs[~roots.is_ring].sum())
@@ -346,7 +328,7 @@ def _judged(
         rod=rod,
         solver=solver,
         activation=gamma[0],
-        tips=rod.pose.to_world(shapes.frames.position[order, 0]),
+        tips=rod.pose.to_world(tips[order]),
         status=np.where(stable, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)[order],
         margin=margin[order],
         directions=roots.directions[order],

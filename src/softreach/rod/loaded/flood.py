@@ -6,20 +6,18 @@ tip, and where the equilibrium is stable; otherwise it is tried at half its leng
 
 The grid over the activation box is flooded from rest, node after node along its edges, each step a
 branch that is followed. Neighbors that are not on one branch are cut: between them the arm snaps,
-or leans to either side. Cells without a cut tell where to begin within them.
+or leans to either side. In cells without a cut, their nodes give the frames to begin from.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softreach.kernels.loaded.grid_values import UNEVEN, interpolate
-from softreach.rod.activation_box import ActivationBox
-from softreach.rod.loaded.shooting import ALL_LOADS, Equilibria, turn_between, units
-from softreach.rod.loaded.solver import Solver
+from softreach.rod.inputs import ActivationBox
+from softreach.rod.loaded.solver import ALL_LOADS, Equilibria, Solver, turn_between, units
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 
@@ -31,11 +29,11 @@ _SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
 CUT = 1e6
 """Roughness of cells that are cut."""
-PARTS = 64  # of a line, at which it is asked for cuts
+PARTS = 64  # of a line, at the ends of which cuts are looked for
 
 
 class Followed(NamedTuple):
-    """Branches as far as they were followed."""
+    """Branches up to where they were followed."""
 
     last: Equilibria
     """The last equilibrium; undecided where it is not that of the end of the way."""
@@ -78,13 +76,13 @@ def follow(
         h = to - place[rows]
         guess = units(last.frame[rows] + h[:, None] * slopes[rows])
         gamma = begin[rows] + to[:, None] * (end[rows] - begin[rows])
-        found = solver.search(gamma, guess, ALL_LOADS if hangs else to)
-        missed = found.tips - last.tips[rows] - h[:, None] * moves[rows]
-        good, growth = _judged(solver, found, guess, missed, is_first[rows])
-        on, h_on, found = rows[good], h[good, None], found.of(good)
-        slopes[on] = (found.frame - last.frame[on]) / h_on
-        moves[on] = (found.tips - last.tips[on]) / h_on
-        last.put(on, found)
+        new = solver.search(gamma, guess, ALL_LOADS if hangs else to)
+        missed = new.tips - last.tips[rows] - h[:, None] * moves[rows]
+        good, growth = _judged(solver, new, guess, missed, is_first[rows])
+        on, h_on, new = rows[good], h[good, None], new.of(good)
+        slopes[on] = (new.frame - last.frame[on]) / h_on
+        moves[on] = (new.tips - last.tips[on]) / h_on
+        last.put(on, new)
         place[on], is_first[on] = to[good], False
         step[rows] = h * growth
         ended[rows] = ~good & (step[rows] < shortest)
@@ -92,30 +90,109 @@ def follow(
 
 
 def _judged(
-    solver: Solver, found: Equilibria, guess: Array, missed: Array, is_first: Mask
+    solver: Solver, new: Equilibria, guess: Array, missed: Array, is_first: Mask
 ) -> tuple[Mask, Array]:
     """Mask of steps that count, and what the lengths of the next ones are multiplied by."""
     allowed = _CORRECTION if solver.tables.segments == 1 else _CORRECTION_OF_NODES
     with np.errstate(all="ignore"):  # of what is not found
         off = np.linalg.norm(missed, axis=1) / solver.tables.arm.length
-        turn = turn_between(found.frame, guess)
+        turn = turn_between(new.frame, guess)
         change = np.maximum(turn, np.where(is_first, 0.5, 1.0) * _TIP * off)
         wanted = 0.5 * (np.sqrt(1.0 + 4.0 * allowed / change) - 1.0)  # half of what is allowed
-    good = found.is_stable & (change < np.where(is_first, 2.0, 1.0) * allowed)
+    good = new.is_stable & (change < np.where(is_first, 2.0, 1.0) * allowed)
     shorter = np.where(wanted > 0.1, 0.4, 0.25)
     return good, np.where(good, np.clip(wanted, 0.5, 4.0), shorter)
 
 
-@dataclass(frozen=True, eq=False)
 class Flood:
-    """The flooded grid."""
+    """The activation box, flooded from the posture at rest over an even grid."""
 
-    box: ActivationBox
-    sizes: tuple[int, ...]
     held: Equilibria
     """Postures of the nodes, the last bundle varying fastest; not found where none is held."""
     is_whole: Mask
     """True for cells whose edges are all on one branch, shape of the cells."""
+
+    def __init__(
+        self,
+        solver: Solver,
+        box: ActivationBox,
+        sizes: tuple[int, ...],
+        rest: Array,
+        start: Equilibria,
+    ) -> None:
+        """Flood the grid.
+
+        Args:
+            solver: That of the twin.
+            box: Bounds of the activations.
+            sizes: Nodes for every bundle.
+            rest: Activations at rest, shape (1, bundles).
+            start: The posture there.
+        """
+        self.solver, self.box, self.sizes, self.rest = solver, box, sizes, rest
+        ends = zip(box.low, box.high, sizes, strict=True)
+        axes = np.meshgrid(*(np.linspace(*end) for end in ends), indexing="ij")
+        self.gamma = np.stack(axes, axis=-1).reshape(-1, box.bundles)
+        self.held = solver.empty(len(self.gamma))
+        self.linked = np.zeros((len(sizes), len(self.gamma)), bool)  # to the next along each axis
+        away = (((self.gamma - rest) / box.scales) ** 2).sum(axis=1)
+        nearest = np.array([away.argmin()])
+        self.held.put(nearest, follow(solver, rest, self.gamma[nearest], start).last)
+        front = nearest[self.held.is_found[nearest]]
+        while len(front):
+            front = self._wave(front)
+        self._link()
+
+    def _wave(self, front: Index) -> Index:
+        """Follow the branches from newly known nodes to all neighbors; the nodes then known."""
+        axes, before = len(self.sizes), self.held.is_found
+        origin, axis = np.tile(front, 2 * axes), np.repeat(np.arange(axes), 2 * len(front))
+        way = np.tile(np.repeat([-1, 1], len(front)), axes)
+        to, inside = neighbors(self.sizes, origin, axis, way)
+        left = np.stack([origin, to, axis, way])[:, inside]
+        at, line = ((self.gamma[nodes] - self.rest) / self.box.scales for nodes in left[:2])
+        share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
+        off = at - np.clip(share, 0.0, 1.0)[:, None] * line  # near the lines from rest first
+        left = left[:, np.argsort(np.sqrt((off * off).sum(axis=1)), kind="stable")]
+        while True:
+            left = left[:, ~self.held.is_found[left[1]]]
+            _, first = np.unique(left[1], return_index=True)
+            if not len(first):
+                break
+            self._grow(*left[:, first])
+            left = np.delete(left, first, axis=1)
+        return np.flatnonzero(self.held.is_found & ~before)
+
+    def _grow(self, origin: Index, to: Index, axis: Index, way: Index) -> None:
+        back, inside = neighbors(self.sizes, origin, axis, -way)
+        is_known = (inside & self.held.is_found[back])[:, None]
+        slopes = np.where(is_known, self.held.frame[origin] - self.held.frame[back], 0.0)
+        ends = self.gamma[origin], self.gamma[to]
+        new = follow(self.solver, *ends, self.held.of(origin), slopes).last
+        good = new.is_found
+        self.held.put(to[good], new.of(good))
+        lower = np.where(way > 0, origin, to)
+        self.linked[axis[good], lower[good]] = True
+
+    def _link(self) -> None:
+        """Tell edges on one branch from cuts: smooth ones at once, the others by following them."""
+        length = self.solver.tables.arm.length
+        frames, tips = self.held.frame.reshape(*self.sizes, -1), self.held.tips / length
+        whole = over_cells(self.held.is_found.reshape(self.sizes), np.logical_and)
+        for axis, size in enumerate(self.sizes):
+            if size < 2:
+                continue
+            low, high = edges_along(self.sizes, axis)
+            both = self.held.is_found[low] & self.held.is_found[high]
+            smooth = smooth_edges(frames, tips.reshape(*self.sizes, 3), axis).ravel()
+            self.linked[axis, low[both & smooth]] = True
+            both &= ~self.linked[axis, low]
+            low, high = low[both], high[both]
+            new = follow(self.solver, self.gamma[low], self.gamma[high], self.held.of(low)).last
+            self.linked[axis, low[are_same(new, self.held.of(high), length)]] = True
+            edges = np.delete(self.linked[axis].reshape(self.sizes), -1, axis)
+            whole &= over_cells(edges, np.logical_and, axis)
+        self.is_whole = whole
 
     def at(self, gamma: Array) -> tuple[Array, Array]:
         """Frames to begin from, and the roughness of cells; `CUT` where no frame is known."""
@@ -153,130 +230,44 @@ class Flood:
 
     def is_uncut(self, gamma: Array) -> Mask:
         """Mask of activations in cells whose edges are all on one branch."""
-        return self.is_whole[self.cells_at(gamma)]
+        return self.is_whole[self._cells_at(gamma)]
 
     def differ(self, other: Flood, gamma: Array) -> Mask:
         """Mask of activations in cells at a corner of which two floods hold different postures."""
         length = np.ptp(self.held.tips[self.held.is_found], axis=0).max(initial=0.0)
         differ = ~are_same(self.held, other.held, length).reshape(self.sizes)
-        return over_cells(differ, np.logical_or)[self.cells_at(gamma)]
+        return over_cells(differ, np.logical_or)[self._cells_at(gamma)]
 
-    def clear(self, rest: Array, gamma: Array) -> Array:
+    def clear(self, gamma: Array) -> Array:
         """Shares of the lines from rest up to which they meet no cut, shape (n,)."""
         t = np.arange(1, PARTS + 1)[:, None, None] / PARTS
-        along = rest + t * (gamma - rest)
+        along = self.rest + t * (gamma - self.rest)
         whole = self.is_uncut(along.reshape(-1, gamma.shape[1])).reshape(PARTS, -1)
         return np.logical_and.accumulate(whole).sum(axis=0) / PARTS
 
     def _in_cells(self, gamma: Array) -> Array:
         return (gamma - self.box.low) * ((np.array(self.sizes) - 1) / self.box.scales)
 
-    def cells_at(self, gamma: Array) -> tuple[Index, ...]:
-        """Indices of the cells that activations are in."""
+    def _cells_at(self, gamma: Array) -> tuple[Index, ...]:
         cells = np.floor(self._in_cells(gamma)).astype(int)
         return tuple(np.clip(cells, 0, np.maximum(np.array(self.sizes) - 2, 0)).T)
 
 
-class Flooding:
-    """The flooding of a grid.
+def neighbors(
+    sizes: tuple[int, ...], nodes: Index, axis: Index, way: Index | int
+) -> tuple[Index, Mask]:
+    """Nodes of a grid one step down or up an axis, and mask of those that are in the grid."""
+    place = np.stack(np.unravel_index(nodes, sizes))
+    moved = place[axis, np.arange(len(nodes))] + way
+    place[axis, np.arange(len(nodes))] = moved
+    inside = (moved >= 0) & (moved < np.array(sizes)[axis])
+    return np.ravel_multi_index(tuple(place), sizes, mode="clip").astype(np.int64), inside
 
-    Args:
-        solver: That of the twin.
-        box: Bounds of the activations.
-        sizes: Nodes for every bundle.
-    """
 
-    def __init__(self, solver: Solver, box: ActivationBox, sizes: tuple[int, ...]) -> None:
-        self.solver, self.box, self.sizes = solver, box, sizes
-        ends = zip(box.low, box.high, sizes, strict=True)
-        axes = np.meshgrid(*(np.linspace(*end) for end in ends), indexing="ij")
-        self.gamma = np.stack(axes, axis=-1).reshape(-1, box.bundles)
-        self.held = solver.empty(len(self.gamma))
-        self.numbers = np.arange(len(self.gamma)).reshape(sizes)
-        self.linked = np.zeros((len(sizes), len(self.gamma)), bool)  # to the next along each axis
-
-    def run(self, rest: Array, start: Equilibria) -> Flood:
-        """The grid, flooded from a posture at rest, whose activations have shape (1, bundles)."""
-        self.rest = rest
-        away = (((self.gamma - rest) / self.box.scales) ** 2).sum(axis=1)
-        nearest = np.array([away.argmin()])
-        self.held.put(nearest, follow(self.solver, rest, self.gamma[nearest], start).last)
-        front = nearest[self.held.is_found[nearest]]
-        while len(front):
-            front = self._wave(front)
-        self._link()
-        return Flood(self.box, self.sizes, self.held, self._whole_cells())
-
-    def _neighbors(self, nodes: Index, axis: int, way: int) -> tuple[Index, Mask]:
-        """Nodes next to some along an axis, and mask of those that are in the grid."""
-        place = list(np.unravel_index(nodes, self.sizes))
-        place[axis] = place[axis] + way
-        inside = (place[axis] >= 0) & (place[axis] < self.sizes[axis])
-        place[axis] = np.clip(place[axis], 0, self.sizes[axis] - 1)
-        return self.numbers[tuple(place)], inside
-
-    def _wave(self, front: Index) -> Index:
-        """Follow the branches from newly known nodes to all neighbors; the nodes then known."""
-        edges = []
-        for axis in range(len(self.sizes)):
-            for way in (-1, 1):
-                to, inside = self._neighbors(front, axis, way)
-                edge = front, to, np.full_like(to, axis), np.full_like(to, way)
-                edges.append(np.stack(edge)[:, inside])
-        left, before = np.concatenate(edges, axis=1), self.held.is_found
-        at, line = ((self.gamma[nodes] - self.rest) / self.box.scales for nodes in left[:2])
-        share = (at * line).sum(axis=1) / np.maximum((line * line).sum(axis=1), 1e-300)
-        off = at - np.clip(share, 0.0, 1.0)[:, None] * line  # near the lines from rest first
-        left = left[:, np.argsort(np.sqrt((off * off).sum(axis=1)), kind="stable")]
-        while True:
-            left = left[:, ~self.held.is_found[left[1]]]
-            _, first = np.unique(left[1], return_index=True)
-            if not len(first):
-                break
-            self._grow(*left[:, first])
-            left = np.delete(left, first, axis=1)
-        return np.flatnonzero(self.held.is_found & ~before)
-
-    def _grow(self, origin: Index, to: Index, axis: Index, way: Index) -> None:
-        known, frame = self.held.is_found, self.held.frame
-        slopes = np.zeros_like(frame[origin])
-        for k in range(len(self.sizes)):
-            for sense in (-1, 1):
-                rows = np.flatnonzero((axis == k) & (way == sense))
-                back, inside = self._neighbors(origin[rows], k, -sense)
-                ahead = frame[origin[rows]] - frame[back]
-                slopes[rows] = np.where((inside & known[back])[:, None], ahead, 0.0)
-        ends = self.gamma[origin], self.gamma[to]
-        found = follow(self.solver, *ends, self.held.of(origin), slopes).last
-        good = found.is_found
-        self.held.put(to[good], found.of(good))
-        lower = np.where(way > 0, origin, to)
-        self.linked[axis[good], lower[good]] = True
-
-    def _link(self) -> None:
-        """Tell edges on one branch from cuts: smooth ones at once, the others by following them."""
-        length = self.solver.tables.arm.length
-        frames, tips = self.held.frame.reshape(*self.sizes, -1), self.held.tips / length
-        for axis, size in enumerate(self.sizes):
-            if size < 2:
-                continue
-            low, high = (np.delete(self.numbers, end, axis).ravel() for end in (-1, 0))
-            both = self.held.is_found[low] & self.held.is_found[high]
-            smooth = smooth_edges(frames, tips.reshape(*self.sizes, 3), axis).ravel()
-            self.linked[axis, low[both & smooth]] = True
-            both &= ~self.linked[axis, low]
-            low, high = low[both], high[both]
-            found = follow(self.solver, self.gamma[low], self.gamma[high], self.held.of(low)).last
-            self.linked[axis, low[are_same(found, self.held.of(high), length)]] = True
-
-    def _whole_cells(self) -> Mask:
-        """Mask of cells all of whose corners are known, and whose edges are all linked."""
-        whole = over_cells(self.held.is_found.reshape(self.sizes), np.logical_and)
-        for axis, size in enumerate(self.sizes):
-            if size > 1:
-                edges = np.delete(self.linked[axis].reshape(self.sizes), -1, axis)
-                whole &= over_cells(edges, np.logical_and, axis)
-        return whole
+def edges_along(sizes: tuple[int, ...], axis: int) -> tuple[Index, Index]:
+    """Nodes at the lower and at the upper ends of all edges of a grid along an axis."""
+    numbers = np.arange(np.prod(sizes)).reshape(sizes)
+    return np.delete(numbers, -1, axis).ravel(), np.delete(numbers, 0, axis).ravel()
 
 
 def over_cells(values: Any, combine: np.ufunc, along: int | None = None) -> Any:

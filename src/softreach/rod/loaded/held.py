@@ -13,10 +13,9 @@ from functools import partial
 import numpy as np
 
 from softreach.kernels.lanes import LANES
-from softreach.rod.loaded.flood import are_same, follow, smooth_edges
+from softreach.rod.loaded.flood import Flood, are_same, edges_along, follow, neighbors, smooth_edges
 from softreach.rod.loaded.postures import Postures, polished
-from softreach.rod.loaded.shooting import Equilibria
-from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.solver import Equilibria, Solver
 from softreach.rod.tip_map import Held
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined
@@ -41,7 +40,9 @@ def held_over(
     grid = _Grid(postures.solver, gamma, sizes)
     grid.fill(postures, grid.has_arm)
     is_doubled = grid.states[:, 1] >= 0
-    beside = grid.has_arm & postures.differ(mirrored, gamma)
+    beside = grid.has_arm
+    if postures.flood is not None and mirrored.flood is not None:
+        beside = beside & postures.flood.differ(mirrored.flood, gamma)
     if beside.any():
         grid.fill(mirrored, beside)
     return grid.held(is_doubled, points)
@@ -57,7 +58,7 @@ class _Grid:
         self.states = np.full((len(gamma), _MOST), _NONE)
         """Numbers of the postures of each node."""
         self.node = np.empty(0, int)
-        self.found = solver.empty(0)
+        self.equilibria = solver.empty(0)
         self.next = np.empty((0, 2 * len(sizes)), int)
         """Postures on the same branch at the next node down and up each axis."""
         self.links = list[Index]()
@@ -67,20 +68,21 @@ class _Grid:
 
     def fill(self, postures: Postures, where: Mask) -> None:
         """Find the postures that are connected with those at some nodes, on the twin of a side."""
-        first, uncut = len(self.node), self.has_arm.copy()
-        uncut[uncut] = postures.is_uncut(self.gamma[uncut])
+        first, uncut = len(self.node), self.has_arm & (postures.flood is not None)
+        if postures.flood is not None:
+            uncut[uncut] = postures.flood.is_uncut(self.gamma[uncut])
         by_lines = not uncut.any()
         if by_lines:
             place = np.unravel_index(np.arange(len(where)), self.sizes)
             uncut = (np.stack(place) % _EVERY == 0).all(axis=0)
         nodes = np.flatnonzero(where & uncut)
-        known = postures.find_all(self.gamma[nodes], by_lines=by_lines)
+        known = postures.find(self.gamma[nodes], by_lines=by_lines)
         good = known.is_stable
         at = np.full(len(self.gamma), _NONE)
         at[nodes[good]] = self._put(nodes[good], known.of(good))
         if not len(self.node):
             return
-        self._link_smooth(at, postures)
+        self._link_smooth(at, postures.flood)
         front = np.arange(first, len(self.node))
         while len(front):
             front = self._wave(postures.twin, front)
@@ -90,59 +92,57 @@ class _Grid:
         none = np.empty((0, 2), int)
         links, ends = (np.concatenate([none, *pairs]) for pairs in (self.links, self.ends))
         end_gamma = np.concatenate([self.gamma[:0], *self.end_gamma])
-        end_postures = joined([self.found.of(slice(0)), *self.end_postures])
-        tips, end_tips = points(self.gamma[self.node], self.found), points(end_gamma, end_postures)
-        return Held(self.node, tips, links, ends, end_tips, is_doubled, self.found.frame)
+        end_postures = joined([self.equilibria.of(slice(0)), *self.end_postures])
+        tips, end_tips = (
+            points(self.gamma[self.node], self.equilibria),
+            points(end_gamma, end_postures),
+        )
+        return Held(self.node, tips, links, ends, end_tips, is_doubled, self.equilibria.frame)
 
-    def _put(self, nodes: Index, found: Equilibria) -> Index:
+    def _put(self, nodes: Index, equilibria: Equilibria) -> Index:
         """Numbers of postures at nodes, known ones or new; none where a node has too many."""
         numbers, left = np.full(len(nodes), _NONE), np.arange(len(nodes))
         while len(left):
             _, first = np.unique(nodes[left], return_index=True)
             now = left[first]
-            numbers[now] = self._put_one_each(nodes[now], found.of(now))
+            numbers[now] = self._put_one_each(nodes[now], equilibria.of(now))
             left = np.delete(left, first)
         return numbers
 
-    def _put_one_each(self, nodes: Index, found: Equilibria) -> Index:
+    def _put_one_each(self, nodes: Index, equilibria: Equilibria) -> Index:
         numbers, open_ = np.full(len(nodes), _NONE), np.arange(len(nodes))
         for place in range(_MOST):
             at = self.states[nodes[open_], place]
             same = at >= 0
-            old = self.found.of(at[same])
-            same[same] = are_same(found.of(open_[same]), old, self.length, _SAME)
+            old = self.equilibria.of(at[same])
+            same[same] = are_same(equilibria.of(open_[same]), old, self.length, _SAME)
             numbers[open_[same]] = at[same]
             new = open_[at < 0]
             numbers[new] = self.states[nodes[new], place] = len(self.node) + np.arange(len(new))
-            self._append(nodes[new], found.of(new))
+            self.node = np.concatenate([self.node, nodes[new]])
+            self.equilibria = joined([self.equilibria, equilibria.of(new)])
+            unknown = np.full((len(new), self.next.shape[1]), _UNKNOWN)
+            self.next = np.concatenate([self.next, unknown])
             open_ = open_[(at >= 0) & ~same]
         return numbers
-
-    def _append(self, nodes: Index, found: Equilibria) -> None:
-        if not len(nodes):
-            return
-        self.node = np.concatenate([self.node, nodes])
-        self.found = joined([self.found, found])
-        unknown = np.full((len(nodes), self.next.shape[1]), _UNKNOWN)
-        self.next = np.concatenate([self.next, unknown])
 
     def _link(self, low: Index, high: Index, column: Index | int) -> None:
         """Note that postures are on one branch with those at the next node in a direction."""
         self.next[low, column], self.next[high, column ^ 1] = high, low
         self.links.append(np.stack([low, high], axis=1))
 
-    def _link_smooth(self, at: Index, postures: Postures) -> None:
+    def _link_smooth(self, at: Index, flood: Flood | None) -> None:
         """Link neighbors on an edge in an uncut cell, or that goes on as that beside it does."""
         lost = np.where(at >= 0, 0.0, np.nan)[:, None]
-        frames = (self.found.frame[at] + lost).reshape(*self.sizes, -1)
-        tips = (self.found.tips[at] / self.length + lost).reshape(*self.sizes, 3)
-        numbers = np.arange(len(at)).reshape(self.sizes)
+        frames = (self.equilibria.frame[at] + lost).reshape(*self.sizes, -1)
+        tips = (self.equilibria.tips[at] / self.length + lost).reshape(*self.sizes, 3)
         for axis in range(len(self.sizes)):
-            low, high = (np.delete(numbers, end, axis).ravel() for end in (-1, 0))
+            low, high = edges_along(self.sizes, axis)
             smooth = smooth_edges(frames, tips, axis).ravel()
             both = (at[low] >= 0) & (at[high] >= 0)
             low, high, smooth = low[both], high[both], smooth[both]
-            smooth |= postures.is_uncut(0.5 * (self.gamma[low] + self.gamma[high]))
+            if flood is not None:
+                smooth |= flood.is_uncut(0.5 * (self.gamma[low] + self.gamma[high]))
             self._link(at[low[smooth]], at[high[smooth]], 2 * axis + 1)
 
     def _wave(self, twin: Solver, front: Index) -> Index:
@@ -151,19 +151,15 @@ class _Grid:
         for up in (1, 0):  # those that are found from below need not be followed from above
             row, column = np.nonzero((self.next[front] == _UNKNOWN) & (columns % 2 == up))
             state = front[row]
-            place = np.stack(np.unravel_index(self.node[state], self.sizes), axis=1)
-            place[np.arange(len(state)), column // 2] += 2 * up - 1
-            inside = ((place >= 0) & (place < self.sizes)).all(axis=1)
-            to = np.atleast_1d(np.ravel_multi_index(tuple(place[inside].T), self.sizes))
-            if len(to):
-                self._grow(twin, state[inside], to, column[inside])
+            to, exists = neighbors(self.sizes, self.node[state], column // 2, 2 * up - 1)
+            exists &= self.has_arm[to]
+            if exists.any():
+                self._grow(twin, state[exists], to[exists], column[exists])
         return np.arange(known, len(self.node))
 
     def _grow(self, twin: Solver, state: Index, to: Index, column: Index) -> None:
-        exists = self.has_arm[to]
-        state, to, column = state[exists], to[exists], column[exists]
         ends, share = self._followed(twin, state, to, column)
-        good, before = ends.is_found.copy(), self.found.of(state)
+        good, before = ends.is_found.copy(), self.equilibria.of(state)
         numbers = self._put(to[good], ends.of(good))
         leaps = np.linalg.norm(ends.tips - before.tips, axis=1) > _LEAP * self.length
         ends.put(np.flatnonzero(leaps), before.of(leaps))
@@ -181,13 +177,10 @@ class _Grid:
     def _followed(
         self, twin: Solver, state: Index, to: Index, column: Index
     ) -> tuple[Equilibria, Array]:
-        """Postures of the arm at the ends of branches of the twin, or where these end.
-
-        And the shares of the edges up to there.
-        """
-        start = self.found.of(state)
+        """Postures of the arm where branches of the twin end, and shares of edges up to there."""
+        start = self.equilibria.of(state)
         back = self.next[state, column ^ 1]
-        before = self.found.frame[np.maximum(back, 0)]
+        before = self.equilibria.frame[np.maximum(back, 0)]
         slopes = np.where((back >= 0)[:, None], start.frame - before, 0.0)
         ends, share = start.of(np.arange(len(state))), np.ones(len(state))
 

@@ -14,17 +14,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import ClassVar
 
 import numpy as np
 
 from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
 from softreach.kernels.lanes import LANES
-from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded.flood import CUT, PARTS, Flood, Flooding, Followed, follow
-from softreach.rod.loaded.shooting import Equilibria, turn_between
-from softreach.rod.loaded.solver import Solver
+from softreach.rod.inputs import ActivationBox
+from softreach.rod.loaded.flood import CUT, PARTS, Flood, Followed, follow
+from softreach.rod.loaded.solver import Equilibria, Solver, turn_between
 from softreach.rod.loaded.tables import SHOT_AT_ONCE
 from softreach.rod.tip_map import BLOCK, TipStatus
 from softreach.support import parallel
@@ -40,12 +38,13 @@ _NODES = {1: 33, 2: 33, 3: 17}  # of the grid for each free bundle: at most a fe
 _TWIST = 1e-4  # [rad], of the twin over its length
 _OF_TWIN = 1e-3  # [L], its tolerance, as postures are polished on the arm
 _DOUBTFUL = 0.02  # margin below which what is found from the unloaded arm may not be its posture
+_NEAR = 0.15  # [rad], of what the flood guesses
 _BESIDE = 0.03  # [rad], by which the arm differs from its twin but near a pitchfork
 _POLISHED = 0.5  # [rad], by which the arm may differ from its twin
 _LOST = 0.05  # margin below which a branch that ends has lost its stability
 _FIRST_PARTS = 0.02, 0.05, 0.1  # of lines, at which an arm that nothing holds at rest leans
 _PULLED = 0.9  # cosine between the arm and its forces, from which on they pull it straight
-_HANGING = 4.0  # [rad] of phase, from which on the unloaded arm tells nothing of one that hangs
+_HANGING = 4.0  # [rad] of phase, from which on the unloaded arm is no guess for one that hangs
 _TURNS = np.pi / 16 * np.array([0, *(sign * k for k in range(1, 17) for sign in (1, -1))])
 """Azimuths beside the one to which the unloaded arm bends, at which the arm is looked for."""
 _STRAIGHT = 1e-8  # [L], aside, of an arm that no activation leans to any side
@@ -57,21 +56,19 @@ class Postures:
 
     Args:
         solver: That of the arm.
-        box: Bounds of its activations.
         side: Sense of the twist that decides between mirror images, 1 or -1.
+        flood: Starts on a grid over the box of activations; None for those on lines alone.
     """
 
     solver: Solver
-    box: ActivationBox
     side: int = 1
-    _nearness: ClassVar[float] = np.inf  # [rad], of what is found from guesses
-    _least: ClassVar[float] = _DOUBTFUL  # margin of what is found from guesses
+    flood: Flood | None = None
 
-    @classmethod
-    def of(cls, solver: Solver) -> Postures:
-        """Those of an arm, by lines from rest."""
-        arm = solver.tables.arm
-        return Postures(solver, ActivationBox.between(arm.bounds, arm.bundle_names))
+    @lazy
+    def box(self) -> ActivationBox:
+        """Bounds of the activations."""
+        arm = self.solver.tables.arm
+        return ActivationBox.between(arm.bounds, arm.bundle_names)
 
     @lazy
     def twin(self) -> Solver:
@@ -100,21 +97,8 @@ class Postures:
         start = self.twin.search(gamma, None, np.zeros(1))
         return follow(self.twin, gamma, gamma, start, hangs=False)
 
-    @lazy
-    def _ring(self) -> Ring | None:
-        return Ring.at_rest(self.solver, self.rest_activation)
-
-    def find(self, gamma: Array) -> Equilibria:
-        """Postures at activations (n, bundles), on the calling thread."""
-        equilibria = self.solver.empty(len(gamma))
-        self.direct(gamma, slice(None), equilibria)
-        rows = np.flatnonzero(~equilibria.is_stable)
-        if len(rows):
-            self.by_line(gamma, rows, equilibria)
-        return equilibria
-
-    def find_all(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
-        """The same on all threads, on request by lines where they are not found at once.
+    def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
+        """Postures at activations (n, bundles); where not found at once, by lines if wanted.
 
         What is to be searched again is gathered, so that kernels get whole blocks.
         """
@@ -133,14 +117,18 @@ class Postures:
         at = np.arange(len(gamma))[rows]
         order, guesses = self._guesses(gamma[at])
         at = at[order]
-        found = self.solver.search(gamma[at], guesses)
-        good = found.margin > self._least
-        if guesses is not None:
-            good &= turn_between(found.frame, guesses) < self._nearness
-        self.solver.put(gamma, at, found.only(good), equilibria)
+        new = self.solver.search(gamma[at], guesses)
+        good = new.margin > (_DOUBTFUL if self.flood is None else 0.0)
+        if self.flood is not None and guesses is not None:
+            good &= turn_between(new.frame, guesses) < _NEAR
+        self.solver.put(gamma, at, new.only(good), equilibria)
 
     def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
-        """Rows, and frames of the unloaded arm there, or of one that hangs along it."""
+        """Rows, and frames there: of the flood, of the unloaded arm, or of one that hangs along."""
+        if self.flood is not None:  # uncut cells, rough ones last: lanes wait for the slowest
+            frames, rough = self.flood.at(gamma)
+            order = np.argsort(rough, kind="stable")[: (rough < CUT).sum()]
+            return order, frames[order]
         tables, every = self.solver.tables, np.arange(len(gamma))
         if tables.phase.entire <= _HANGING or tables.axes[0, 2] < _PULLED:
             return every, None
@@ -162,23 +150,22 @@ class Postures:
     def by_line(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
         """Postures at some rows along the straight lines from rest."""
         followed = self.followed(gamma[rows])
-        found = polished(self.solver, gamma[rows], followed.last, _POLISHED)
-        self.solver.put(gamma, rows, found, equilibria)
+        new = polished(self.solver, gamma[rows], followed.last, _POLISHED)
+        self.solver.put(gamma, rows, new, equilibria)
         snaps = followed.has_ended & (followed.last.margin < _LOST)
         gone = equilibria.status[rows] == TipStatus.UNDECIDED
         equilibria.status[rows[gone & snaps]] = TipStatus.SNAPS
-        if not self.is_held_at_rest and gone.any():
-            self._unstable(gamma, rows[gone], equilibria)
-
-    def _unstable(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
-        """Equilibria of an arm that nothing holds at rest, and that no activation leans."""
-        found = self.solver.search(gamma[rows], None)
-        at_rest = ~np.any(gamma[rows] != self.rest_activation, axis=1)
-        found = found.only(~found.is_stable | at_rest)  # no stable ones of others
-        self.solver.put(gamma, rows, found, equilibria)
+        if not self.is_held_at_rest and gone.any():  # unstable ones, which no activation leans
+            left, new = rows[gone], self.solver.search(gamma[rows[gone]], None)
+            at_rest = (gamma[left] == self.rest_activation).all(axis=1)
+            self.solver.put(gamma, left, new.only(~new.is_stable | at_rest), equilibria)
 
     def followed(self, gamma: Array) -> Followed:
-        """Branches of the twin along lines from rest; where nothing holds it, from beside it."""
+        """Branches of the twin from nodes of the flood, or along lines from rest."""
+        return self._from_rest(gamma) if self.flood is None else self._flooded(self.flood, gamma)
+
+    def _from_rest(self, gamma: Array) -> Followed:
+        """Along lines from rest; where nothing holds the twin there, from beside it."""
         if self.is_held_at_rest:
             begin = np.repeat(self.rest_activation, len(gamma), axis=0)
             start = self.rest.of(np.zeros(len(gamma), int))
@@ -186,37 +173,92 @@ class Postures:
             begin, start = self._leaning(gamma)
         return follow(self.twin, begin, gamma, start)
 
+    def _flooded(self, flood: Flood, gamma: Array) -> Followed:
+        """In uncut cells from the nearest node, else from where the lines meet the first cut."""
+        uncut = flood.is_uncut(gamma)
+        begin, start = flood.nearest(gamma)
+        slopes = flood.at(gamma)[0] - start.frame
+        cut = np.flatnonzero(~uncut)
+        if len(cut):
+            begin[cut], of_cut, slopes[cut] = self._before_cuts(flood, gamma[cut])
+            start.put(cut, of_cut)
+        followed = follow(self.twin, begin, gamma, start, slopes)
+        lost = np.flatnonzero(uncut & ~followed.last.is_found)
+        if len(lost):
+            by_line = self._from_rest(gamma[lost])
+            followed.has_ended[lost] = by_line.has_ended
+            followed.last.put(lost, by_line.last)
+        return followed
+
+    def _before_cuts(self, flood: Flood, gamma: Array) -> tuple[Array, Equilibria, Array]:
+        """Where lines meet their first cut, else rest; postures there, and changes of frames."""
+        rest, clear = self.rest_activation, flood.clear(gamma)[:, None]
+        way = gamma - rest
+        begin = rest + clear * way
+        guesses = flood.at(begin)[0]
+        before = flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
+        slopes = (1.0 - clear) * PARTS * (guesses - before)
+        start = self.twin.search(begin, guesses)
+        near = turn_between(start.frame, guesses) <= _NEAR
+        lost = np.flatnonzero(~(start.is_stable & near))
+        start.put(lost, self.rest.of(np.zeros(len(lost), int)))
+        begin[lost], slopes[lost] = rest, 0.0
+        return begin, start, slopes
+
     def _leaning(self, gamma: Array) -> tuple[Array, Equilibria]:
         """Places on lines where the twin leans that nothing holds at rest, and how it does."""
         rest, ring = self.rest_activation, self._ring
         begin = rest + _FIRST_PARTS[0] * (gamma - rest)
         if ring is None:
             return begin, self._hung(begin).last
-        start = ring.near(self.twin, begin)
+        start = self._near_ring(*ring, begin)
         for part in _FIRST_PARTS[1:]:
             left = np.flatnonzero(~start.is_found)
             begin[left] = rest + part * (gamma[left] - rest)
-            start.put(left, ring.near(self.twin, begin[left]))
+            start.put(left, self._near_ring(*ring, begin[left]))
         return begin, start
+
+    @lazy
+    def _ring(self) -> tuple[Array, float] | None:
+        """Frame of an arm of the ring that leans at rest, and its azimuth; None where none does."""
+        solver, rest, tables = self.solver, self.rest_activation, self.solver.tables
+        if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
+            return None
+        image, axis = solver.base_map(rest), tables.axes[0]
+        if not is_axisymmetric(image, axis, SYMMETRIC):
+            return None
+        rings = pole_rings(image, axis, axis)
+        points = rings.points[rings.signs > 0]
+        whole = replace(solver, tables=tables.in_one_segment)
+        many, tip = np.repeat(rest, len(points), axis=0), np.array([tables.arm.length])
+        shapes, margin = whole.shapes_facing(many, points, tip)
+        if not (margin > -NEUTRAL).any():
+            return None
+        first = int((margin > -NEUTRAL).argmax())
+        frame = solver.frames_facing(rest, points[[first]])[0]
+        return frame, float(_azimuth(shapes.position[:, 0], tables.axes)[first])
+
+    def _near_ring(self, frame: Array, azimuth: float, gamma: Array) -> Equilibria:
+        """Stable equilibria of the twin near the ring, about where it would bend without loads."""
+        twin, tables = self.twin, self.twin.tables
+        leaning = twin.search(gamma, None).only(np.zeros(len(gamma), bool))
+        bent = FreeRod(tables.arm, 1e-6).tips(gamma)
+        bends = np.linalg.norm(bent @ tables.axes[1:].T, axis=1) > _STRAIGHT * tables.arm.length
+        there = _azimuth(bent, tables.axes) - azimuth
+        for turn in _TURNS:
+            left = np.flatnonzero(bends & ~leaning.is_found)
+            new = twin.search(gamma[left], _turned(frame, there[left] + turn, tables.axes))
+            leaning.put(left[new.is_stable], new.of(new.is_stable))
+        return leaning
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
         """Postures of an arm that is in one of some at activations (k, bundles)."""
-        return ContinuedPostures(
-            self.solver, self.box, self.side, origin=self, at=gamma, frame=frame
-        )
-
-    def is_uncut(self, gamma: Array) -> Mask:
-        """Mask of activations in cells of the flooded grid that are on one branch."""
-        return np.zeros(len(gamma), bool)
-
-    def differ(self, mirrored: Postures, gamma: Array) -> Mask:
-        """Mask of activations beside which the other side may hold another posture."""
-        return np.ones(len(gamma), bool)
+        return ContinuedPostures(self.solver, self.side, origin=self, at=gamma, frame=frame)
 
     @lazy
     def mirrored(self) -> Postures:
         """Those of the twin with the other twist."""
-        return Postures(self.solver, self.box, -self.side)
+        return Postures(self.solver, -self.side)
 
     def with_flood(self) -> Postures:
         """The same, with starts from a grid over the box where that is worth it."""
@@ -224,73 +266,17 @@ class Postures:
         if nodes is None or not self.is_held_at_rest:
             return self
         sizes = tuple(nodes if free else 1 for free in self.box.is_free)
-        grid = Flooding(self.twin, self.box, sizes)
-        flood = grid.run(self.rest_activation, self.rest)
-        on_arm = polished(self.solver, grid.gamma, flood.held, _BESIDE)
+        flood = Flood(self.twin, self.box, sizes, self.rest_activation, self.rest)
+        on_arm = polished(self.solver, flood.gamma, flood.held, _BESIDE)
         flood.held.put(np.flatnonzero(on_arm.is_found), on_arm.of(on_arm.is_found))
-        return FloodedPostures(self.solver, self.box, self.side, flood=flood)
+        return Postures(self.solver, self.side, flood)
 
 
 def polished(solver: Solver, gamma: Array, on_twin: Equilibria, within: float) -> Equilibria:
     """Stable equilibria of an arm beside those of its twin; found where they are so near [rad]."""
-    found = solver.search(gamma, on_twin.frame)
-    near = turn_between(found.frame, on_twin.frame) < within
-    return found.only(on_twin.is_found & found.is_stable & near)
-
-
-@dataclass(frozen=True, eq=False)
-class FloodedPostures(Postures):
-    """The same with starts from a flooded grid."""
-
-    flood: Flood = field(kw_only=True)
-    _nearness: ClassVar[float] = 0.15
-    _least: ClassVar[float] = 0.0
-
-    def is_uncut(self, gamma: Array) -> Mask:
-        return self.flood.is_uncut(gamma)
-
-    def differ(self, mirrored: Postures, gamma: Array) -> Mask:
-        if not isinstance(mirrored, FloodedPostures):
-            return super().differ(mirrored, gamma)
-        return self.flood.differ(mirrored.flood, gamma)
-
-    def _guesses(self, gamma: Array) -> tuple[Index, Array | None]:
-        """Those of uncut cells, rough ones last: lanes wait for the slowest among them."""
-        frames, rough = self.flood.at(gamma)
-        order = np.argsort(rough, kind="stable")[: (rough < CUT).sum()]
-        return order, frames[order]
-
-    def followed(self, gamma: Array) -> Followed:
-        """In uncut cells from the nearest node, else from where the lines meet the first cut."""
-        uncut = self.flood.is_uncut(gamma)
-        begin, start = self.flood.nearest(gamma)
-        slopes = self.flood.at(gamma)[0] - start.frame
-        cut = np.flatnonzero(~uncut)
-        if len(cut):
-            begin[cut], of_cut, slopes[cut] = self._before_cuts(gamma[cut])
-            start.put(cut, of_cut)
-        followed = follow(self.twin, begin, gamma, start, slopes)
-        lost = np.flatnonzero(uncut & ~followed.last.is_found)
-        if len(lost):
-            by_line = super().followed(gamma[lost])
-            followed.has_ended[lost] = by_line.has_ended
-            followed.last.put(lost, by_line.last)
-        return followed
-
-    def _before_cuts(self, gamma: Array) -> tuple[Array, Equilibria, Array]:
-        """Where lines meet their first cut, else rest; postures there, and changes of frames."""
-        rest, clear = self.rest_activation, self.flood.clear(self.rest_activation, gamma)[:, None]
-        way = gamma - rest
-        begin = rest + clear * way
-        guesses = self.flood.at(begin)[0]
-        before = self.flood.at(begin - np.minimum(clear, 1 / PARTS) * way)[0]
-        slopes = (1.0 - clear) * PARTS * (guesses - before)
-        start = self.twin.search(begin, guesses)
-        near = turn_between(start.frame, guesses) <= self._nearness
-        lost = np.flatnonzero(~(start.is_stable & near))
-        start.put(lost, self.rest.of(np.zeros(len(lost), int)))
-        begin[lost], slopes[lost] = rest, 0.0
-        return begin, start, slopes
+    new = solver.search(gamma, on_twin.frame)
+    near = turn_between(new.frame, on_twin.frame) < within
+    return new.only(on_twin.is_found & new.is_stable & near)
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,64 +333,15 @@ class ContinuedPostures(Postures):
         return True
 
 
-@dataclass(frozen=True, eq=False)
-class Ring:
-    """The ring of one arm under loads along one direction."""
-
-    frame: Array
-    """As in `Equilibria`, of one arm of the ring, shape (component,)."""
-    azimuth: float
-    """To which this one leans, about the first axis of the world [rad]."""
-
-    @classmethod
-    def at_rest(cls, solver: Solver, rest: Array) -> Ring | None:
-        """The ring of an arm at rest (1, bundles).
-
-        None where there is none, loads have several directions, or are too heavy for a search.
-        """
-        tables, axis = solver.tables, solver.tables.axes[0]
-        if not tables.one_direction or tables.phase.entire > SHOT_AT_ONCE:
-            return None
-
-        image = solver.base_map(rest)
-        if not is_axisymmetric(image, axis, SYMMETRIC):
-            return None
-        rings = pole_rings(image, axis, axis)
-        points = rings.points[rings.signs > 0]
-        whole = replace(solver, tables=tables.in_one_segment)
-        many, tip = np.repeat(rest, len(points), axis=0), np.array([tables.arm.length])
-        shapes, margin = whole.shapes_facing(many, points, tip)
-        if not (margin > -NEUTRAL).any():
-            return None
-        first = int((margin > -NEUTRAL).argmax())
-        frame = solver.frames_facing(rest, points[[first]])[0]
-        return cls(frame, float(_azimuth(shapes.frames.position[:, 0], tables.axes)[first]))
-
-    def near(self, twin: Solver, gamma: Array) -> Equilibria:
-        """Stable equilibria of the twin near the ring, under small activations (n, bundles).
-
-        They lean to about where the activations bend the unloaded arm; without a bend none is
-        found.
-        """
-        leaning, tables = twin.search(gamma, None).only(np.zeros(len(gamma), bool)), twin.tables
-        bent = FreeRod(tables.arm, 1e-6).tips(gamma)
-        bends = np.linalg.norm(bent @ tables.axes[1:].T, axis=1) > _STRAIGHT * tables.arm.length
-        there = _azimuth(bent, tables.axes) - self.azimuth
-        for turn in _TURNS:
-            left = np.flatnonzero(bends & ~leaning.is_found)
-            found = twin.search(gamma[left], self._turned(there[left] + turn, tables.axes))
-            leaning.put(left[found.is_stable], found.of(found.is_stable))
-        return leaning
-
-    def _turned(self, angles: Array, axes: Array) -> Array:
-        """Frames of other arms of the ring, shape (n, component)."""
-        turns = np.zeros((len(angles), 3, 3))
-        turns[:, 0, 0] = 1.0
-        turns[:, 1, 1] = turns[:, 2, 2] = np.cos(angles)
-        turns[:, 2, 1] = np.sin(angles)
-        turns[:, 1, 2] = -turns[:, 2, 1]
-        turned = self.frame.reshape(-1, 3) @ axes.T @ turns.transpose(0, 2, 1) @ axes
-        return turned.reshape(len(angles), self.frame.size)
+def _turned(frame: Array, angles: Array, axes: Array) -> Array:
+    """Frames of a frame that turns about the first axis [rad], shape (n, component)."""
+    turns = np.zeros((len(angles), 3, 3))
+    turns[:, 0, 0] = 1.0
+    turns[:, 1, 1] = turns[:, 2, 2] = np.cos(angles)
+    turns[:, 2, 1] = np.sin(angles)
+    turns[:, 1, 2] = -turns[:, 2, 1]
+    turned = frame.reshape(-1, 3) @ axes.T @ turns.transpose(0, 2, 1) @ axes
+    return turned.reshape(len(angles), frame.size)
 
 
 def _azimuth(places: Array, axes: Array) -> Array:

@@ -19,9 +19,9 @@ from softreach.arm.tables import quadrature
 from softreach.arm.tensions import LengthLaw, Tensions
 from softreach.rod.free import ArmRod
 from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
+from softreach.rod.tip_map import InvalidLoads
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask, rows
-from softreach.support.errors import InvalidInput
+from softreach.support.arrays import Array, Mask, rows
 from softreach.support.lazy import lazy
 
 _BLOCK = 256
@@ -94,12 +94,13 @@ class LoadedLengths:
         pulled = bundles[:, law.columns] - law.taut_from
         start = law.tensions(bundles)
         tension, taut = np.full_like(start.tension, np.nan), start.is_taut.copy()
-        inner = law.inner(bundles, start.tension)
-        slopes = np.broadcast_to(
-            law.shortening_slopes(inner)[..., law.columns], (n, *law.compliance.shape * 2)
+        of_free = law.shortening_slopes(law.inner(bundles, start.tension))[..., law.columns]
+        slopes = np.broadcast_to(of_free, (n, *law.compliance.shape * 2)).copy()
+        lowered, shortening = self._after(
+            0.0 * start.tension, start.tension, bundles, _HALVINGS + 1
         )
-        state = _State(start.tension, self.shortening(inner), slopes.copy())
-        state, left = self._lowered(state, bundles)
+        left = np.flatnonzero(~_has_nan(shortening))
+        state = rows(_State(lowered, shortening, slopes), left)
         for _ in range(_MOST_STEPS):
             if not len(left):
                 break
@@ -108,21 +109,29 @@ class LoadedLengths:
             done = left[~open_]
             tension[done], taut[done] = state.tension[~open_], aim.is_taut[~open_]
             left, state, aimed = left[open_], rows(state, open_), aim.tension[open_]
-            state, kept = self._stepped(state, aimed, bundles[left])
-            left, state = left[kept], rows(state, kept)
+            step = aimed - state.tension
+            step, shortening = self._after(state.tension, step, bundles[left], _HALVINGS)
+            slopes = _corrected(state.slopes, step, shortening - state.shortening)
+            kept = ~_has_nan(shortening)
+            state = rows(_State(state.tension + step, shortening, slopes), kept)
+            left = left[kept]
         return Tensions(tension, taut)
 
-    def _lowered(self, state: _State, bundles: Array) -> tuple[_State, Index]:
-        """Tensions that have an equilibrium to start with, halves of the first; and their rows."""
-        for _ in range(_HALVINGS):
-            lost = np.flatnonzero(_has_nan(state.shortening))
+    def _after(
+        self, tension: Array, step: Array, bundles: Array, tries: int
+    ) -> tuple[Array, Array]:
+        """Steps of tensions, halved until there is an equilibrium, and s behind them, else NaN."""
+        step, shortening = step.copy(), np.full_like(tension, np.nan)
+        lost = np.flatnonzero(np.isfinite(step).all(axis=1))
+        for _ in range(tries):
             if not len(lost):
                 break
-            state.tension[lost] *= 0.5
-            inner = self.law.inner(bundles[lost], state.tension[lost])
-            state.shortening[lost] = self.shortening(inner)
-        kept = ~_has_nan(state.shortening)
-        return rows(state, kept), np.flatnonzero(kept)
+            shortening[lost] = self.shortening(
+                self.law.inner(bundles[lost], tension[lost] + step[lost])
+            )
+            lost = lost[_has_nan(shortening[lost])]
+            step[lost] *= 0.5
+        return step, shortening
 
     def _aimed(self, state: _State, pulled: Array) -> Tensions:
         """Tensions of the complementarity problem of s linearized."""
@@ -137,22 +146,6 @@ class LoadedLengths:
         own = np.diagonal(state.slopes, axis1=1, axis2=2) + law.compliance
         miss = np.abs(np.minimum(left, own * state.tension)).max(axis=1)
         return miss <= _CONVERGED * law.arm.length
-
-    def _stepped(self, state: _State, aimed: Array, bundles: Array) -> tuple[_State, Mask]:
-        """The state after a step, halved where it has no equilibrium, and where there is one."""
-        step = aimed - state.tension
-        shortening = np.full_like(state.shortening, np.nan)
-        todo = np.flatnonzero(np.isfinite(step).all(axis=1))
-        for _ in range(_HALVINGS):
-            if not len(todo):
-                break
-            inner = self.law.inner(bundles[todo], state.tension[todo] + step[todo])
-            shortening[todo] = self.shortening(inner)
-            todo = todo[_has_nan(shortening[todo])]
-            step[todo] *= 0.5
-        slopes = _corrected(state.slopes, step, shortening - state.shortening)
-        after = _State(state.tension + step, shortening, slopes)
-        return after, ~_has_nan(shortening)
 
     def continued_from(self, inner: Array, frames: Array | None = None) -> LoadedLengths:
         """Those of the arm in its posture at activations with tensions, shape (k, bundles)."""
@@ -193,7 +186,7 @@ class LoadedLengths:
         grid = step_grid(arm, nowhere, max(_STEPS, self.rod.steps))
         try:
             table = node_tables(arm, nowhere, grid)
-        except InvalidInput:  # loads that it does not know
+        except InvalidLoads:  # that it does not know
             return None
         force, moment = self.law.loads_at(table.stations.ravel(), np.ones(table.stations.size))
         loads = np.concatenate([moment, force[:, None]], axis=1)

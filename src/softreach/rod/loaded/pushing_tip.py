@@ -12,10 +12,9 @@ import numpy as np
 
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.loaded.shooting import Equilibria, turn_between
-from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.solver import Equilibria, Solver, turn_between
 from softreach.rod.loaded.tables import LoadTables
-from softreach.rod.tip_map import TipStatus, position_slopes
+from softreach.rod.tip_map import position_slopes
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
 
@@ -59,7 +58,7 @@ class PushingTip:
 
     @lazy
     def _tables(self) -> LoadTables:
-        return LoadTables(self.rod.arm, self.rod.loads, self.rod.body, direction=-self.direction)
+        return LoadTables(arm=self.rod.arm, direction=-self.direction)
 
     def _solver(self, force: float, steps: int) -> Solver:
         return Solver(self._tables.under(force), steps, self.rod.tol)
@@ -74,37 +73,38 @@ class PushingTip:
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
         if near is None:
-            known = Postures.of(solver).find(sample)
+            known = Postures(solver).find(sample)
         else:
             known = solver.near(sample, near.equilibrium)
-        response = solver.respond(sample, known, compliance=True)
-        slopes = np.empty_like(response.twists[:, :3])
-        position_slopes(known.tips, response.twists, slopes)
-        retreat = response.compliance[0] @ self.direction
-        return TipResponse(known.tips[0], slopes[0], retreat, known)
+        twists, compliance, _ = solver.respond(sample, known, compliance=True)
+        slopes = np.empty_like(twists[:, :3])
+        position_slopes(known.tips, twists, slopes)
+        return TipResponse(known.tips[0], slopes[0], compliance[0] @ self.direction, known)
 
     def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if this equilibrium is stable; in doubt steps half as long decide."""
         if abs(response.margin) > _DOUBTFUL:
             return response.margin > 0
-        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
-        return bool(fine.status[0] == TipStatus.STABLE)
+        return bool(self._judged(gamma, force, response).is_stable[0])
 
     def error(self, gamma: Array, force: float, response: TipResponse) -> float:
         """Movement of the tip when the steps are halved [m]."""
-        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
+        fine = self._judged(gamma, force, response)
         return float(np.linalg.norm(fine.tips[0] - response.tip))
+
+    def _judged(self, gamma: Array, force: float, response: TipResponse) -> Equilibria:
+        return self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
 
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if the force alone, raised from the posture without it, leads there."""
         sample, share, step = gamma[None], 0.0, 0.25
-        held = Postures.of(self._solver(0.0, self.steps)).find(sample)
+        held = Postures(self._solver(0.0, self.steps)).find(sample)
         while share < 1.0 and step > _SHORTEST:
             to = min(1.0, share + step)
-            found = self._solver(to * force, self.steps).near(sample, held)
-            turn = turn_between(found.frame, held.frame)[0]
-            if found.status[0] == TipStatus.STABLE and turn < _MOST_TURN:
-                held, share, step = found, to, 2.0 * step
+            new = self._solver(to * force, self.steps).near(sample, held)
+            turn = turn_between(new.frame, held.frame)[0]
+            if new.is_stable[0] and turn < _MOST_TURN:
+                held, share, step = new, to, 2.0 * step
             else:
                 step *= 0.5
         apart = float(np.linalg.norm(held.tips[0] - response.tip))

@@ -12,44 +12,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.body import load_number
-from softreach.arm.loads import Loads
-from softreach.rod.free import (
-    ArmRod,
-    FreeRod,
-    add_offset,
-    linear_strains,
-    per_length,
-    tables_at,
-)
+from softreach.rod.free import ArmRod, FreeRod, add_offset
 from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
-from softreach.rod.loaded.shooting import Equilibria, LoadedShapes, turn_between
-from softreach.rod.loaded.solver import Solver
-from softreach.rod.loaded.tables import ArmBody, LoadTables
-from softreach.rod.response import (
-    NodeTables,
-    linear_response,
-    node_tables,
-    rod_state,
-    step_grid,
-)
+from softreach.rod.loaded.solver import Equilibria, LoadedShapes, Solver, turn_between
+from softreach.rod.loaded.tables import LoadTables
+from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.rod.steps import enough_for_all_breaks, pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
     Held,
+    InvalidLoads,
     Shapes,
     Status,
-    Strains,
-    TipStatus,
+    TipOutputs,
     drop,
-    has_tip,
     position_slopes,
 )
 from softreach.support import parallel
@@ -58,7 +42,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
 Differences = Callable[[Solver, Array, Equilibria], Array]
-"""Distances [m] between what a solver and its judge find, near known equilibria."""
+"""Distances [m] between results of a solver and of its judge, near known equilibria."""
 
 _BLOCK = BLOCK // 8  # samples per task
 _RESPONSE_STEPS = 48
@@ -86,28 +70,17 @@ class LoadedRod(ArmRod):
         return True
 
     @lazy
-    def loads(self) -> Loads:
-        """Loads on the arm beside its actuators, in the frame of the base."""
-        loads = self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
-        return loads.seen_from(self.arm.base)
-
-    @property
-    def body(self) -> ArmBody:
-        """Compliance and weight of the arm."""
-        return ArmBody(self.arm)
-
-    @lazy
     def tables(self) -> LoadTables:
         """Tables for the kernels.
 
         Raises:
             InvalidInput: Loads so heavy that no number of steps resolves what they do.
         """
-        tables = LoadTables(self.arm, self.loads, self.body)
+        tables = LoadTables(arm=self.arm)
         if (steps := tables.phase.fewest_steps) > _MOST_STEPS:
             load = f"of load number {load_number(self.arm):.3g}"
             allowed = f"lighter: they need {steps:,} steps, at most {_MOST_STEPS} allowed"
-            raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
+            raise InvalidLoads("loads", load, allowed, "lighten the load or stiffen the arm")
         return tables
 
     @property
@@ -117,27 +90,51 @@ class LoadedRod(ArmRod):
         Raises:
             InvalidInput: None is enough.
         """
-        return _checked(self._tip_steps, self._tip_tol)
+        return self._checked(self._tip_steps)
 
     @lazy
     def _tip_steps(self) -> int | None:
-        """Steps with which `tol` holds for tips, if any are enough, theory (72)."""
-        fewest = self.tables.phase.fewest_steps
-        return self.fixed_steps or self._fewest(fewest, tip_differences)
+        return self.fixed_steps or self._fewest(self.tables.phase.fewest_steps, tip_differences)
 
     @lazy
     def _shape_steps(self) -> int | None:
-        """Steps with which `tol` holds all along the arm, if any are enough."""
         return self.fixed_steps or self._fewest(self.steps, shape_differences)
 
+    def _checked(self, steps: int | None) -> int:
+        if steps is None:
+            allowed = f"reachable within {_MOST_STEPS} steps"
+            raise InvalidInput("tol", self._tip_tol, allowed, "enlarge it")
+        return steps
+
     def _fewest(self, least: int, differences: Differences) -> int | None:
+        """The fewest steps with which `tol` holds; None where the most are too few."""
         pilot, steps = pilot_activations(self.arm, self.box), max(least, _FEWEST_STEPS)
         others = pilot[_FEW:]  # behind the first, which are corners
         few = np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
-        enough = _enough(self._solver_of, few, steps, differences)
+        enough = self._enough(few, steps, differences)
         if enough is not None:
-            enough = _enough(self._solver_of, pilot, enough or steps, differences)
+            enough = self._enough(pilot, enough or steps, differences)
         return max(least, self.unloaded_steps) if enough == _UNJUDGED else enough
+
+    def _enough(self, gamma: Array, steps: int, differences: Differences) -> int | None:
+        """The same for some activations; `_UNJUDGED` where nothing judges any steps."""
+        at_all, allowed = enough_for_all_breaks(self.arm), self._tip_tol * self.length / _SAFETY
+        known = Postures(self._solver_of(steps)).find(gamma)
+        gamma, known = gamma[known.is_found], known.of(known.is_found)
+        while steps <= max(_MOST_STEPS, _FINER * at_all):
+            solver = self._solver_of(steps)
+            equilibria = solver.near(gamma, known)
+            settled = equilibria.is_found & (np.abs(equilibria.margin) > _CRITICAL)
+            errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
+            if not len(errors):
+                return _UNJUDGED
+            error = float(errors.max())
+            if error <= allowed:
+                return steps
+            steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
+            if steps > _MOST_STEPS:
+                steps = max(steps, at_all)
+        return None
 
     @lazy
     def unloaded_steps(self) -> int:
@@ -155,11 +152,11 @@ class LoadedRod(ArmRod):
     @lazy
     def postures(self) -> Postures:
         """Postures, with starts on a grid over the box where that is worth it."""
-        return Postures.of(self.solver).with_flood()
+        return Postures(self.solver).with_flood()
 
     @lazy
     def _shape_solver(self) -> Solver:
-        return self._solver_of(_checked(self._shape_steps, self._tip_tol))
+        return self._solver_of(self._checked(self._shape_steps))
 
     @lazy
     def _mirrored(self) -> Postures:
@@ -179,36 +176,30 @@ class LoadedRod(ArmRod):
         """Tips with their status, and the margin of stability."""
         self.prepare()
         gamma, lost = self.with_arms(self.box.check(activations))
-        equilibria = self.postures.find_all(gamma)
+        equilibria = self.postures.find(gamma)
         drop(lost, equilibria.status, equilibria.tips, equilibria.margin)
         return equilibria
 
-    def fill(
-        self,
-        gamma: Array,
-        tips: Array,
-        slopes: Array | None = None,
-        *,
-        twists: Array | None = None,
-        status: Status | None = None,
-        directions: Array | None = None,
-        known: Equilibria | None = None,
-    ) -> None:
-        """Put tips, and what else is asked for, into place; each equilibrium is found once."""
-        known = known or self.postures.find(gamma)
+    def fill(self, gamma: Array, out: TipOutputs) -> None:
+        """Put tips, and what else is wanted, into place; each equilibrium is found once."""
+        with parallel.undivided():
+            known = self.postures.find(gamma)
+        self._fill(gamma, known, out)
+
+    def _fill(self, gamma: Array, known: Equilibria, out: TipOutputs) -> None:
+        tips, slopes, twists, status, directions = out
         if status is not None:
             status[:] = known.status
         is_moving = slopes is not None or twists is not None
+        has_directors = directions is not None or self.reach > 0.0
         if self.end < self.length:
             shapes = self._shape_solver.shapes(gamma, np.array([self.end]), known)
-            tips[:], directors = shapes.frames.position[:, 0], shapes.frames.directors[:, 0]
+            tips[:], directors = shapes.position[:, 0], shapes.directors[:, 0]
             moved = self._section_twists(gamma) if is_moving else None
         else:
             tips[:], directors, moved = known.tips, None, None
-            if is_moving or directions is not None or self.reach > 0.0:
-                has_directors = directions is not None or self.reach > 0.0
-                response = self.solver.respond(gamma, known, directors=has_directors)
-                directors, moved = response.directors, response.twists
+            if is_moving or has_directors:
+                moved, _, directors = self.solver.respond(gamma, known, directors=has_directors)
         if directors is not None and len(directors):
             add_offset(tips, self.offset, directors)
             if directions is not None:
@@ -241,18 +232,17 @@ class LoadedRod(ArmRod):
         points, stable = np.empty((len(gamma), 3)), np.zeros(len(gamma), np.int8)
         known = known._replace(status=stable)
         for rows in parallel.blocks(len(gamma), _BLOCK):
-            self.fill(gamma[rows], points[rows], known=known.of(rows))
+            self._fill(gamma[rows], known.of(rows), TipOutputs(points[rows]))
         return points
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
         self.prepare()
         gamma, solver = self.box.check(activations), self.solver
-        known, compliance = self.postures.find_all(gamma), np.empty((len(gamma), 3, 3))
+        known, compliance = self.postures.find(gamma), np.empty((len(gamma), 3, 3))
 
         def fill(rows: slice) -> None:
-            response = solver.respond(gamma[rows], known.of(rows), compliance=True)
-            compliance[rows] = response.compliance
+            compliance[rows] = solver.respond(gamma[rows], known.of(rows), compliance=True)[1]
 
         parallel.run(partial(fill, rows) for rows in parallel.blocks(len(gamma), _BLOCK))
         return compliance
@@ -264,59 +254,33 @@ class LoadedRod(ArmRod):
         """
         self.prepare()
         gamma = self.box.check(activations)
-        here, there = (side.find_all(gamma) for side in (self.postures, self._mirrored))
+        here, there = (side.find(gamma) for side in (self.postures, self._mirrored))
         apart = turn_between(here.frame, there.frame) > _SIDES
         return here.is_found & there.is_found & apart
 
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
+    def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
         """Frames, and (û + K⁻¹m) η/ζ and ζ = ζ̂ + η n3/K0.
 
         Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
         """
         gamma = self.box.check(activations)
-        z, at, known = (
-            np.asarray(framed, float),
-            np.asarray(strained, float),
-            self.equilibria(gamma),
-        )
-        framed_shapes = strained_shapes = self._walked(gamma, known, z, status)
+        z, at = np.asarray(framed, float), np.asarray(strained, float)
+        known = self.equilibria(gamma)
+        walked, status = self._walked(gamma, known, z)
+        frames = walked.frames
         if not np.array_equal(z, at):
-            strained_shapes = self._walked(gamma, known, at, status)
-        return Shapes(*framed_shapes.frames, *self.strains_under(gamma, at, strained_shapes))
+            walked, status = self._walked(gamma, known._replace(status=status), at)
+        return Shapes(*frames, *self._shape_solver.strains_under(gamma, at, walked), status)
 
-    def with_moments(self, gamma: Array, z: Array, status: Status) -> tuple[Frames, Array]:
-        shapes = self._walked(gamma, self.equilibria(gamma), z, status)
-        return shapes.frames, shapes.moment
+    def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
+        walked, status = self._walked(gamma, self.equilibria(gamma), z)
+        return walked.frames, walked.moment, status
 
-    def _walked(
-        self, gamma: Array, known: Equilibria, z: Array, status: Status | None
-    ) -> LoadedShapes:
-        if not len(z):
-            return LoadedShapes.empty(len(gamma), 0)
+    def _walked(self, gamma: Array, known: Equilibria, z: Array) -> tuple[LoadedShapes, Status]:
+        """Shapes of known equilibria, undecided where steps that end at Z [m] do not find them."""
         shapes = self._shape_solver.shapes(gamma, z, known)
-        if status is not None:
-            gone = known.is_found & np.isnan(shapes.frames.position[:, 0, 0])
-            status[:] = np.where(gone, TipStatus.UNDECIDED, known.status)
-        return shapes
-
-    def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
-        """The strains at stations Z [m], from m and n in the directors of the shapes there."""
-        axial, bending, torsion = _compliance_at(self.body, z.tobytes())
-        u, extension, eta = linear_strains(tables_at(self.arm, z), gamma)
-        extension = extension + eta * shapes.force[..., 2] * axial
-        yielded = np.stack([bending, bending, torsion], axis=1)
-        return per_length(u + shapes.moment * yielded, extension, eta)
-
-
-@lru_cache(maxsize=64)
-def _compliance_at(body: ArmBody, stations: bytes) -> tuple[Array, Array, Array]:
-    return body.compliance(np.frombuffer(stations))
+        gone = known.is_found & np.isnan(shapes.position[:, :1, 0]).any(axis=1)
+        return shapes, known.only(~gone).status
 
 
 class _ContinuedRod(LoadedRod):
@@ -338,33 +302,6 @@ class _ContinuedRod(LoadedRod):
         return self.origin._shape_solver
 
 
-def _enough(
-    solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
-) -> int | None:
-    """The fewest steps, `_UNJUDGED` where nothing judges any; None where the most are too few."""
-    tol, at_all = solver_of(steps).tol, enough_for_all_breaks(solver_of(steps).tables.arm)
-    known: Equilibria | None = None
-    while steps <= max(_MOST_STEPS, _FINER * at_all):
-        solver = solver_of(steps)
-        allowed = tol * solver.tables.arm.length / _SAFETY
-        if known is None:
-            known = Postures.of(solver).find(gamma)
-            held = has_tip(known.status)
-            gamma, known = gamma[held], known.of(held)
-        equilibria = solver.near(gamma, known)
-        settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
-        errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
-        if not len(errors):
-            return _UNJUDGED
-        error = float(errors.max())
-        if error <= allowed:
-            return steps
-        steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
-        if steps > _MOST_STEPS:
-            steps = max(steps, at_all)
-    return None
-
-
 def _bulk(distances: Array) -> Array:
     """Without those that are far larger than nearly all."""
     known = distances[np.isfinite(distances)]
@@ -382,14 +319,8 @@ def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
     """Between centerlines, along the arm."""
     stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
     shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.judge())]
-    return _distances(*(shape.frames.position for shape in shapes)).max(axis=1, initial=0.0)
+    return _distances(*(shape.position for shape in shapes)).max(axis=1, initial=0.0)
 
 
 def _distances(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=-1)
-
-
-def _checked(steps: int | None, tol: float) -> int:
-    if steps is None:
-        raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
-    return steps

@@ -1,36 +1,87 @@
-"""The equilibria of a loaded rod at many activations."""
+"""The equilibria of a loaded rod at many activations, shot from the tip, and their shapes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from softreach.arm.base import rotation_matrices
-from softreach.arm.tables import tables
+from softreach.arm.tables import compliance as compliance_of
 from softreach.geometry.sphere_maps import Map
-from softreach.kernels.loaded.response import TRACE
-from softreach.rod.free import linear_strains
-from softreach.rod.loaded.shooting import (
-    ALL_LOADS,
-    Equilibria,
-    LoadedShapes,
-    Response,
-    base_directions,
-    shapes_of,
-    shoot,
-    walk,
-)
+from softreach.kernels.loaded import shooting as kernels
+from softreach.kernels.loaded.response import TRACE, respond
+from softreach.rod.free import linear_strains, per_length, tables_at
 from softreach.rod.loaded.tables import LoadTables, StepTables
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import Frames, Status, Strains, TipStatus, has_tip
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 
+ALL_LOADS = np.ones(1)
+_WIDEST = 1.2  # [rad], longest first step of Newton's method that is trusted
+_SMALL = 2e-3  # [rad], step from which on chord steps do
+_WALKS = 8, 12  # allowed, with tangents and without
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
+
+
+class Equilibria(NamedTuple):
+    """Equilibria of activations, one for each, and where the search for one ended."""
+
+    tips: Array
+    """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
+    status: Status
+    """`TipStatus`, shape (n,)."""
+    margin: Array
+    """Margin of stability, from 1 to below 0 [-], shape (n,)."""
+    frame: Array
+    """First axis of the world at the nodes, tip first, as the base of the unloaded arm sees it,
+    (n, 3 node); with loads of several directions also the second one, (n, 6 node)."""
+
+    @property
+    def is_found(self) -> Mask:
+        """Mask of those that are equilibria, stable or not, shape (n,)."""
+        return has_tip(self.status)
+
+    @property
+    def is_stable(self) -> Mask:
+        """Mask of those that are stable equilibria, shape (n,)."""
+        return np.asarray(self.status == TipStatus.STABLE)
+
+    def of(self, rows: slice | Mask | Index) -> Equilibria:
+        """Some of them; a slice shares memory."""
+        return Equilibria(*(values[rows] for values in self))
+
+    def put(self, rows: slice | Index, others: Equilibria) -> None:
+        """Replace some of them."""
+        for values, new in zip(self, others, strict=True):
+            values[rows] = new
+
+    def only(self, good: Mask) -> Equilibria:
+        """The same, undecided where they are not good."""
+        return self._replace(status=np.where(good, self.status, np.int8(TipStatus.UNDECIDED)))
+
+
+class LoadedShapes(NamedTuple):
+    """Arms at stations, all shapes (n, station, ...)."""
+
+    position: Array
+    """r [m]."""
+    directors: Array
+    """d1, d2, d3 as rows."""
+    moment: Array
+    """m [N m] in the directors."""
+    force: Array
+    """n [N] in the directors."""
+
+    @property
+    def frames(self) -> Frames:
+        """Centerlines and directors."""
+        return Frames(self.position, self.directors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +111,52 @@ class Solver:
         return Solver(self.tables, steps, self.tol)
 
     def search(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Equilibria:
-        """Searches under shares of the loads, from frames or from the unloaded arm."""
-        tiny = max(_OF_TOL * self.tol, 1e-13)
-        return shoot(gamma, self.tables, guesses, self._steps, tiny, shares)
+        """Searches under shares of the loads, from frames or from the unloaded arm.
+
+        Args:
+            gamma: Activations, shape (n, bundles).
+            guesses: Frames as in `Equilibria`; None for those of the unloaded arm.
+            shares: Of the loads, shape (n,), or (1,) for all.
+        """
+        limits = _WIDEST, _SMALL, max(_OF_TOL * self.tol, 1e-13)
+        return self._shot(gamma, guesses, self._steps, limits, shares)
+
+    def _shot(
+        self,
+        gamma: Array,
+        guesses: Array | None,
+        steps: StepTables,
+        limits: tuple[float, float, float],
+        shares: Array = ALL_LOADS,
+        walks: tuple[int, int] = _WALKS,
+    ) -> Equilibria:
+        """Searches on any steps; see `solve_directions`."""
+        tables = self.tables
+        size = tables.frame_size
+        out = np.empty((len(gamma), 5 + size))
+        solve = kernels.solve_directions if tables.one_direction else kernels.solve_frames
+        given = np.zeros((0, size)) if guesses is None else np.ascontiguousarray(guesses)
+        arm = _columns(gamma), tables.axes, tables.at_tip, given, tuple(steps)
+        solve(*arm, limits, walks, shares, out)
+        margin = out[:, -2]
+        status = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)
+        ends = Equilibria(out[:, :3], status, margin, out[:, 3:-2])
+        return ends.only((out[:, -1] == kernels.FOUND) & np.isfinite(out[:, :-1]).all(axis=1))
+
+    def _traced(self, gamma: Array, frames: Array, steps: StepTables) -> Array:
+        """Sections between steps, tip first."""
+        return self._walked(gamma, frames, steps, (0, 0, len(gamma)))[2]
+
+    def _walked(
+        self, gamma: Array, frames: Array, steps: StepTables, counts: tuple[int, int, int]
+    ) -> tuple[Array, Array, Array]:
+        """Twists, compliances and sections of so many arms, all or none; see `respond`."""
+        moved, yielding, traced = counts
+        twists, yields = np.zeros((moved, 6, gamma.shape[1] or 1)), np.zeros((yielding, 3, 3))
+        sections = np.zeros((traced, len(steps.lengths) + 1, TRACE))
+        walked = _columns(gamma), self.tables.at_tip, np.ascontiguousarray(frames), tuple(steps)
+        respond(*walked, twists, yields, sections)
+        return twists[:, :, : gamma.shape[1]], yields, sections
 
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
@@ -76,24 +170,32 @@ class Solver:
         return equilibria
 
     def put(
-        self, gamma: Array, rows: slice | Index, found: Equilibria, equilibria: Equilibria
+        self, gamma: Array, rows: slice | Index, ends: Equilibria, equilibria: Equilibria
     ) -> None:
-        """Put down what is found at some rows of all activations."""
-        tips = np.where(found.is_found[:, None], found.tips, np.nan)
-        equilibria.put(rows, found._replace(tips=tips))
-        if self.tables.phase.squeeze >= 1.0:
-            self._give_up_squeezed(gamma, np.arange(len(gamma))[rows], equilibria)
+        """Put down what is found at some rows of all activations.
 
-    def _give_up_squeezed(self, gamma: Array, rows: Index, equilibria: Equilibria) -> None:
-        """No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out."""
-        edges = self.tables.edges(np.array([]), self.steps)[::-1]
-        z = self.tables.arm.profile.station(edges)
-        force = self.shapes(gamma[rows], z, equilibria.of(rows)).force[..., 2]
-        _, extension, eta = linear_strains(tables(self.tables.arm, z), gamma[rows])
-        extension = extension + eta * force * self.tables.body.compliance(z)[0]
-        squeezed = rows[(extension <= 0.0).any(axis=1)]
+        No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out.
+        """
+        tips = np.where(ends.is_found[:, None], ends.tips, np.nan)
+        equilibria.put(rows, ends._replace(tips=tips))
+        if self.tables.phase.squeeze < 1.0:
+            return
+        z = self.tables.arm.profile.station(self.tables.edges(np.array([]), self.steps)[::-1])
+        at = np.arange(len(gamma))[rows]
+        shapes = self.shapes(gamma[at], z, equilibria.of(at))
+        extension = self.strains_under(gamma[at], z, shapes).extension
+        squeezed = at[(extension <= 0.0).any(axis=1)]
         equilibria.tips[squeezed] = np.nan
         equilibria.status[squeezed] = TipStatus.NO_EQUILIBRIUM
+
+    def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
+        """The strains at stations Z [m], from m and n in the directors of the shapes there."""
+        arm = self.tables.arm
+        axial, bending, torsion = compliance_of(arm, z)
+        u, extension, eta = linear_strains(tables_at(arm, z.tobytes()), gamma)
+        extension = extension + eta * shapes.force[..., 2] * axial
+        yielded = np.stack([bending, bending, torsion], axis=1)
+        return per_length(u + shapes.moment * yielded, extension, eta)
 
     def base_map(self, gamma: Array) -> Map:
         """Map from directions of gravity at the tip of one arm (1, bundles) to those at its base.
@@ -102,8 +204,9 @@ class Solver:
         """
 
         def image(points: Array) -> Array:  # steps do not keep the length
-            directions = np.ascontiguousarray(points)
-            images = base_directions(gamma, self.tables, directions, self._steps)
+            images, directions = np.empty((len(points), 3)), np.ascontiguousarray(points)
+            at_tip, steps = self.tables.at_tip, tuple(self._steps)
+            kernels.base_directions(_columns(gamma), at_tip, directions, steps, images)
             return images / np.linalg.norm(images, axis=1, keepdims=True)
 
         return image
@@ -121,16 +224,19 @@ class Solver:
         is_uniform = len(edges) == len(self._steps.lengths) + 1  # stations at ends of steps alone
         table = self._steps if is_uniform else self.tables.of_edges(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
-        trace = walk(gamma, self.tables, directions, table, trace=True)[2]
-        margin = shoot(gamma, self.tables, directions, table, 0.0, margin_alone=True).margin
+        trace = self._traced(gamma, directions, table)
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
-        shapes = shapes_of(at, trace, rows, self._force_at(table, rows), nowhere)
-        return shapes.on_base(), margin
+        position, directors, *inner = _shapes_of(at, trace, table, rows, nowhere)
+        turn = np.swapaxes(directors[:, -1], -1, -2)  # so that the last one stands on the base
+        position, directors = (position - position[:, -1:]) @ turn, directors @ turn[:, None]
+        shapes = LoadedShapes(*(values[:, :-1] for values in (position, directors, *inner)))
+        margin = self._shot(gamma, directions, table, (np.inf, np.inf, 0.0), walks=(1, 0)).margin
+        return shapes, margin
 
     def frames_facing(self, gamma: Array, directions: Array) -> Array:
         """Frames, as in `Equilibria`, of arms whose tips see gravity along given directions."""
         whole = self._steps._replace(firsts=np.array([0, len(self._steps.lengths)]))
-        trace = walk(gamma, self.tables.in_one_segment, directions, whole, trace=True)[2]
+        trace = self._traced(gamma, directions, whole)
         seen = trace[:, self._steps.firsts[:-1], :3] @ rotation_matrices(trace[:, -1, 12:16])
         seen /= np.linalg.norm(seen, axis=2, keepdims=True)  # steps do not keep the length
         return seen.reshape(len(gamma), self.tables.frame_size)
@@ -142,59 +248,109 @@ class Solver:
         *,
         compliance: bool = False,
         directors: bool = False,
-    ) -> Response:
+    ) -> tuple[Array, Array, Array]:
         """Derivatives of tips, theory (74); NaN where there is no equilibrium.
 
         Args:
             gamma: Activations (n, bundles).
             known: Their equilibria, with these steps.
-            compliance: Whether to tell ∂r/∂F.
-            directors: Whether to tell the directors of the tips.
+            compliance: Whether ∂r/∂F is wanted.
+            directors: Whether the directors of the tips are.
+
+        Returns:
+            (v, ω) per activation, shape (n, 6, bundles); ∂r/∂F [m/N], shape (n, 3, 3) or (0, 3, 3);
+            directors as rows [-], likewise.
         """
-        lost = ~known.is_found
-        rows = np.where(lost, lost.argmin(), np.arange(len(gamma)))  # none is walked in vain
-        wanted = {"slopes": True, "compliance": compliance, "trace": directors}
-        twists, yields, trace = walk(
-            gamma[rows], self.tables, known.frame[rows], self._steps, **wanted
-        )
+        n, (rows, lost) = len(gamma), _found_rows(known)
+        counts = n, n * compliance, n * directors
+        twists, yields, trace = self._walked(gamma[rows], known.frame[rows], self._steps, counts)
         for values in (twists, yields):
             values[lost[: len(values)]] = np.nan
         if not directors:
-            return Response(twists, yields, np.empty((0, 3, 3)))
+            return twists, yields, np.empty((0, 3, 3))
         at, at_tip = np.zeros(1, int), np.array([self.tables.arm.length])
-        shapes = shapes_of(known.tips, trace, at, self._force_at(self._steps, at), at_tip)
-        return Response(twists, yields, shapes.frames.directors[:, 0])
+        shapes = _shapes_of(known.tips, trace, self._steps, at, at_tip)
+        return twists, yields, shapes.directors[:, 0]
 
     def shapes(self, gamma: Array, stations: Array, known: Equilibria) -> LoadedShapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
 
         Args:
             gamma: Activations (n, bundles).
-            stations: Ascending Z [m].
+            stations: Ascending Z [m]; there may be none.
             known: Their equilibria, with these steps or others.
         """
+        position, moment, force = np.empty((3, len(gamma), len(stations), 3))
+        shapes = LoadedShapes(position, np.empty((*position.shape, 3)), moment, force)
+        if not len(stations):
+            return shapes
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
-        force, shapes = self._force_at(table, rows), LoadedShapes.empty(len(gamma), len(stations))
 
         def fill(block: slice) -> None:
-            tips, trace = self._traced(gamma[block], known.of(block), table)
-            shapes.put(block, shapes_of(tips, trace, rows, force, stations))
+            at, lost = _found_rows(some := known.of(block))
+            inner = gamma[block][at]
+            ends = self._shot(inner, some.frame[at], table, (_WIDEST, _SMALL, 1e-12))
+            trace = self._traced(inner, ends.frame, table)
+            tips = np.where((lost | ~ends.is_found)[:, None], np.nan, ends.tips)
+            at_block = _shapes_of(tips, trace, table, rows, stations)
+            for values, new in zip(shapes, at_block, strict=True):
+                values[block] = new
 
         size = max(1, _TRACED // (len(edges) * TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
         return shapes
 
-    def _traced(self, gamma: Array, known: Equilibria, table: StepTables) -> tuple[Array, Array]:
-        """Tips and sections of arms near known ones on the steps of a table."""
-        lost = ~known.is_found
-        at = np.where(lost, lost.argmin(), np.arange(len(gamma)))
-        found = shoot(gamma[at], self.tables, known.frame[at], table, 1e-12)
-        trace = walk(gamma[at], self.tables, found.frame, table, trace=True)[2]
-        return np.where((lost | ~found.is_found)[:, None], np.nan, found.tips), trace
 
-    def _force_at(self, table: StepTables, rows: Index) -> Array:
-        """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
-        at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
-        return at_ends[rows]
+def _columns(gamma: Array) -> Array:
+    """Activations for kernels, which want one bundle at least."""
+    return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))
+
+
+def _found_rows(known: Equilibria) -> tuple[Index, Mask]:
+    """Rows with a found one in place of each that is lost, so that none is walked in vain."""
+    lost = ~known.is_found
+    return np.where(lost, lost.argmin(), np.arange(len(lost))), lost
+
+
+def _shapes_of(
+    tips: Array, trace: Array, table: StepTables, rows: Index, stations: Array
+) -> LoadedShapes:
+    """Shapes at stations Z [m], ends of steps with these rows, tip first; NaN where a tip is."""
+    force = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])[rows]
+    axes = _world(trace[:, -1])[:, None]
+    trace = trace[:, rows]
+    world, turn = _world(trace), rotation_matrices(trace[..., 12:16])
+    directors = np.swapaxes(world, -1, -2) @ axes
+    back = trace[..., None, 9:12] @ turn @ np.swapaxes(world, -1, -2) @ axes
+    position = tips[:, None] - back[..., 0, :]
+    position[:, stations == 0.0] = 0.0
+    directors[:, stations == 0.0] = np.eye(3)
+    moment = (trace[..., None, 6:9] @ turn)[..., 0, :]
+    thrust = ((force + trace[..., 16:19])[..., None, :] @ world)[..., 0, :]
+    for values in (position, directors, moment, thrust):
+        values[np.isnan(tips).any(axis=1)] = np.nan
+    return LoadedShapes(position, directors, moment, thrust)
+
+
+def _world(trace: Array) -> Array:
+    """Axes of the world in the directors of sections, as rows, without the errors of the steps."""
+    g, h = trace[..., 0:3], trace[..., 3:6]
+    g = g / np.linalg.norm(g, axis=-1, keepdims=True)
+    h = h - (g * h).sum(axis=-1, keepdims=True) * g
+    h /= np.linalg.norm(h, axis=-1, keepdims=True)
+    return np.stack([g, h, np.cross(g, h)], axis=-2) @ rotation_matrices(trace[..., 12:16])
+
+
+def units(frames: Array) -> Array:
+    """Frames whose directions have unit length."""
+    axes = frames.reshape(len(frames), frames.shape[1] // 3, 3)
+    size = np.linalg.norm(axes, axis=2, keepdims=True)
+    return (axes / np.maximum(size, 1e-300)).reshape(frames.shape)
+
+
+def turn_between(frames: Array, others: Array) -> Array:
+    """The largest change of a direction [rad], shape (n,)."""
+    change = (frames - others).reshape(len(frames), frames.shape[1] // 3, 3)
+    return np.sqrt(np.einsum("nki,nki->nk", change, change).max(axis=1))

@@ -8,7 +8,7 @@ like cosh of the same.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from softreach.kernels.loaded import unloaded_frames as rest_frames
 from softreach.kernels.loaded.rod_step import NODES
 from softreach.kernels.rod import magnus
 from softreach.kernels.rod import tips as rod
-from softreach.rod.steps import edges_between, ends_of_steps
+from softreach.rod.steps import edges_between, ends_of_steps, tables_on
 from softreach.support.arrays import Array, Index
 from softreach.support.lazy import lazy
 
@@ -32,23 +32,6 @@ _MOST_PHASE = math.pi / 2.0
 _MOST_STEPS = 1 << 16
 _STATIONS = 65
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-
-
-@dataclass(frozen=True)
-class ArmBody:
-    """The body of an arm; it weighs nothing where nothing falls."""
-
-    arm: Manipulator
-
-    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
-        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
-        return compliance(self.arm, z)
-
-    def mass_per_length(self, z: Array) -> Array:
-        """[kg/m], before activation."""
-        if self.arm.loads is None or not any(self.arm.loads.gravity):
-            return np.zeros(np.shape(z))
-        return self.arm.section.mass_per_length_at(self.arm.profile, z)
 
 
 class LoadPhase(NamedTuple):
@@ -82,44 +65,6 @@ class LoadPhase(NamedTuple):
         return max(2, math.ceil(min(self.steepest / _MOST_PHASE, _MOST_STEPS)))
 
 
-def load_phase(arm: Manipulator, loads: Loads, body: ArmBody) -> LoadPhase:
-    """The phase that loads give the tangents of an arm at most.
-
-    Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the sizes of
-    all forces and moments beyond, added whatever their directions, and ζ̂ the largest within bounds,
-    or η where that is larger.
-    """
-    even = np.linspace(0.0, arm.profile.slender_length, _STATIONS)
-    z = both_sides(arm, arm.profile.station(even))
-    axial, bending, torsion = body.compliance(z)
-    mass = body.mass_per_length(z)
-    with np.errstate(over="ignore"):
-        force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
-        swing = force * (1.0 + force * axial) * softest + (0.5 * loads.moment_size * softest) ** 2
-        table = tables(arm, z)
-        longest, grown = (
-            1.0 + ends_over(part, arm.bounds).T
-            for part in (table.extension, table.rest_length_factor)
-        )
-        relative = grown[1] / longest[0] if table.has_forces else 1.0
-        squeeze = float((force * axial * relative).max())
-        rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
-    steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
-    along = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(z)))
-    return LoadPhase(float(along[-1]), float(steepest.max()), squeeze, z, along)
-
-
-def _force(loads: Loads, z: Array, mass: Array) -> Array:
-    """The sizes of all forces beyond each station, added [N]."""
-    gravity, at_tip = math.hypot(*loads.gravity), math.hypot(*loads.tip_force)
-    per_length = math.hypot(*loads.force_per_length) + mass * gravity
-    each = 0.5 * (per_length[1:] + per_length[:-1]) * np.diff(z)
-    along = np.append(np.cumsum(each[::-1])[::-1], 0.0)
-    points = sum((math.hypot(*load.force) * (load.station >= z) for load in loads.point_loads), 0.0)
-    at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
-    return at_tip + along + points
-
-
 class StepTables(NamedTuple):
     """Steps from tip to base."""
 
@@ -137,20 +82,18 @@ class StepTables(NamedTuple):
     """The first step of each segment, and the number of steps, (segment + 1,)."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LoadTables:
-    """Tables of one arm under given loads, for any number of steps."""
+    """Tables of one arm under its loads, for any number of steps."""
 
     arm: Manipulator
-    loads: Loads
-    body: ArmBody
-    longest: float = field(default=PHASE_OF_SEGMENT, kw_only=True)
+    longest: float = PHASE_OF_SEGMENT
     """Phase of the longest segment between nodes [rad]."""
-    twist: float = field(default=0.0, kw_only=True)
+    twist: float = 0.0
     """Of the arm at rest [rad/m], beside that of its design."""
-    direction: Array | None = field(default=None, kw_only=True)
+    direction: Array | None = None
     """Unit vector in the base frame of one more force on the tip."""
-    force: float = field(default=0.0, kw_only=True)
+    force: float = 0.0
     """Of that [N]; nodes, axes and phase are the same for all."""
 
     def under(self, force: float) -> LoadTables:
@@ -159,6 +102,18 @@ class LoadTables:
         tables = replace(self, force=force)
         vars(tables).update(kept)
         return tables
+
+    @lazy
+    def loads(self) -> Loads:
+        """Loads on the arm beside its actuators, in the frame of the base."""
+        loads = self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+        return loads.seen_from(self.arm.base)
+
+    def _mass_per_length(self, z: Array) -> Array:
+        """[kg/m], before activation; 0 where nothing falls, as densities may not be known."""
+        if not any(self.loads.gravity):
+            return np.zeros(z.shape)
+        return self.arm.section.mass_per_length_at(self.arm.profile, z)
 
     @lazy
     def nodes(self) -> Array:
@@ -202,7 +157,7 @@ class LoadTables:
 
     @property
     def frame_size(self) -> int:
-        """Numbers by which the nodes of an arm tell how they see the world."""
+        """Numbers of a frame: how the nodes of an arm see the world."""
         return self.segments * (3 if self.one_direction else 6)
 
     @lazy
@@ -233,12 +188,45 @@ class LoadTables:
 
     @lazy
     def phase(self) -> LoadPhase:
-        """Phase that the loads give the tangents."""
-        return load_phase(self.arm, self.loads, self.body)
+        """The phase that the loads give the tangents at most.
+
+        Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the
+        sizes of all forces and moments beyond, added as if along one line, and ζ̂ the largest
+        within bounds, or η where that is larger.
+        """
+        arm, profile = self.arm, self.arm.profile
+        z = both_sides(arm, profile.station(np.linspace(0.0, profile.slender_length, _STATIONS)))
+        axial, bending, torsion = compliance(arm, z)
+        moment = self.loads.moment_size
+        with np.errstate(over="ignore"):
+            force, softest = self._largest_force(z), np.maximum(bending, torsion)
+            swing = force * (1.0 + force * axial) * softest + (0.5 * moment * softest) ** 2
+            table = tables(arm, z)
+            longest, grown = (
+                1.0 + ends_over(part, arm.bounds).T
+                for part in (table.extension, table.rest_length_factor)
+            )
+            relative = grown[1] / longest[0] if table.has_forces else 1.0
+            squeeze = float((force * axial * relative).max())
+            rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
+        steepest = rate * profile.radius(z) * profile.slender_length  # dZ = R2 dS
+        along = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(z)))
+        return LoadPhase(float(along[-1]), float(steepest.max()), squeeze, z, along)
+
+    def _largest_force(self, z: Array) -> Array:
+        """The sizes of all forces beyond each station, added [N]."""
+        loads = self.loads
+        gravity, at_tip = math.hypot(*loads.gravity), math.hypot(*loads.tip_force)
+        per_length = math.hypot(*loads.force_per_length) + self._mass_per_length(z) * gravity
+        each = 0.5 * (per_length[1:] + per_length[:-1]) * np.diff(z)
+        along = np.append(np.cumsum(each[::-1])[::-1], 0.0)
+        points = sum((math.hypot(*p.force) * (p.station >= z) for p in loads.point_loads), 0.0)
+        at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
+        return at_tip + along + points
 
     @lazy
     def _made(self) -> dict[int, StepTables]:
-        """Tables by their number of steps; searches ask for the same ones again."""
+        """Tables by their number of steps; searches use the same ones again."""
         return {}
 
     def uniform(self, steps: int) -> StepTables:
@@ -257,69 +245,44 @@ class LoadTables:
 
         No step is longer in S than those of `steps` uniform ones.
         """
-        profile = self.arm.profile
-        breaks = [
-            *ends_of_steps(self.arm, steps),
-            *(load.station for load in self.loads.point_loads),
-        ]
-        z = np.unique(np.concatenate([[0.0, self.arm.length], self.nodes, breaks, stations]))
-        return edges_between(profile, profile.slender_coordinate(z), steps)[::-1]
+        points = [load.station for load in self.loads.point_loads]
+        breaks = [0.0, self.arm.length, *ends_of_steps(self.arm, steps), *points]
+        z = np.unique(np.concatenate([breaks, self.nodes, stations]))
+        return edges_between(self.arm.profile, z, steps)[::-1]
 
     def of_edges(self, edges: Array) -> StepTables:
         """Tables of steps between boundaries S, tip first."""
-        profile, bundles = self.arm.profile, self.arm.bundles
-        width, fractions = -np.diff(edges), np.array(NODES)
-        s = edges[:-1, None] - width[:, None] * fractions
+        profile, width = self.arm.profile, -np.diff(edges)[:, None]
+        s, ends = edges[:-1, None] - width * np.array(NODES), profile.station(edges)
         z = profile.station(s)
-        ends = profile.station(edges)
         z[:, 0], z[:, -1] = ends[:-1], ends[1:]
-        inward = _inward(z)
-        at = tables(self.arm, inward.ravel())
-        measure = width[:, None] * profile.radius(inward)
-        axial, bending, torsion = (c.reshape(z.shape) for c in self.body.compliance(inward.ravel()))
+        # A hair inside their step, nodes at its ends take what jumps there from within.
+        inward = z + 1e-9 * (z[:, :1] - z[:, -1:]) * np.array([-1.0, 0.0, 0.0, 0.0, 1.0])
+        wide = (width * np.diff(np.array(NODES))).reshape(-1, 1)  # of the pieces between nodes
+        between = profile.station(s[:, 1:].reshape(-1, 1) + wide * np.array(magnus.NODES))
+        at, inside = tables_on(self.arm, inward, between)
+        resting = inside.rest_length_factor  # only rotations are needed
+        pieces = rod.pack(wide * profile.radius(between), resting, resting, inside.curvature)
+        pieces[:, 3::4, -1] += self.twist  # u3 at rest
+        measure = width * profile.radius(inward)
+        axial, bending, torsion = (c[..., None] for c in compliance(self.arm, inward))
         force = self._forces(z) @ self.axes.T
+        scalars = np.concatenate([bending, torsion - bending, axial, force], axis=-1)
         inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
-        scalars = np.concatenate(
-            [np.stack([bending, torsion - bending, axial], axis=-1), force], axis=-1
-        )
         return StepTables(
-            self._pieces(s, width),
-            rest_frames.pack_lengths(
-                measure,
-                at.extension.reshape(*z.shape, bundles),
-                at.rest_length_factor.reshape(*z.shape, bundles),
-            ),
+            pieces,
+            rest_frames.pack_lengths(measure, at.extension, at.rest_length_factor),
             np.ascontiguousarray(scalars),
-            np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
+            np.ascontiguousarray(at.curvature),
             self._moments(ends[:-1]),
             np.array([0, *inner, len(edges) - 1], np.int64),
         )
 
-    def _pieces(self, s: Array, width: Array) -> Array:
-        """Packed Magnus nodes between the nodes of steps."""
-        profile, bundles = self.arm.profile, self.arm.bundles
-        wide = (width[:, None] * np.diff(np.array(NODES))).ravel()
-        gauss = s[:, 1:].ravel()[:, None] + wide[:, None] * np.array(magnus.NODES)
-        z = profile.station(gauss)
-        at = tables(self.arm, z.ravel())
-        resting = at.rest_length_factor.reshape(*z.shape, bundles)  # only rotations are needed
-        pieces = rod.pack(
-            wide[:, None] * profile.radius(z),
-            resting,
-            resting,
-            at.curvature.reshape(*z.shape, 3, bundles),
-        )
-        pieces[:, 3::4, -1] += self.twist  # u3 at rest
-        return pieces
-
     def _forces(self, z: Array) -> Array:
         """Dead force n [N] at the nodes of steps, theory (60), (step, 5, 3)."""
-        loads, length = self.loads, self.arm.length
-        order = z.ravel()
-        ahead = np.concatenate([[length], order[:-1]])
-        half = 0.5 * (ahead - order)
-        at = order[:, None] + half[:, None] * (1.0 + _GAUSS)
-        mass = self.body.mass_per_length(at.ravel()).reshape(at.shape)
+        loads, length, order = self.loads, self.arm.length, z.ravel()
+        half = 0.5 * (np.concatenate([[length], order[:-1]]) - order)
+        mass = self._mass_per_length(order[:, None] + half[:, None] * (1.0 + _GAUSS))
         beyond = np.cumsum(half * (mass @ _WEIGHTS)).reshape(z.shape)
         force = self._at_tip + beyond[..., None] * np.array(loads.gravity)
         force = force + (length - z)[..., None] * np.array(loads.force_per_length)
@@ -339,12 +302,3 @@ class LoadTables:
 def _step_inward(ends: Array, station: float) -> int:
     """The step whose tip end, of these, is the station; one past the last for the base."""
     return int(np.argmin(np.abs(ends - station))) if station > 0.0 else len(ends)
-
-
-def _inward(z: Array) -> Array:
-    """Nodes a hair inside their steps, so that what jumps at a boundary is taken from within."""
-    hair = 1e-9 * (z[:, :1] - z[:, -1:])
-    inward = z.copy()
-    inward[:, :1] -= hair
-    inward[:, -1:] += hair
-    return inward
