@@ -31,12 +31,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.inverse.nearest import descend
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import (
     Roots,
     conditions,
+    descend,
     no_roots,
     placed,
     roots_at,

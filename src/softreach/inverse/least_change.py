@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.inverse.direction import constrained_minima
-from softreach.inverse.nearest import Reached, descend, first_of_each, reach
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
+from softreach.inverse.roots import Reached, descend, first_of_each, reach
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.sequential_projection import (
     FIRST_PROXIMITY,

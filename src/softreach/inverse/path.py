@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.nearest import descend
 from softreach.inverse.request import as_activations, as_residual, reach_tol
+from softreach.inverse.roots import descend
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles
 from softreach.rod.tip_map import TipMap
