@@ -67,13 +67,9 @@ _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is loo
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
-    """All roots inside the bounds, sorted by target.
+    """All roots inside the bounds of three free bundles, sorted by target.
 
     Sets of targets are solved together, each on a thread of its own.
-
-    Args:
-        prepared: A tip map of three free bundles.
-        request: Targets, and the residual that makes a root.
     """
     count = len(request.targets)
     if not count:
@@ -90,9 +86,8 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     if prepared.tip_map.supports_unstable or len(sets) == 1:
         parts = [_branches_of(prepared, request, chosen) for chosen in sets]
     else:
-        parts = list(
-            parallel.in_order(partial(_alone, prepared, request, chosen) for chosen in sets)
-        )
+        alone = parallel.undivided()(_branches_of)
+        parts = list(parallel.in_order(partial(alone, prepared, request, some) for some in sets))
     return joined_by("target", parts)
 
 
@@ -113,11 +108,6 @@ def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> 
     same = at_rest.residual <= request.reach_tol
     roots = distinct(prepared, request, roots.joined(rows(at_rest, same)))
     return roots.joined(distinct(prepared, request, rows(others, ~same)))
-
-
-def _alone(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
-    with parallel.undivided():
-        return _branches_of(prepared, request, chosen)
 
 
 def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
@@ -294,13 +284,9 @@ class Starts(NamedTuple):
 def starts_from_cells(
     prepared: PreparedMap, request: Request, chosen: Index, with_root: bool = True
 ) -> Starts:
-    """Starts for some of the targets, sorted by target.
+    """Starts for targets `chosen`, ascending numbers, sorted by target.
 
-    Args:
-        prepared: The tip map, with its cells and their tree.
-        request: The request; targets that follow each other are best near to each other.
-        chosen: Numbers of the targets, ascending.
-        with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
+    `with_root` leaves out tetrahedra whose quadratic does not reach the target.
     """
     parts = [Starts.empty(0)]
     if not len(prepared.mesh.corner) or not len(chosen):

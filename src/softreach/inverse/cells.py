@@ -28,12 +28,7 @@ _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 
 
 def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornCells]:
-    """Cells of the activation box with tips and Jacobians at their corners; those without apart.
-
-    Args:
-        tip_map: A tip map of three bundles, each free to move.
-        cells: Cells along each axis of the box.
-    """
+    """Cells of the box of three free bundles, as many along each axis; those without tips apart."""
     gamma = tip_map.box.from_cube(cube_grid(cells))
     vertices, corner = _Vertices(gamma, *tip_map.tips_and_slopes(gamma)), cell_corners(cells, 3)
     mesh = _mesh(tip_map, vertices, corner)
@@ -66,11 +61,7 @@ def image_tree(mesh: ActivationMesh) -> SpaceTree:
 
 
 class ImageLeaves:
-    """Trees that are not divided: for few targets, of no more than what may cover them.
-
-    Args:
-        mesh: Cells of the activation box.
-    """
+    """Trees that are not divided: for few targets, of no more than what may cover them."""
 
     def __init__(self, mesh: ActivationMesh) -> None:
         self._mesh, self._boxes, self._rounding = mesh, _image_boxes(mesh), _rounding(mesh)
@@ -78,11 +69,7 @@ class ImageLeaves:
         self._root = _root(self._boxes)
 
     def around(self, targets: Array) -> SpaceTree:
-        """The tetrahedra of the cells in whose boxes some targets lie; planes of no others.
-
-        Args:
-            targets: Targets [m], shape (t, 3).
-        """
+        """The tetrahedra of cells in whose boxes some targets (t, 3) lie; planes of no others."""
         mesh, near = self._mesh, np.zeros(len(self._boxes), bool)
         for place in targets[:, :, None]:
             near |= ((self._low <= place) & (place <= self._high)).all(axis=0)
@@ -146,11 +133,8 @@ def _mesh(tip_map: TipMap, vertices: _Vertices, corner: Index) -> ActivationMesh
     error, remainder = np.empty(len(corner)), np.empty(len(corner))
     interpolation_errors(*vertices, corner, error, remainder)
     error += 1e-9 * tip_map.length  # rounding must not put a target between two tetrahedra
-    slope = vertices.slope
-    change = np.sqrt(((slope[corner[:, 7]] - slope[corner[:, 0]]) ** 2).sum((1, 2)))
-    for bit in (1, 2, 4):
-        step = slope[corner[:, bit]] - slope[corner[:, 0]]
-        change += np.sqrt((step**2).sum((1, 2)))
+    first, *others = (vertices.slope[corner[:, k]] for k in (0, 7, 1, 2, 4))
+    change = np.sum([np.sqrt(((each - first) ** 2).sum((1, 2))) for each in others], axis=0)
     return ActivationMesh(*vertices, corner, error, remainder, change)
 
 

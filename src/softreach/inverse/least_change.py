@@ -59,10 +59,6 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     The others are those nearest to random activations, whatever their direction, and apart from
     each other: fewer than `family` where further searches end at what is known.
 
-    Args:
-        prepared: The tip map.
-        request: Targets, and what is preferred.
-
     Returns:
         Number of the target and activation, sorted by target, those of least change first; and the
         best place found for every target, reached or not.
@@ -298,7 +294,7 @@ def sqp(
         tip_map: The tip map.
         request: Targets, and what to stay near to.
         owner: Number of the target of each start, shape (n,).
-        start: Activations to begin with, inside the bounds [-], shape (n, m).
+        start: Inside the bounds [-], shape (n, m).
         penalty: Least penalty. A high one keeps a search near the target once it is there, as it
             must where the target lies next to a fold or to the boundary of the reachable set.
         proximity: σ of the first step, shape (n,) or one for all.

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.request import as_activations, as_residual, reach_tol
+from softreach.inverse.request import RESIDUALS, as_activations
 from softreach.inverse.roots import descend
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import InvalidInput
 
@@ -80,7 +81,7 @@ def track_path(
         )
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
-    residual = as_residual(residual_over_length)
+    residual = as_number("residual_over_length", residual_over_length, RESIDUALS)
     tracker = Continuation(free_bundles(tip_map), residual * tip_map.length)
     if start is not None:
         gamma = as_activations("start", start, tip_map.box, 1)[0]
@@ -122,7 +123,7 @@ class Continuation:
     def __init__(self, tip_map: TipMap, residual: float) -> None:
         """Set up for tips within `residual` [m] of their points, or as near as tips can tell."""
         self.tip_map, self.box, self.residual = tip_map, tip_map.box, residual
-        self.reach_tol = reach_tol(tip_map, residual)
+        self.reach_tol = max(residual, tip_map.tol * tip_map.length)
         self._torn = False  # whether the last correction met a place where the arm snaps
 
     def at(self, gamma: Array, tip_map: TipMap | None = None) -> BranchPoint:
@@ -293,7 +294,7 @@ class BranchEnd(NamedTuple):
 
 
 class _Substep(NamedTuple):
-    """A substep: where it led, or by how much to shorten it, or the end of the branch."""
+    """Where a substep led, or by how much to shorten it, or the end of the branch."""
 
     point: BranchPoint | None = None
     shorten: float = 1.0
@@ -331,7 +332,8 @@ def _dataset(
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
     activation, measures = np.full((len(points), box.bundles), np.nan), tip_map.measures
-    length, length_error = _end_length(points, n, end)
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = length_error = np.nan
     error = np.full(len(points), np.nan)
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""
@@ -340,6 +342,9 @@ def _dataset(
         tips = np.array([point.tip for point in followed])
         error[:n] = np.linalg.norm(tips - points[:n], axis=1)
         end_activation, end_position = box.with_fixed(end.point.gamma[None])[0], end.point.tip
+        length, length_error = float(lengths[: n - 1].sum()), end.error
+        if end.status != PathStatus.FOLLOWED:
+            length += end.done * float(lengths[n - 1])
         if end.status == PathStatus.BOUND:
             bundle, bound = box.names[box.free[end.bundle]], "upper" if end.upper else "lower"
     return xr.Dataset(
@@ -361,13 +366,3 @@ def _dataset(
             "end_bound": bound,
         },
     )
-
-
-def _end_length(points: Array, followed: int, end: BranchEnd | None) -> tuple[float, float]:
-    if end is None:
-        return np.nan, np.nan
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    length = float(lengths[: followed - 1].sum())
-    if end.status != PathStatus.FOLLOWED:
-        length += end.done * float(lengths[followed - 1])
-    return length, end.error

@@ -40,9 +40,8 @@ def gap_bounds(
         tip_map: The tip map.
         coarse: Its cells.
         targets: Shape (t, 3) [m].
-        gap: Distance of the best place known from each [m], shape (t,).
-        reach_tol: Distance that a bound must exceed to prove anything of the arm itself [m]; every
-            gap does.
+        gap: Distance of the best place known from each [m], shape (t,); above `reach_tol`.
+        reach_tol: Distance that a bound must exceed to prove anything of the arm itself [m].
 
     Returns:
         Bounds [m], shape (t,); 0 where nothing is proved.

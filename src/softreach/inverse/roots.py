@@ -1,4 +1,4 @@
-"""Ends of searches: roots of tip(γ) = target and nearest tips, and the searches for hard targets."""
+"""Roots of tip(γ) = target, how well the tip can be moved there, and searches for hard targets."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def no_roots(tip_map: TipMap) -> Roots:
 
 def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
     """Activations (n, m) as roots for some of the targets (t, 3) [m], whatever their residual."""
-    tips, slopes = tip_map.tips_and_slopes(gamma)
+    tips, slopes = placed(tip_map, gamma), tip_map.tips_and_slopes(gamma)[1]
     residual = np.linalg.norm(tips - targets[target], axis=1)
     cell, sheet = np.full(len(target), -1), np.zeros(len(target), np.int64)
     return Roots(target, gamma, tips, slopes, residual, cell, sheet)
@@ -220,15 +220,10 @@ class Reached(NamedTuple):
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
     """The activation found whose tip is nearest to each target, with growing effort.
 
-    Most targets are reached from the seed whose tip is nearest. The rest lie where the map is
-    singular or on the boundary of the reachable set, which is the image of faces of the box on
-    which few bundles are free: these are searched from many seeds, on such faces too, that lie
-    apart.
-
-    Args:
-        prepared: The tip map.
-        request: Targets, and the residual at which one is reached.
-        start: Activations to begin from, shape (t, m).
+    Most targets are reached from `start`, shape (t, m), or the seed whose tip is nearest. The rest
+    lie where the map is singular or on the boundary of the reachable set, which is the image of
+    faces of the box on which few bundles are free: these are searched from many seeds, on such
+    faces too, that lie apart.
     """
     box, targets = prepared.tip_map.box, request.targets
     first = descend(prepared.tip_map, targets, box.clip(start), request.residual)

@@ -11,7 +11,7 @@ from softreach.inverse.direction import compromises
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import Request, as_activations, as_residual, reach_tol
+from softreach.inverse.request import RESIDUALS, Request, as_activations
 from softreach.inverse.roots import (
     Roots,
     conditions,
@@ -107,12 +107,13 @@ def solve_inverse(
     preferred = np.zeros(box.bundles) if near is None else near
     measures = prepared.whole.measures
     unit = None if direction is None else as_directions("direction", direction, len(points))
-    residual = as_residual(residual_over_length) * prepared.whole.length
+    least = as_number("residual_over_length", residual_over_length, RESIDUALS)
+    residual = least * prepared.whole.length
     within = as_number("within", within, Range(0.0, unit="m"))
     request = Request(
         targets=points,
         residual=residual,
-        reach_tol=max(reach_tol(prepared.whole, residual), within),
+        reach_tol=max(residual, prepared.whole.tol * prepared.whole.length, within),
         near=as_activations("near", preferred, box, len(points)) / measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
