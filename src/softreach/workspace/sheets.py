@@ -22,8 +22,8 @@ from softreach.picture.shading import vertex_normals
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Faces, Mask
-from softreach.workspace.flux import box_slopes, face_triangles, grid_faces
-from softreach.workspace.grid import cube_grid
+from softreach.workspace.flux import face_triangles, grid_faces
+from softreach.workspace.grid import box_slopes, cube_grid
 from softreach.workspace.image import Image
 
 _FACE_CELLS = 40
