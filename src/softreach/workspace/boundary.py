@@ -140,7 +140,7 @@ def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySam
 
 
 def _of_cells(cells: ReachedCells) -> BoundarySamples:
-    tip_map, wrap = cells.tip_map, cells.wrap
+    tip_map, wrap = cells.grid.tip_map, cells.wrap
     if not cells.is_thick:
         group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
         return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,17 +18,17 @@ from softreach.support import parallel
 from softreach.support.arguments import as_names, as_number
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.quantity import quantity
 from softreach.workspace.boundary import BoundarySamples, boundary_samples
-from softreach.workspace.cells import ReachedCells
+from softreach.workspace.cells import ReachedCells, Wrap
 from softreach.workspace.flux import Flux, face_image, flux_tol, grid_faces, signed_volume
 from softreach.workspace.image import Image
 from softreach.workspace.measure import FLUX_PART, Estimate, HullCorners, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.tip_derivatives import Shifts, TipDerivatives, shifts_along
-from softreach.workspace.wrap import Wrap
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +47,6 @@ _MEANINGS = {
     "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
     "unreachability": ("1 per unit", "derivative of the unreachability"),
 }
-
 
 _CELLS = 40  # along each edge of the box, where its faces are the boundary
 _BLOCK = 1 << 21  # numbers at once
@@ -104,13 +103,9 @@ def volume_gradient(
 def gradient_of(
     solid: ReachableSet, names: tuple[str, ...], accuracy: float, progress: Progress = silent
 ) -> VolumeGradient:
-    """As `volume_gradient`, of a reachable set that is known.
+    """As `volume_gradient`, of a reachable set that is known to an accuracy.
 
-    Args:
-        solid: Reachable set of three free bundles or more.
-        names: Names of parameters.
-        accuracy: That to which the set was computed.
-        progress: Called with the number of parameters done since its last call, often with 0.
+    The progress is called with the number of parameters done since its last call, often with 0.
     """
     if solid.dimension < 3:
         raise InvalidInput("arm", "a set without a volume", "one of three free bundles or more")
@@ -381,14 +376,7 @@ class MovingBoundary:
         return cls(centers, np.linalg.norm(area, axis=1), swept)
 
     def lost(self, changes: Array) -> Array:
-        """Volume of what is no longer reached after changes of the parameters [m³].
-
-        Args:
-            changes: Shape (draws, parameters).
-
-        Returns:
-            Shape (draws,).
-        """
+        """Volume of what is no longer reached after changes (draws, parameters) [m³], (draws,)."""
         out, swept = np.empty(len(changes)), self.swept.astype(np.float32)
 
         def task(block: slice) -> None:
@@ -418,12 +406,12 @@ class MovingBoundary:
         """Distance to the center of the nearest triangle [m], shape (n,)."""
         return np.asarray(self._tree.query(points)[0])
 
-    @cached_property
+    @lazy
     def _wide(self) -> Index:
         """Numbers of the triangles that are no slivers."""
         return np.flatnonzero(self.area > _SLIVER * self.area.mean())
 
-    @cached_property
+    @lazy
     def _tree(self) -> KDTree:
         from scipy.spatial import KDTree
 

@@ -146,13 +146,7 @@ class Image:
         return replace(self, lattice=finer, unit=self.unit / times)
 
     def cube_places(self, spans: Spans, axis: int, which: Index) -> Array:
-        """Places of the unit cube of a grid of n³ boxes that go to where spans begin, (n, 3).
-
-        Args:
-            spans: Those along an axis.
-            axis: The axis.
-            which: Numbers of the spans.
-        """
+        """Places of the unit cube that go to where some spans along an axis begin, (n, 3)."""
         corners = self.triangles[spans.triangle[which], :3]
         at = np.stack(np.divmod(spans.column[which], self.lattice.shape[(axis + 2) % 3]), axis=1)
         plane = [(axis + 1) % 3, (axis + 2) % 3]
@@ -305,14 +299,7 @@ def image_of(
     progress: Progress = silent,
     half: LiftedGrid | None = None,
 ) -> Image:
-    """The image of a grid of three free bundles.
-
-    Args:
-        grid: The grid.
-        lattice: Cells to rasterize on.
-        progress: Called with the number of nodes done since its last call.
-        half: Of half as many cells, where it is known already and takes time.
-    """
+    """The image of a grid of three free bundles; `half` is that of half as many cells, if known."""
     scaled, nodes = lattice.coordinates(grid.tips), (grid.n + 1) ** 3
     places = scaled[:nodes].reshape(*(grid.n + 1,) * 3, 3)
     steps = [np.nanmax(np.abs(np.diff(places, axis=axis))) for axis in range(3)]

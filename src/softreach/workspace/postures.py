@@ -127,14 +127,8 @@ def all_postures(tip_map: TipMap, cells: int | None = None) -> AllPostures | Non
     """All postures that an arm holds, on sheets that are known at the nodes of a grid.
 
     A sheet that is narrower than the cells may be missing. Each goes on beyond its last nodes, as
-    far as the cells beside.
-
-    Args:
-        tip_map: The tip map.
-        cells: Of the grid along each free bundle; by default as many as 8,192 nodes allow.
-
-    Returns:
-        None where all are those to which activations lead straight from rest.
+    far as the cells beside. The grid has so many cells along each free bundle, by default as many
+    as 8,192 nodes allow. None where all are those to which activations lead straight from rest.
     """
     m, box = tip_map.box.dimension, tip_map.box
     if not tip_map.supports_unstable:

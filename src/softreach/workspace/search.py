@@ -162,14 +162,8 @@ def nearest_tips(
 ) -> Nearest:
     """The activations whose tips come closest to targets, as far as a descent from `start` finds.
 
-    Only stable equilibria are taken.
-
-    Args:
-        tip_map: The tip map.
-        start: Activations to begin with, within the bounds, shape (n, bundles).
-        targets: Places [m], shape (n, 3).
-        enough: Distance at which a target counts as reached [m].
-        stop: When to give up.
+    Starts are within the bounds, shape (n, bundles), and each has a target, shape (n, 3) [m], which
+    counts as reached at the distance `enough` [m]. Only stable equilibria are taken.
     """
     gamma = np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))

@@ -17,7 +17,7 @@ from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import MissingExtra
 from softreach.support.progress import Progress
-from softreach.workspace.cells import CLIMBERS, lost_share, shifted_lattice
+from softreach.workspace.cells import CLIMBERS, drawn_tight, lost_share, shifted_lattice
 from softreach.workspace.grid import (
     LiftedGrid,
     box_slopes,
@@ -31,7 +31,6 @@ from softreach.workspace.measure import Estimate, climbed_hull, named
 from softreach.workspace.postures import all_postures
 from softreach.workspace.reachable import SIZES, ReachableSet
 from softreach.workspace.search import DISTANCE, ENOUGH, ReachedGrid, all_reached, cloud_on_faces
-from softreach.workspace.wrap import drawn_tight
 
 _CELLS = {1: 1024, 2: 128}  # of the grids of a curve and of a surface, for distances and pictures
 _NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
