@@ -1,8 +1,8 @@
 """Reach of the tip with four free bundles or more, by search instead of by simplices.
 
 The box of m activations has m! simplices to a cell of its grid, its image has one boundary. So the
-image is found in space: a lattice tells how far its centers are from the nearest tip. Distances have
-a level set that goes around both sides of a sheet and its rim, of whatever thinness; each of its
+image is found in space: a lattice tells how far its centers are from the nearest tip. A level set
+of these distances goes around both sides of a sheet and its rim, of whatever thinness; each of its
 vertices is drawn to the nearest tip. Where this leaves a larger error, lines of sight through the
 centers that are reached add up to the volume. Each place that counts as reached has an activation
 that proves it; what searches miss is missing from the volume.
