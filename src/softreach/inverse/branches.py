@@ -125,17 +125,20 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
     roots = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
     roots = _with_partners(prepared, some, roots)
     missing = roots.missing(len(chosen), some.residual)
-    starts = starts_from_cells(prepared, some, missing)  # step 9
-    goal = some.targets[starts.target]
-    ends = nearest_tips(prepared.tip_map, starts.gamma, goal, some.residual, CLOSELY)
-    late = roots_at(prepared.tip_map, some.targets, starts.target, ends.gamma)
-    roots = roots.joined(distinct(prepared, some, rows(late, late.residual <= some.residual)))
+    starts = starts_from_cells(prepared, some, missing)
+    if len(starts.target):  # step 9
+        goal = some.targets[starts.target]
+        ends = nearest_tips(prepared.tip_map, starts.gamma, goal, some.residual, CLOSELY)
+        late = roots_at(prepared.tip_map, some.targets, starts.target, ends.gamma)
+        roots = roots.joined(distinct(prepared, some, rows(late, late.residual <= some.residual)))
     return roots._replace(target=chosen[roots.target])
 
 
 def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     """Steps 5 and 8: damped Newton from every start; the roots that are within the bounds."""
     tip_map, goal = prepared.tip_map, request.targets[starts.target]
+    if not len(goal):
+        return no_roots(tip_map)
     low, high = tip_map.box.low.copy(), tip_map.box.high.copy()
     start, n = _improved(tip_map, goal, starts), len(goal)
     search = Search(

@@ -155,10 +155,12 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
     lost |= np.bincount(owner, coarse.residual <= _HIT * tip_map.length, count) == 0
     owner = owner[leading]
     ends = _best(owner, _on_target(tip_map, request, owner, fine), request)
-    left = np.flatnonzero(ends.residual > request.residual)
-    lost[left] = True
-    ends.gamma[left], ends.residual[left] = reach(prepared, request.of(left), ends.gamma[left])
-    return _searched_again(prepared, request, ends, np.flatnonzero(lost), *every)
+    if len(left := np.flatnonzero(ends.residual > request.residual)):
+        ends.gamma[left], ends.residual[left] = reach(prepared, request.of(left), ends.gamma[left])
+        lost[left] = True
+    if lost.any():
+        return _searched_again(prepared, request, ends, np.flatnonzero(lost), *every)
+    return ends
 
 
 def _leading(prepared: PreparedMap, request: Request, owner: Index, ends: Minima) -> Index:

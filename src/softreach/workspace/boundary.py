@@ -16,7 +16,7 @@ from softreach.geometry.surface import Surface, enclosed_volume, level_set
 from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Index
 from softreach.workspace.cells import ReachedCells
-from softreach.workspace.image import Image
+from softreach.workspace.image import Image, Lattice
 
 _AWAY, _EVENED, _FAR = 1.0, 0.7, 3.0  # cells: a level set, widths of a filter, and no farther
 _CLASSES = 4  # every other line along both directions
@@ -124,19 +124,16 @@ def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySam
     """
     if isinstance(image, ReachedCells):
         return _of_cells(image)
-    lattice, rules = image.lattice, []
+    lattice, cuts = image.lattice, list[tuple[Array, Index, Array, Index]]()
     for axis, spans in enumerate(image.spans):
         jumps = np.diff((spans.cover > 0).astype(np.int64), prepend=0)
         jumps -= sense * np.diff(spans.degree, prepend=0)
         which = np.flatnonzero(jumps)
         i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
-        at = np.empty((len(which), 3))
-        at[:, axis], at[:, (axis + 1) % 3], at[:, (axis + 2) % 3] = spans.start[which], i, j
-        area = np.zeros((len(which), 3))
-        area[:, axis] = -(lattice.cell**2) * jumps[which]
-        places = lattice.origin + lattice.cell * at
-        rules.append((image.cube_places(spans, axis, which), places, area, _group(axis, i, j)))
-    return BoundarySamples(*(np.concatenate(parts) for parts in zip(*rules, strict=True)))
+        at = np.roll(np.stack([spans.start[which], i, j], axis=1), axis, axis=1)
+        cube = image.cube_places(spans, axis, which)
+        cuts.append((cube, np.full(len(which), axis), at, -jumps[which]))
+    return _on_lines(lattice, *(np.concatenate(parts) for parts in zip(*cuts, strict=True)))
 
 
 def _of_cells(cells: ReachedCells) -> BoundarySamples:
@@ -145,18 +142,18 @@ def _of_cells(cells: ReachedCells) -> BoundarySamples:
         group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
         return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
     crossings, _ = cells.swept
-    every, axis, lattice = np.arange(len(crossings.cell)), crossings.axis, cells.lattice
-    index = np.stack(np.unravel_index(crossings.cell, lattice.shape), axis=-1)
-    i, j = index[every, (axis + 1) % 3], index[every, (axis + 2) % 3]
+    cube = tip_map.box.to_cube(crossings.beyond)[:, tip_map.box.free].clip(0.0, 1.0)
+    at = crossings.coordinates(np.arange(len(cube)), crossings.place)
+    return _on_lines(cells.lattice, cube, crossings.axis, at, crossings.sense)
+
+
+def _on_lines(
+    lattice: Lattice, cube: Array, axis: Index, at: Array, sense: Index
+) -> BoundarySamples:
+    """Nodes at coordinates (n, 3) in cells, where lines along an axis leave the set or enter it."""
+    every = np.arange(len(at))
+    i, j = (at[every, (axis + k) % 3].astype(np.int64) for k in (1, 2))
     area = np.zeros((len(every), 3))
-    area[every, axis] = lattice.cell**2 * crossings.sense
-    return BoundarySamples(
-        tip_map.box.to_cube(crossings.beyond)[:, tip_map.box.free].clip(0.0, 1.0),
-        crossings.points(every, crossings.place),
-        area,
-        _group(axis, i, j),
-    )
-
-
-def _group(axis: int | Index, i: Index, j: Index) -> Index:
-    return _CLASSES * axis + 2 * (i % 2) + j % 2
+    area[every, axis] = lattice.cell**2 * sense
+    group = _CLASSES * axis + 2 * (i % 2) + j % 2
+    return BoundarySamples(cube, lattice.origin + lattice.cell * at, area, group)

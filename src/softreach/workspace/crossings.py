@@ -76,12 +76,15 @@ class Crossings:
         crossings.enclose(np.arange(n))
         return crossings
 
+    def coordinates(self, which: Index, t: Array) -> Array:
+        """Places on edges, t cells from the reached center, in cells, shape (n, 3)."""
+        at = np.stack(np.unravel_index(self.cell[which], self.lattice.shape), axis=-1).astype(float)
+        at[np.arange(len(which)), self.axis[which]] += self.sense[which] * t
+        return at
+
     def points(self, which: Index, t: Array) -> Array:
-        """Places on edges, t cells from the reached center [m], shape (n, 3)."""
-        lattice = self.lattice
-        index = np.stack(np.unravel_index(self.cell[which], lattice.shape), axis=-1).astype(float)
-        index[np.arange(len(which)), self.axis[which]] += self.sense[which] * t
-        return lattice.origin + lattice.cell * index
+        """The same [m]."""
+        return self.lattice.origin + self.lattice.cell * self.coordinates(which, t)
 
     def enclose(self, which: Index) -> None:
         """Bring `low` and `high` together on some of the edges."""

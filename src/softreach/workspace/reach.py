@@ -141,20 +141,13 @@ def rasterized_set(
 
 
 def allowed_error(solid: ReachableSet, accuracy: float) -> float:
-    """The error of the volume that has to do, relative.
+    """The relative error of the volume that is enough.
 
-    Of several sheets it falls as 1/n and no faster: twice what is asked has to do for them, but on
-    grids that take no time.
+    Of several sheets it falls as 1/n and no faster: for them twice as much is enough, but on grids
+    that take no time.
     """
     has_sheets = solid.is_torn and solid.cells > _QUICK
     return (_TORN if has_sheets else 1.0) * accuracy
-
-
-def is_worthwhile(solid: ReachableSet, accuracy: float) -> bool:
-    """True if the volume errs too much, and grids that memory holds may be fine enough."""
-    most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)
-    errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
-    return errs and (2 * solid.cells + 1) ** 3 <= most
 
 
 def _of_three(
@@ -169,7 +162,9 @@ def _of_three(
         if tip_map.is_smooth and not tip_map.supports_unstable and image.is_one_to_one:
             return _by_faces(image)
         solid = _by_raster(image, accuracy)
-        if not is_worthwhile(solid, accuracy):
+        most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)  # that memory holds
+        errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
+        if not errs or (2 * cells + 1) ** 3 > most:
             return solid
         cells, before = 2 * cells, grid
 
