@@ -9,7 +9,7 @@ import numpy as np
 from softreach.arm.base import Base
 from softreach.geometry.flat import Plane, are_inside, convex_edges, enclosed_area, plane_of
 from softreach.geometry.hull import convex_hull
-from softreach.geometry.surface import Surface, compact_surface
+from softreach.geometry.surface import Surface, compact_surface, surface_area
 from softreach.kernels.box.simplices import chains
 from softreach.rod.rods import ArmMap, refined
 from softreach.rod.tip_map import TipMap
@@ -101,12 +101,9 @@ def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
 
 
 def _size(grid: LiftedGrid) -> float:
-    corners = grid.tips[grid.cells]
-    if corners.shape[1] == 2:
-        return float(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=-1).sum())
-    first, last, second = (corners[:, k] - corners[:, 0] for k in (1, 3, 2))
-    pair = np.stack([np.cross(first, last), np.cross(last, second)])
-    return float((np.linalg.norm(pair, axis=-1).sum(axis=0) / 2.0).sum())
+    if grid.is_lifted.ndim == 2:
+        return surface_area(grid.tips, grid.cells[:, chains(2, 2)].reshape(-1, 3))
+    return float(np.linalg.norm(np.diff(grid.tips[grid.cells], axis=1), axis=-1).sum())
 
 
 def _convex_volume(grid: LiftedGrid) -> Estimate:
