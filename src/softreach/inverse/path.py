@@ -151,27 +151,32 @@ class Continuation:
             part = min(part, 1.0 - done)
             last = part >= 1.0 - done
             target = end if last else begin + (done + part) * (end - begin)
-            substep = self._predicted(point, target)
-            if substep.end is not None and (beside := self._beside(point, target)) is not None:
-                substep = _Substep(point=beside)  # as near as tips can tell where a bound is met
-            if substep.end is not None:
-                return substep.end._replace(done=done, error=shortest * distance)
-            torn = torn or substep.torn
-            if substep.point is not None:
-                point, done, part = substep.point.kept(), 1.0 if last else done + part, 2 * part
+            ahead = self._predicted(point, target)
+            torn = torn or self._torn
+            if isinstance(ahead, BranchEnd):
+                # Where a bound is met, the tip may be as near as tips can tell.
+                beside = self._beside(point, target)
+                if beside is None:
+                    return ahead._replace(done=done, error=shortest * distance)
+                ahead = beside
+            if isinstance(ahead, BranchPoint):
+                point, done, part = ahead.kept(), 1.0 if last else done + part, 2 * part
                 torn = False
-            elif part * substep.shorten < (shortest_torn if torn else shortest):
+            elif part * ahead < (shortest_torn if torn else shortest):
                 if (beside := self._beside(point, end)) is not None:
                     return BranchEnd(PathStatus.FOLLOWED, beside, done=1.0)
                 why = PathStatus.SNAPS if torn else PathStatus.FOLD
                 return BranchEnd(why, point, done=done, error=part * distance)
             else:
-                part *= substep.shorten
+                part *= ahead
         return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
 
-    def _predicted(self, point: BranchPoint, target: Array) -> _Substep:
-        """Predict and correct; bundles that would leave their bounds are held there."""
-        gamma, bundle, upper = point.gamma, -1, False
+    def _predicted(self, point: BranchPoint, target: Array) -> BranchPoint | BranchEnd | float:
+        """Predict and correct; bundles that would leave their bounds are held there.
+
+        A number says by how much to shorten the substep.
+        """
+        gamma, bundle, upper, self._torn = point.gamma, -1, False, False
         moving = self.box.is_free
         while moving.sum() >= 3:
             step = _least_norm(point.slope, moving) @ (target - point.tip)
@@ -180,27 +185,25 @@ class Continuation:
             blocked = moving & self._at_bound(gamma) & (self.box.excess(ahead) > _AT_BOUND)
             if not blocked.any():
                 if size > _LONGEST:
-                    return _Substep(shorten=0.9 * _LONGEST / size)
+                    return float(0.9 * _LONGEST / size)
                 corrected = self._corrected(point.tip_map, ahead, target, moving)
-                if corrected is None:
-                    return _Substep(shorten=0.5, torn=self._torn)
-                if self._left_branch(point, ahead, corrected):
-                    return _Substep(shorten=0.5)
+                if corrected is None or self._left_branch(point, ahead, corrected):
+                    return 0.5
                 over = self.box.excess(corrected.gamma) > _AT_BOUND
                 if not over.any():
-                    return _Substep(point=self._clipped(corrected))
+                    return self._clipped(corrected)
                 blocked = over & self._at_bound(gamma)
                 if not blocked.any():  # end just inside the bounds
                     way = (corrected.gamma - gamma)[over]
                     bound = np.where(way > 0.0, self.box.high[over], self.box.low[over])
                     inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales[over] / np.abs(way)
                     part = (bound - gamma[over]) / way * np.minimum(inside, 1 - 1e-6)
-                    return _Substep(shorten=float(np.clip(part.min(), 1e-6, 0.9999)))
+                    return float(np.clip(part.min(), 1e-6, 0.9999))
                 ahead = corrected.gamma
             bundle = int(np.flatnonzero(blocked)[0])
             upper = bool(ahead[bundle] > self.box.high[bundle])
             moving = moving & ~blocked
-        return _Substep(end=BranchEnd(PathStatus.BOUND, point, bundle, upper))
+        return BranchEnd(PathStatus.BOUND, point, bundle, upper)
 
     def _beside(self, point: BranchPoint, target: Array) -> BranchPoint | None:
         """The point of the branch that is at a place as far as tips can tell; None if none is."""
@@ -291,16 +294,6 @@ class BranchEnd(NamedTuple):
     """The part of the way to the next point that was followed [-]."""
     error: float = 0.0
     """Largest distance that the branch may go farther [m]."""
-
-
-class _Substep(NamedTuple):
-    """Where a substep led, or by how much to shorten it, or the end of the branch."""
-
-    point: BranchPoint | None = None
-    shorten: float = 1.0
-    end: BranchEnd | None = None
-    torn: bool = False
-    """True if it met a place where the arm snaps."""
 
 
 def _least_norm(slope: Array, moving: Mask) -> Array:
