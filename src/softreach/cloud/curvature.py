@@ -23,7 +23,7 @@ from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import Strains, TipMap, no_equilibrium
 from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
-from softreach.support.arguments import as_given, as_instance, as_integer
+from softreach.support.arguments import as_instance, as_integer
 from softreach.support.arrays import Array, Index, as_floats, as_shares
 from softreach.support.errors import InvalidInput
 
@@ -112,9 +112,8 @@ def stream_statistics(
     """
     bins = as_integer("bins", bins, 1, _MOST)
     shares = as_shares("quantiles", quantiles)
-    if not isinstance(activations, Iterable):
-        allowed = "an iterable of arrays of shape (n, bundles)"
-        raise InvalidInput("activations", as_given(activations), allowed)
+    allowed = "an iterable of arrays of shape (n, bundles)"
+    activations = as_instance("activations", activations, Iterable, allowed)
     tip_map = as_tip_map(arm)
     places = distal_stations(tip_map) if stations is None else stations
     z = tip_map.check_stations(np.atleast_1d(as_floats("stations", places)), ascending=False)

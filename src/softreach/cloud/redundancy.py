@@ -76,8 +76,8 @@ def activation_distance(
         mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
         mask, number = stable[sample], np.cumsum(stable) - 1
         among = number[sample[mask]]
-        found = mean_value_distance(tip[stable], activation[stable], radius, among)
-        mean[mask], others[mask] = found
+        known = mean_value_distance(tip[stable], activation[stable], radius, among)
+        mean[mask], others[mask] = known
     counted = {"long_name": "other tips within the radius", "units": "1"}
     return xr.DataArray(
         mean,

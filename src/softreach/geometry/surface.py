@@ -276,8 +276,8 @@ def parted(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     middles: list[Array] = []
     for k in several:
         sides = order[first[k] : first[k] + count[k]]
-        for one, other, place in _wedges(vertices, faces, sides):
-            corners[[one, other]] = len(vertices) + len(middles)
+        for side, other, place in _wedges(vertices, faces, sides):
+            corners[[side, other]] = len(vertices) + len(middles)
             middles.append(place)
     touching = corners.reshape(-1, 3)
     cut = (touching >= 0).any(axis=1)

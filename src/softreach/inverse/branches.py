@@ -93,14 +93,14 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
 
 def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     """The roots, and after those of each target the ones in other postures than from rest."""
-    found = [no_roots(prepared.tip_map)]
+    parts = [no_roots(prepared.tip_map)]
     for number, sheet in enumerate(prepared.sheets, 1):
         target, start = sheet.starts.starts(request.targets)
         ends = descend(sheet.tip_map, request.targets[target], start, request.residual)
         part = roots_at(sheet.tip_map, request.targets, target, ends.gamma)
         part = part._replace(sheet=np.full(len(target), number))
-        found.append(rows(part, part.residual <= request.reach_tol))
-    others = joined_by("target", found)
+        parts.append(rows(part, part.residual <= request.reach_tol))
+    others = joined_by("target", parts)
     if not len(others.target):
         return roots
     # A sheet goes on into activations at which its posture is that from rest.

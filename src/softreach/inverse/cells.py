@@ -40,8 +40,8 @@ def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornC
     if torn.any():
         mesh = _mesh(tip_map, vertices, corner[~torn])
     vertex = np.unique(corner[torn])
-    found = rows(vertices, vertex[np.isfinite(vertices.tip[vertex, 0])])
-    return mesh, TornCells.at(found, tip_map.box.widths / cells)
+    known = rows(vertices, vertex[np.isfinite(vertices.tip[vertex, 0])])
+    return mesh, TornCells.at(known, tip_map.box.widths / cells)
 
 
 class _Vertices(NamedTuple):
@@ -57,7 +57,7 @@ def image_tree(mesh: ActivationMesh) -> SpaceTree:
     low, size = _root(boxes)
     corner, edge, nodes, listed = low[None], size, 1, 0
     first, count = np.zeros(1, np.int64), np.array([len(planes)])
-    item, parts = np.arange(len(planes), dtype=np.int32), list[tuple[Index, ...]]()
+    item, parts = np.arange(len(planes), dtype=np.int32), list[tuple[Index, Index, Index, Items]]()
     for depth in range(_MOST_LEVELS + 1):
         # The fullest nodes, as many as leave room for the lists, which are four times as long.
         counts = np.sort(count)[::-1]
@@ -142,8 +142,8 @@ class TornCells(NamedTuple):
     def of_sheet(cls, tip_map: TipMap, gamma: Array, widths: Array) -> TornCells:
         """Places (n, 3) on a sheet in cells of these widths; its steep edges are seen from afar."""
         vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
-        found = rows(vertices, np.isfinite(vertices.tip[:, 0]))
-        return cls.at(found, 2.0 * widths)._replace(most=_MOST_OF_SHEET)
+        known = rows(vertices, np.isfinite(vertices.tip[:, 0]))
+        return cls.at(known, 2.0 * widths)._replace(most=_MOST_OF_SHEET)
 
     def starts(self, targets: Array) -> tuple[Index, Array]:
         """Number of the target and activation of each start, sorted by target."""

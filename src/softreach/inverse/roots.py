@@ -130,8 +130,8 @@ def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index
             owner, start = prepared.seeds.starts(near, most, apart)
             goal, owner = request.targets[part[owner]], part[owner]
             gamma = affine_invariant_newton(prepared.tip_map, goal, start, request.residual)
-            found = roots_at(prepared.tip_map, request.targets, owner, gamma)
-            roots = roots.joined(rows(found, found.residual <= request.residual))
+            ends = roots_at(prepared.tip_map, request.targets, owner, gamma)
+            roots = roots.joined(rows(ends, ends.residual <= request.residual))
     return roots
 
 
@@ -238,8 +238,10 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
         for some in np.array_split(left, 1 + len(left) * neighbors // 100_000):
             goal = targets[some]
             starts = [(np.repeat(np.arange(len(some)), random), np.tile(anywhere, (len(some), 1)))]
-            for name in ("seeds", "face_seeds")[: 1 + (neighbors > 1)]:  # one does for nearly all
-                seeds = getattr(prepared, name)
+            every = [prepared.seeds]
+            if neighbors > 1:  # the nearest seed is enough for nearly all
+                every.append(prepared.face_seeds)
+            for seeds in every:
                 starts.append(seeds.starts(seeds.nearest(goal, neighbors), most, apart))
             owner, start = map(np.concatenate, zip(*starts, strict=True))
             ends = descend(prepared.tip_map, goal[owner], start, request.residual)

@@ -101,12 +101,12 @@ class Wrap(Surface):
         areas = np.linalg.norm(self.corner_areas, axis=1)
         tips, slopes = tip_map.tips_and_slopes(self.gamma)
         normals = np.linalg.svd(slopes * tip_map.box.scales)[0][:, :, 2]
-        found = np.zeros(len(tips))
+        thick = np.zeros(len(tips))
         for _ in range(_PASSES):
             ways = (2.0 * thickness * normals, -2.0 * thickness * normals)
-            found = sum(_pushed(tip_map, self.gamma, tips, way) for way in ways)
-            thickness = float(np.quantile(found, _WIDEST))
-        return Estimate(0.5 * float(areas @ found), self.area * _SHEET_TOL * tip_map.length)
+            thick = sum(_pushed(tip_map, self.gamma, tips, way) for way in ways)
+            thickness = float(np.quantile(thick, _WIDEST))
+        return Estimate(0.5 * float(areas @ thick), self.area * _SHEET_TOL * tip_map.length)
 
     @lazy
     def cube(self) -> Array:
@@ -145,9 +145,9 @@ def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
     best = Nearest(np.zeros((n, grid.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
     for end in (np.floor(at), np.ceil(at)):
         cells = end.astype(np.int64) @ grid.steps
-        found = nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * lattice.cell)
-        closer = found.distance < best.distance
-        for kept, new in zip(best, found, strict=True):
+        nearest = nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * lattice.cell)
+        closer = nearest.distance < best.distance
+        for kept, new in zip(best, nearest, strict=True):
             kept[closer] = new[closer]
     return best
 
@@ -321,10 +321,10 @@ def searched_set(
     hull = climbed_hull(tip_map, begin.clip(0.0, 1.0), accuracy)
     while True:
         grid = of_cells(edge)
-        found = ReachedCells(grid, cloud, wrapped(grid), coarse, hull)
-        if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
-            return found
-        edge, coarse = edge / _FINER, found.wrap
+        cells = ReachedCells(grid, cloud, wrapped(grid), coarse, hull)
+        if cell is not None or not _may_meet(cells, accuracy, smallest, mean / _THINNEST):
+            return cells
+        edge, coarse = edge / _FINER, cells.wrap
 
 
 def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: float) -> bool:

@@ -169,8 +169,8 @@ class LiftedGrid:
         n, m = self.n // times, self.is_lifted.ndim
         if self.is_torn:
             return LiftedGrid.of(self.tip_map, n)
-        tips, one = every_node(self.tips, times, self.n, m), np.zeros((n,) * m, bool)
-        return LiftedGrid(self.tip_map, tips, one, self.lifted, finer=self)
+        tips, uncut = every_node(self.tips, times, self.n, m), np.zeros((n,) * m, bool)
+        return LiftedGrid(self.tip_map, tips, uncut, self.lifted, finer=self)
 
 
 def every_node(values: Array, times: int, n: int, m: int = 3) -> Array:
@@ -246,9 +246,9 @@ def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
     parted = label[forked][first]
     parts = sheet[parted]
     parts[part, corner[forked]] = state[forked]
-    whole = np.setdiff1d(np.arange(len(sheet)), parted)
-    every = np.concatenate([whole, parted])
-    return of_cell[every], np.concatenate([sheet[whole], parts])
+    simple = np.setdiff1d(np.arange(len(sheet)), parted)
+    every = np.concatenate([simple, parted])
+    return of_cell[every], np.concatenate([sheet[simple], parts])
 
 
 def _joined(held: Held, states: Index) -> Index:
@@ -280,9 +280,9 @@ def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
     pairs = np.stack([slot, len(row) + of_key], axis=1)
     label = components(pairs, len(row) + len(keys))
     groups, group = np.unique(label[: len(row)], return_inverse=True)
-    found = np.searchsorted(keys, ends := held.ends @ [1, total]).clip(max=max(len(keys) - 1, 0))
-    known = np.flatnonzero(keys[found] == ends) if len(keys) else found[:0]
-    group_of_end = np.searchsorted(groups, label[len(row) + found[known]])
+    place = np.searchsorted(keys, ends := held.ends @ [1, total]).clip(max=max(len(keys) - 1, 0))
+    known = np.flatnonzero(keys[place] == ends) if len(keys) else place[:0]
+    group_of_end = np.searchsorted(groups, label[len(row) + place[known]])
     tips = _means(held.end_tips[known], group_of_end, len(groups))
     for _ in range(corners.shape[1]):  # corners that no edge of a cell leads to
         around = _means(tips[group], row, len(states))

@@ -255,7 +255,7 @@ def climbed_hull(
         area = np.linalg.norm(vectors, axis=1)
         normals = vectors / np.maximum(area, np.finfo(float).tiny)[:, None]
         start = corners.cube[corners.faces[:, 0]]
-        found, tips, top = _climbed(tip_map, start, normals, _ENOUGH * accuracy * size, size)
+        ends, tips, top = _climbed(tip_map, start, normals, _ENOUGH * accuracy * size, size)
         every = np.concatenate([corners.tips, tips])
         for rows in range(0, len(top), _TOGETHER):
             block = slice(rows, rows + _TOGETHER)
@@ -263,7 +263,7 @@ def climbed_hull(
             top[block] = np.fmax(top[block], attained)
         offset = np.einsum("fi,fi->f", corners.tips[corners.faces[:, 0]], normals)
         high = low + float(area @ (top - offset).clip(0.0))
-        corners = HullCorners.of(every, np.concatenate([corners.cube, found]), hull_of)
+        corners = HullCorners.of(every, np.concatenate([corners.cube, ends]), hull_of)
         last, error = error, 0.5 * (high - corners.volume)
         if error <= accuracy * high or error > _LESS * last:
             break

@@ -67,8 +67,8 @@ class AllPostures(TipMap):
         every = [each.gamma for each in self.sheets]
         number = np.repeat(np.arange(len(every)) + 1.0, [len(gamma) for gamma in every])
         gamma = np.column_stack([np.concatenate(every), number]).astype(np.float64)
-        found = np.isfinite(tips := self.tips(gamma)).all(axis=1)
-        return gamma[found], tips[found]
+        held = np.isfinite(tips := self.tips(gamma)).all(axis=1)
+        return gamma[held], tips[held]
 
     @lazy
     def box(self) -> ActivationBox:

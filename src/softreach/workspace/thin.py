@@ -151,20 +151,20 @@ def planar_set(tip_map: TipMap, plane: Plane, accuracy: float, progress: Progres
 
     coarse = outline(_FINER * edge)
     while True:
-        found = outline(edge)
-        slack = found.length * (ENOUGH * edge + tip_map.tol * tip_map.length)
-        area = Estimate(found.area, abs(found.area - coarse.area) + slack)
+        fine = outline(edge)
+        slack = fine.length * (ENOUGH * edge + tip_map.tol * tip_map.length)
+        area = Estimate(fine.area, abs(fine.area - coarse.area) + slack)
         if area.error <= accuracy * area.value or edge / _FINER < sides.max() / _MOST:
             break
-        edge, coarse = edge / _FINER, found
+        edge, coarse = edge / _FINER, fine
     area = _smooth(tip_map, flat, area)
-    cube = flat.box.to_cube(np.concatenate([gamma[:CLIMBERS], found.gamma]))[:, flat.box.free]
+    cube = flat.box.to_cube(np.concatenate([gamma[:CLIMBERS], fine.gamma]))[:, flat.box.free]
     return ReachableSet(
         tip_map=tip_map,
         lost_share=lost_share(flat),
         hysteresis_share=0.0 if every is None else every.hysteresis_share,
-        mesh=_mesh(found, plane),
-        outline=Surface(vertices=plane.places(found.tips), faces=found.edges[:, [0, 1, 1]]),
+        mesh=_mesh(fine, plane),
+        outline=Surface(vertices=plane.places(fine.tips), faces=fine.edges[:, [0, 1, 1]]),
         **named(area=area, convex_area=climbed_hull(flat, cube, accuracy, convex_edges).volume),
     )
 
