@@ -139,8 +139,8 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     tip_map, goal = prepared.tip_map, request.targets[starts.target]
     if not len(goal):
         return no_roots(tip_map)
-    low, high = tip_map.box.low.copy(), tip_map.box.high.copy()
-    start, n = _improved(tip_map, goal, starts), len(goal)
+    low, high, n = tip_map.box.low.copy(), tip_map.box.high.copy(), len(goal)
+    start = _improved(tip_map, goal, starts)
     search = Search(
         target=goal,
         gamma=start.copy(),

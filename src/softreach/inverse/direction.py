@@ -111,18 +111,10 @@ def objective(
 
     Theory (40). With the right λ its minimum is the least change that reaches the target (an
     augmented Lagrangian); without λ, and then without the change, a compromise of distance and
-    direction.
-
-    Args:
-        tip_map: The tip map.
-        request: A target and a direction for each search.
-        penalty: μ [-].
-        multiplier: λ of each search, shape (n, 3).
-        which: Numbers of searches, shape (k,).
-        gamma: Their activations, shape (k, m).
+    direction. μ is the penalty and λ the multiplier of each search, shape (n, 3).
 
     Returns:
-        Values (k,) and gradients (k, m).
+        Values (k,) and gradients (k, m) at activations (k, m) of some searches, numbers (k,).
     """
     assert request.direction is not None
     motions, wanted = tip_map.tip_motions(gamma), request.direction[which]

@@ -325,9 +325,8 @@ def _dataset(
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
     activation, measures = np.full((len(points), box.bundles), np.nan), tip_map.measures
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    lengths, error = np.linalg.norm(np.diff(points, axis=0), axis=1), np.full(len(points), np.nan)
     length = length_error = np.nan
-    error = np.full(len(points), np.nan)
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""
     if end is not None:

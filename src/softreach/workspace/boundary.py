@@ -93,10 +93,8 @@ class BoundarySamples:
     def derivative(self, slopes: Array, weights: Array | None = None) -> Array:
         """Derivatives of the volume, swept by the boundary, theory (98), shape (parameters,).
 
-        Args:
-            slopes: ∂r/∂p at the nodes, shape (n, 3, parameters).
-            weights: Of each node, shape (n,): 1 where it is in a region and 0 elsewhere give the
-                derivative of the volume of the part of the set in that region.
+        By ∂r/∂p at the nodes, shape (n, 3, parameters). Weights (n,) that are 1 in a region and 0
+        elsewhere give the derivative of the volume of the part of the set in that region.
         """
         area = self.area if weights is None else self.area * weights[:, None]
         return np.einsum("ni,nip->p", area, slopes)
@@ -116,11 +114,9 @@ class BoundarySamples:
 def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySamples:
     """Nodes on all of the boundary of an image; the vertices of what is wrapped.
 
-    Args:
-        image: Of three free bundles or more.
-        sense: Of three, the orientation that the larger part of the map keeps, 1 or -1: nodes are
-            then those where the image is not one to one, the boundary less what of it the degree
-            tells, for the derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
+    With the orientation that the larger part of a map of three bundles keeps, 1 or -1, nodes are
+    those where the image is not one to one, the boundary less what of it the degree tells, for the
+    derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
     """
     if isinstance(image, ReachedCells):
         return _of_cells(image)

@@ -69,7 +69,8 @@ _STRETCH = 30.0  # times as much as one to the side, a miss along the normal cou
 _PUSHES, _PASSES = 12, 4
 _DAMPING = 1e-8  # of the mean square of the slopes
 CLIMBERS = 1024
-"""Of these, for the convex hull beside tips on the boundary: more make countless facets."""
+"""Tips of a cloud from which the convex hull is climbed, beside those on the boundary: more make
+countless facets."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -140,16 +141,16 @@ def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
 
 def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
     """Nearest tips of places (n, 3) on edges of the lattice, in cells, from those at both ends."""
-    lattice, n = grid.lattice, len(at)
+    lattice = grid.lattice
     places = lattice.origin + lattice.cell * at
-    best = Nearest(np.zeros((n, grid.gamma.shape[1])), np.full((n, 3), np.nan), np.full(n, np.inf))
-    for end in (np.floor(at), np.ceil(at)):
-        cells = end.astype(np.int64) @ grid.steps
-        nearest = nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * lattice.cell)
-        closer = nearest.distance < best.distance
-        for kept, new in zip(best, nearest, strict=True):
-            kept[closer] = new[closer]
-    return best
+    first, second = (
+        nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * lattice.cell)
+        for cells in (end.astype(np.int64) @ grid.steps for end in (np.floor(at), np.ceil(at)))
+    )
+    closer = second.distance < first.distance
+    for kept, new in zip(first, second, strict=True):
+        kept[closer] = new[closer]
+    return first
 
 
 def wrapped(grid: ReachedGrid) -> Wrap:

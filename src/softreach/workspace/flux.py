@@ -30,15 +30,10 @@ def signed_volume(tip_map: TipMap, nodes: int | None = None, *, enough: float = 
     any power of the number of nodes. They are added until tips are no more exact than the rule. Of
     maps with kinks it is the volume in mapped triangles, which needs no slopes.
 
-    Args:
-        tip_map: The tip map.
-        nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
-            tips are then less exact.
-        enough: Relative change of the volume that ends the adding of nodes; tips of free arms are
-            then as exact as those of the map.
-
-    Returns:
-        Value and error are NaN if a node has no stable equilibrium.
+    With a number of nodes along each side, the rule is taken for this and two thirds of it alone;
+    tips are then less exact. `enough` is the relative change of the volume that ends the adding of
+    nodes; tips of free arms are then as exact as those of the map. Value and error are NaN if a
+    node has no stable equilibrium.
     """
     if tip_map.supports_unstable:
         tip_map = refined(tip_map, _LOADED_TOL)

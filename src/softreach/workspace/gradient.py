@@ -350,13 +350,7 @@ class MovingBoundary:
 
         Where the map is one to one, its triangles are images of triangles on the faces of the box;
         elsewhere they are found in the raster and move as the nearest place does at which a line
-        of sight cuts the boundary.
-
-        Raises:
-            InvalidInput: A parameter counts something, has no value, or its change holds or frees a
-                bundle.
-            InvalidDesign: The design has no neighbors with other values of a parameter.
-            MissingExtra: scikit-image is not installed.
+        of sight cuts the boundary. Raises as `TipDerivatives` and `ReachableSet.surface`.
         """
         tips = TipDerivatives(solid.tip_map, parameters)
         by_faces = solid.route == "flux"
