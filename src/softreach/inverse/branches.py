@@ -152,8 +152,7 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
         state=np.full(n, RUNNING),
     )
     for _ in range(_MOST_ITERATIONS):
-        active = np.flatnonzero(search.state == RUNNING)
-        if not len(active):
+        if not len(active := np.flatnonzero(search.state == RUNNING)):
             break
         tips, slopes = tip_map.tips_and_slopes(search.trial[active])
         newton.newton_step(search, active, tips, slopes, low, high, request.residual)
