@@ -1,4 +1,4 @@
-"""Everything that the tip of an arm can reach, as a value to be asked."""
+"""Everything that the tip of an arm can reach: sizes with their errors, surface, distances."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra, NotPossible, counted
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.boundary import boundary_surface, wrapped_surface
 from softreach.workspace.cells import Covering, ReachedCells, cells_of
 from softreach.workspace.flux import face_image
-from softreach.workspace.image import DIAGONAL, Image
+from softreach.workspace.image import DIAGONAL, Image, boundary_surface, wrapped_surface
 from softreach.workspace.measure import Estimate, extrapolated
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
