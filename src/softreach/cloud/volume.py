@@ -176,7 +176,7 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
 
 
 def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> float | str:
-    """The radius asked for [m], or ``"critical"``."""
+    """The radius [m], by default that for the length of the arm, or ``"critical"``."""
     allowed = "a radius > 0 [m], 'critical', or None"
     if alpha is None:
         if (length := getattr(points, "attrs", {}).get("length")) is None:
@@ -184,9 +184,7 @@ def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> flo
             hint = f"{hint} of {DEFAULT_RADIUS} of it"
             raise InvalidInput("alpha", None, "a radius [m] for these points", hint)
         return DEFAULT_RADIUS * float(length)
-    if isinstance(alpha, str):
-        if alpha != "critical":
-            raise InvalidInput("alpha", repr(alpha), allowed)
+    if isinstance(alpha, str) and alpha == "critical":
         return alpha
     radius = plain(alpha)
     if POSITIVE.admits(radius) or (isinstance(radius, float) and radius == np.inf):

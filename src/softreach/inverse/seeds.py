@@ -159,7 +159,5 @@ def face_seeds(tip_map: TipMap, coarse: TipMap) -> Seeds:
 
 def _with_tips(tip_map: TipMap, gamma: Array, coarse: TipMap) -> Seeds:
     tip = tip_map.tips(gamma)
-    if tip_map.supports_unstable:
-        known = np.isfinite(tip[:, 0])
-        gamma, tip = gamma[known], tip[known]
-    return Seeds(gamma, tip, coarse)
+    known = np.isfinite(tip[:, 0])
+    return Seeds(gamma[known], tip[known], coarse)

@@ -268,8 +268,6 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     cube[bound] = rng.integers(0, 2, int(bound.sum()))
     gamma = np.ascontiguousarray(box.from_free_cube(cube))
     tips = tip_map.tips(gamma)
-    if not tip_map.supports_unstable:
-        return gamma, tips
     stable = np.isfinite(tips[:, 0])
     if not stable.any():
         raise no_equilibrium(len(tips))
