@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
@@ -113,14 +112,8 @@ class AllPostures(TipMap):
             if status is not None:
                 status[rows] = kept
 
-    def shapes(
-        self,
-        activations: ArrayLike,
-        framed: ArrayLike,
-        strained: ArrayLike,
-        status: Status | None = None,
-    ) -> Shapes:
-        raise NotImplementedError
+    def shapes(self, *_: Any, **__: Any) -> Shapes:
+        raise NotImplementedError  # its shapes are those of the maps that it is made of
 
 
 def all_postures(tip_map: TipMap, cells: int | None = None) -> AllPostures | None:
