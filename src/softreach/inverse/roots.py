@@ -33,7 +33,7 @@ _FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
 
 
 class Roots(NamedTuple):
-    """Activations of the free bundles, each a root for one of the targets."""
+    """Activations of the free bundles, each a root for one of the targets or the nearest tip."""
 
     target: Index
     """Number of the target, shape (n,)."""
@@ -69,7 +69,9 @@ def no_roots(tip_map: TipMap) -> Roots:
 
 def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
     """Activations (n, m) as roots for some of the targets (t, 3) [m], whatever their residual."""
-    tips, slopes = placed(tip_map, gamma), tip_map.tips_and_slopes(gamma)[1]
+    tips, slopes = tip_map.tips_and_slopes(gamma)
+    if not tip_map.supports_unstable:
+        tips = tip_map.tips(gamma)  # to the last bit those that users get
     residual = np.linalg.norm(tips - targets[target], axis=1)
     cell, sheet = np.full(len(target), -1), np.zeros(len(target), np.int64)
     return Roots(target, gamma, tips, slopes, residual, cell, sheet)
