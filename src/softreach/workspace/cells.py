@@ -141,10 +141,9 @@ def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
 
 def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
     """Nearest tips of places (n, 3) on edges of the lattice, in cells, from those at both ends."""
-    lattice = grid.lattice
-    places = lattice.origin + lattice.cell * at
+    places = grid.lattice.places(at)
     first, second = (
-        nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * lattice.cell)
+        nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * grid.lattice.cell)
         for cells in (end.astype(np.int64) @ grid.steps for end in (np.floor(at), np.ceil(at)))
     )
     closer = second.distance < first.distance
@@ -161,7 +160,7 @@ def wrapped(grid: ReachedGrid) -> Wrap:
     """
     at, faces = level_set(grid.distances, DISTANCE)
     gamma, tips, _ = drawn_tight(grid, at)
-    cell, away = grid.lattice.cell, grid.lattice.origin + grid.lattice.cell * at - tips
+    cell, away = grid.lattice.cell, grid.lattice.places(at) - tips
     away /= np.linalg.norm(away, axis=1).clip(1e-9 * cell)[:, None]
     return Wrap(
         vertices=tips + _ASIDE * cell * away,

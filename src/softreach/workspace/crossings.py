@@ -84,7 +84,7 @@ class Crossings:
 
     def points(self, which: Index, t: Array) -> Array:
         """The same [m]."""
-        return self.lattice.origin + self.lattice.cell * self.coordinates(which, t)
+        return self.lattice.places(self.coordinates(which, t))
 
     def enclose(self, which: Index) -> None:
         """Bring `low` and `high` together on some of the edges."""

@@ -492,4 +492,4 @@ def _on_lines(
     area = np.zeros((len(every), 3))
     area[every, axis] = lattice.cell**2 * sense
     group = _CLASSES * axis + 2 * (i % 2) + j % 2
-    return BoundarySamples(cube, lattice.origin + lattice.cell * at, area, group)
+    return BoundarySamples(cube, lattice.places(at), area, group)

@@ -63,6 +63,10 @@ class Lattice(NamedTuple):
         """Points [m] in cells from the center of cell (0, 0, 0)."""
         return (points - self.origin) / self.cell
 
+    def places(self, coordinates: Array | Index) -> Array:
+        """Such coordinates as points [m]."""
+        return self.origin + self.cell * coordinates
+
 
 def covered_cubes(covered: Mask) -> Mask:
     """Cubes between eight neighboring centers of a lattice that are all covered."""
@@ -380,11 +384,11 @@ def boundary_surface(image: Image, volume: float) -> Surface:
 
 
 def _level_set(image: Image, level: float) -> Surface:
-    field, lattice = image.signed_field, image.lattice
+    field = image.signed_field
     if not (field < level).any():
         return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
     vertices, faces = level_set(field, level)
-    return Surface(vertices=lattice.origin + lattice.cell * vertices, faces=faces)
+    return Surface(vertices=image.lattice.places(vertices), faces=faces)
 
 
 def wrapped_surface(image: Image, volume: float) -> Surface:
@@ -397,10 +401,9 @@ def wrapped_surface(image: Image, volume: float) -> Surface:
     Raises:
         MissingExtra: scikit-image is not installed.
     """
-    lattice = image.lattice
     vertices, faces = level_set(gaussian_filter(_distances(image), _EVENED), _AWAY)
-    places = lattice.origin + lattice.cell * vertices
-    back = _AWAY * lattice.cell * vertex_normals(places, faces)
+    places = image.lattice.places(vertices)
+    back = _AWAY * image.lattice.cell * vertex_normals(places, faces)
     far, near = (enclosed_volume(places - part * back, faces) for part in (0.0, 1.0))
     part = float(np.clip((far - volume) / (far - near), 0.5, 1.5))
     return Surface(vertices=places - part * back, faces=faces)
@@ -412,7 +415,6 @@ def _distances(image: Image) -> Array:
     near = covered & ~np.asarray(binary_erosion(covered), bool)
     near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
     near = np.asarray(binary_dilation(near, np.ones((3, 3, 3)), iterations=2), bool) & ~covered
-    centers = image.lattice.origin + image.lattice.cell * np.argwhere(near)
-    distances = np.where(covered, 0.0, _FAR)
+    distances, centers = np.where(covered, 0.0, _FAR), image.lattice.places(np.argwhere(near))
     distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)
     return distances

@@ -415,8 +415,8 @@ class ReachableSet:
         try:
             return html_card(repr(self), Skin(self.surface().vertices, self.surface().faces))
         except MissingExtra:  # cells instead of a surface
-            lattice, cells = self.image.lattice, np.argwhere(self.image.counts[0] > 0)
-            return html_card(repr(self), Dots(lattice.origin + lattice.cell * cells))
+            cells = np.argwhere(self.image.counts[0] > 0)
+            return html_card(repr(self), Dots(self.image.lattice.places(cells)))
 
     @property
     def _several(self) -> float:

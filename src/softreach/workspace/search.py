@@ -108,8 +108,7 @@ class ReachedGrid:
 
     def centers(self, cells: Index) -> Array:
         """Places [m] of cells given by flat index, shape (n, 3)."""
-        index = np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1)
-        return self.lattice.origin + self.lattice.cell * index
+        return self.lattice.places(np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1))
 
     def add_inside(self, inside: Callable[[Array], Mask]) -> None:
         """Take centers for reached, without a search, that are within a part known to be [m]."""
