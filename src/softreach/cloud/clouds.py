@@ -18,7 +18,7 @@ from softreach.rod.rods import all_inputs, as_tip_map, with_unstable
 from softreach.rod.tip_map import BLOCK, Frame, TipMap
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
-from softreach.support.arguments import as_dataset, as_flag, as_path
+from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import place_to_read, replacing_folder
@@ -34,7 +34,7 @@ from softreach.support.files.stores import (
     storage_errors,
 )
 from softreach.support.memory import check_memory
-from softreach.support.progress import Progress, as_progress, bar
+from softreach.support.progress import Progress, bar
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,14 +82,14 @@ def compute_cloud(
         InvalidInput: An argument out of range, or more samples than fit into memory; the message
             says what to use instead.
     """
-    report = as_progress(progress)
+    report = None if progress is None else as_function("progress", progress)
     tip_map = with_unstable(all_inputs(as_tip_map(arm, tol, frame=frame, point=point)))
     bundles = tip_map.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if tip_map.supports_unstable else 0, np.int8)
-    show_bar = progress is None and n > _LONG
+    show_bar = report is None and n > _LONG
     cubes = cube_blocks(sampler, n, bundles, seed, BLOCK)
     tip_map.prepare()
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
@@ -173,12 +173,13 @@ def _tasks(
     tip: Array,
     status: NDArray[np.int8],
     cubes: Iterator[Array],
-    progress: Progress,
+    progress: Progress | None,
 ) -> Iterator[Callable[[], object]]:
     def fill(rows: slice) -> None:
         kept = status[rows] if len(status) else None
         tip_map.fill(activation[rows], tip[rows], status=kept)
-        progress(rows.stop - rows.start)
+        if progress:
+            progress(rows.stop - rows.start)
 
     first = 0
     for cube in cubes:
