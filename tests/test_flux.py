@@ -14,9 +14,8 @@ from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import volume_gradient
-from softreach.workspace.flux import grid_faces, signed_volume
+from softreach.workspace.flux import signed_volume
 from softreach.workspace.image import DIAGONAL
-from softreach.workspace.measure import extrapolated_hull
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
 from tests.sets import solid
@@ -231,14 +230,3 @@ def test_a_surface_found_in_a_raster_leaves_no_spike_out(arm):
     corners = found.tip_map.tips(found.tip_map.box.corners())
     outer = corners[~found.image.are_deep(corners)]
     assert found.surface().distance(outer).max() < DIAGONAL * found.image.lattice.cell
-
-
-def test_the_hull_is_that_of_the_faces():
-    rod = Mapped(around(0.5, 0.0))
-    found = solid(rod, accuracy=0.02)
-    assert found.route == "flux"
-    cube = grid_faces(found.cells)
-    even = (np.rint(cube * found.cells) % 2 == 0).all(axis=1)
-    at_once = extrapolated_hull(rod.tips(cube), rod.tips(cube[even]))
-    assert found.convex_volume == pytest.approx(at_once.value, rel=1e-12)
-    assert found.convex_volume_error == pytest.approx(at_once.error, rel=1e-9)

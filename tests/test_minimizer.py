@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from softreach.arm import designs
-from softreach.inverse.direction import Objective, minimize
+from softreach.inverse.direction import minimize, objective
+from softreach.inverse.request import Request
 from softreach.rod import ActivationBox, as_tip_map, configuration
 from softreach.workspace.search import CLOSELY, nearest_tips
 from tests.laws import differences, in_box
@@ -62,29 +63,22 @@ def test_no_bundle_brings_the_nearest_tip_nearer_to_a_target_out_of_reach(design
     assert np.abs(gain).max() < 1e-5
 
 
-@pytest.mark.parametrize(
-    "terms",
-    [
-        {"direction_weight": 0.0},
-        {"direction_weight": 0.0, "penalty": 1e3, "multiplier": True},
-        {"direction_weight": 0.0, "near": True},
-        {"direction_weight": 0.7},
-        {"direction_weight": 3.0, "near": True, "multiplier": True},
-    ],
-)
-def test_the_gradient_of_an_objective_is_its_derivative(terms):
+@pytest.mark.parametrize("weight", [0.0, 0.7, 3.0])
+@pytest.mark.parametrize(("penalty", "reaches"), [(1.0, False), (1e3, False), (1e3, True)])
+def test_the_gradient_of_an_objective_is_its_derivative(weight, penalty, reaches):
     # Directions and Jacobians have steps of their own; the finer they are, the nearer they agree.
     rod, rng = as_tip_map(designs.redundant_trunk(), tol=1e-10), np.random.default_rng(2)
     gamma = in_box(rod.arm, 9)
     direction = rng.normal(size=(9, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
-    arrays = {"multiplier": rng.normal(size=(9, 3)), "near": in_box(rod.arm, 9, seed=5)}
-    chosen = {name: arrays.get(name, value) for name, value in terms.items()}
-    targets = rng.normal(size=(9, 3))
-    objective = Objective(tip_map=rod, targets=targets, direction=direction, **chosen)
+    request = Request(
+        targets=rng.normal(size=(9, 3)), residual=1e-10, reach_tol=1e-6, direction_weight=weight,
+        near=in_box(rod.arm, 9, seed=5), direction=direction,
+    )  # fmt: skip
+    given = rod, request, penalty, rng.normal(size=(9, 3)) if reaches else None
     which = np.array([3, 3, 0, 8, 1, 2, 7, 5, 4])
-    expected = differences(lambda x: objective(which, x)[0], gamma)
-    gradient = objective(which, gamma)[1]
+    expected = differences(lambda x: objective(*given, which, x)[0], gamma)
+    gradient = objective(*given, which, gamma)[1]
     assert np.allclose(gradient, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
 
 

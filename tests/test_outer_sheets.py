@@ -7,8 +7,8 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed
-from softreach.workspace.boundary import boundary_surface
 from softreach.workspace.flux import face_image
+from softreach.workspace.image import boundary_surface
 from tests.sets import is_closed
 from tests.test_flux import Mapped, mirrored, twisted
 

@@ -122,7 +122,7 @@ def test_little_memory_means_larger_cells_a_larger_error_and_a_warning():
     least = smallest_memory(as_tip_map(arm))
     with pytest.warns(SoftreachWarning, match="more memory"):
         found = solid(arm, accuracy=1e-3, memory=least)
-    assert found.image.reached.size < 2.5e4
+    assert found.image.grid.reached.size < 2.5e4
     fine = solid(arm, accuracy=1e-2)
     assert fine.volume_error < found.volume_error or fine.grid.attrs["cell"] < 0.05
     assert abs(found.volume - fine.volume) < found.volume_error + fine.volume_error

@@ -302,8 +302,8 @@ def test_the_last_point_inside_a_sphere_of_points_joins_all_faces_of_their_hull(
     # n points have 2n - 4 faces, all of them walls of one cavity, however its cells are tied
     sphere = np.random.default_rng(walls).normal(size=((walls + 4) // 2, 3))
     points = np.vstack([sphere / np.linalg.norm(sphere, axis=1)[:, None], np.zeros(3)])
-    cells, neighbors, same = triangulate(points, lambda: False)
-    mesh = Delaunay(points=points, tetrahedra=cells, neighbors=neighbors, duplicate_of=same)
+    cells, neighbors, _ = triangulate(points, lambda: False)
+    mesh = Delaunay(points=points, tetrahedra=cells, neighbors=neighbors)
     assert len(cells) == walls
     assert (cells == len(points) - 1).any(axis=1).all()
     assert_adjacency(mesh)
@@ -333,7 +333,6 @@ def test_every_distinct_point_is_a_vertex(name):
     points = DEGENERATE[name]
     mesh = delaunay(points)
     assert len(np.unique(mesh.tetrahedra)) == len(np.unique(points, axis=0))
-    assert (points[mesh.duplicate_of] == points).all()
 
 
 @every_degenerate
@@ -360,14 +359,11 @@ def test_radii_and_volumes_do_not_depend_on_the_order_of_the_points(name):
 def test_flat_clouds_have_no_cells(name):
     mesh = delaunay(FLAT[name])
     assert mesh.tetrahedra.shape == mesh.neighbors.shape == (0, 4)
-    assert len(mesh.duplicate_of) == len(FLAT[name])
 
 
-def test_duplicates_are_reported_and_not_inserted():
+def test_duplicates_are_not_inserted():
     points = random_points(30)
     mesh = delaunay(np.concatenate([points, points[:7], points[:7]]))
-    assert (mesh.duplicate_of[mesh.duplicate_of] == mesh.duplicate_of).all()
-    assert len(np.unique(mesh.duplicate_of)) == 30
     original = np.concatenate([np.arange(30), np.arange(7), np.arange(7)])
     renamed = np.sort(original[mesh.tetrahedra], axis=1)
     assert set(map(tuple, renamed.tolist())) == cells_of(delaunay(points))

@@ -21,5 +21,4 @@ def delaunay(points: np.ndarray) -> Delaunay:
     negative = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
     cells[negative] = cells[negative][:, EXCHANGED]
     neighbors[negative] = neighbors[negative][:, EXCHANGED]
-    same = np.arange(len(points))
-    return Delaunay(points=points, tetrahedra=cells, neighbors=neighbors, duplicate_of=same)
+    return Delaunay(points=points, tetrahedra=cells, neighbors=neighbors)

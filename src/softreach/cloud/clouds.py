@@ -91,8 +91,9 @@ def compute_cloud(
     status = np.empty(n if tip_map.supports_unstable else 0, np.int8)
     show_bar = report is None and n > _LONG
     cubes = cube_blocks(sampler, n, bundles, seed, BLOCK)
+    tip_map.prepare()
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
-        _fill(tip_map, activation, tip, status, cubes, shown)
+        parallel.run(_tasks(tip_map, activation, tip, status, cubes, shown))
     drawn = {"seed": seed, "sampler": sampler}
     cloud = schema.cloud_dataset(
         tip_map.arm, activation, tip, **drawn, tol=tip_map.tol, frame=tip_map.frame
@@ -166,29 +167,25 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
     return as_tip_map(arm, float(cloud.attrs["tol"]), frame=schema.frame_of(cloud))
 
 
-def _fill(
+def _tasks(
     tip_map: TipMap,
     activation: Array,
     tip: Array,
     status: NDArray[np.int8],
     cubes: Iterator[Array],
     progress: Progress | None,
-) -> None:
-    def fill(gamma: Array, tips: Array, kept: NDArray[np.int8] | None) -> None:
-        tip_map.fill(gamma, TipOutputs(tips, status=kept))
+) -> Iterator[Callable[[], object]]:
+    def fill(rows: slice) -> None:
+        kept = status[rows] if len(status) else None
+        tip_map.fill(activation[rows], TipOutputs(tip[rows], status=kept))
         if progress:
-            progress(len(gamma))
+            progress(rows.stop - rows.start)
 
-    def tasks() -> Iterator[Callable[[], object]]:
-        first = 0
-        for cube in cubes:
-            block = slice(first, first := first + len(cube))
-            tip_map.box.from_cube(cube, out=activation[block])
-            kept = status[block] if len(status) else None
-            yield partial(fill, activation[block], tip[block], kept)
-
-    tip_map.prepare()
-    parallel.run(tasks())
+    first = 0
+    for cube in cubes:
+        rows = slice(first, first := first + len(cube))
+        tip_map.box.from_cube(cube, out=activation[rows])
+        yield partial(fill, rows)
 
 
 CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}

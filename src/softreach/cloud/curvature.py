@@ -6,9 +6,9 @@ box allows, and no array of all samples by stations ever exists.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import Strains, TipMap, no_equilibrium
 from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
-from softreach.support.arguments import as_given, as_instance, as_integer
+from softreach.support.arguments import as_instance, as_integer
 from softreach.support.arrays import Array, Index, as_floats, as_shares
 from softreach.support.errors import InvalidInput
 
@@ -112,7 +112,8 @@ def stream_statistics(
     """
     bins = as_integer("bins", bins, 1, _MOST)
     shares = as_shares("quantiles", quantiles)
-    blocks = _blocks("activations", activations)
+    allowed = "an iterable of arrays of shape (n, bundles)"
+    activations = as_instance("activations", activations, Iterable, allowed)
     tip_map = as_tip_map(arm)
     places = distal_stations(tip_map) if stations is None else stations
     z = tip_map.check_stations(np.atleast_1d(as_floats("stations", places)), ascending=False)
@@ -120,7 +121,7 @@ def stream_statistics(
         name: _Tally.between(ends, bins)
         for name, ends in zip(QUANTITIES, strain_ranges(tip_map, z), strict=True)
     }
-    for strains in _strains(tip_map, blocks, z):
+    for strains in _strains(tip_map, activations, z):
         for k in range(len(z)):
             u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
             tallies["bending"].add(k, np.hypot(u1, u2))  # theory (7), (45)
@@ -135,12 +136,6 @@ def distal_stations(arm: Manipulator | TipMap) -> Array:
     """Six even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
     arm = as_instance("arm", arm, (Manipulator, TipMap), "a Manipulator or a TipMap")
     return np.linspace(0.5, 1.0, 6) * arm.length
-
-
-def _blocks(name: str, value: Any) -> Iterable[Array]:
-    if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set | type):
-        return value
-    raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
 
 
 def _strains(tip_map: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
@@ -160,10 +155,6 @@ def strain_ranges(tip_map: ArmMap, z: Array) -> tuple[Array, Array, Array]:
     Exact but for bending, which is at most 1e-5 too large for fibers and muscles, and with tendons
     and chambers by as much as their ζ differs. Under loads, and with tendons driven by length, they
     are those of samples: others may strain the arm a little more.
-
-    Args:
-        tip_map: The tip map.
-        z: Z of the stations [m].
 
     Raises:
         InvalidInput: Under loads no sample has an equilibrium.

@@ -13,7 +13,7 @@ from softreach.geometry.neighbors import mean_value_distance
 from softreach.rod.inputs import activation_measures
 from softreach.schema import cell_dataset, check_cloud, is_stable, tip_cells
 from softreach.support.arguments import as_dataset, as_number, plain
-from softreach.support.arrays import Array, Index, Mask, as_indices
+from softreach.support.arrays import Index, Mask, as_indices
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import quantity
 
@@ -42,7 +42,7 @@ def activation_distance(
     itself is not counted; another point at the same place is. Where K = 0 the point is isolated
     and D̄ is NaN. Neighbors always come from the full cloud, whatever is evaluated. Where bundles
     have different units, the activation of each counts in its own range. Of an arm under loads the
-    tips that are no stable equilibria are nobody's neighbors, and D̄ there is NaN.
+    tips that are no stable equilibria are no neighbors, and D̄ there is NaN.
 
     Memory is a sorted copy of the cloud and a few blocks, however many neighbors there are; the
     result does not depend on the number of threads.
@@ -76,8 +76,8 @@ def activation_distance(
         mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
         mask, number = stable[sample], np.cumsum(stable) - 1
         among = number[sample[mask]]
-        found = mean_value_distance(tip[stable], activation[stable], radius, among)
-        mean[mask], others[mask] = found
+        known = mean_value_distance(tip[stable], activation[stable], radius, among)
+        mean[mask], others[mask] = known
     counted = {"long_name": "other tips within the radius", "units": "1"}
     return xr.DataArray(
         mean,
@@ -195,14 +195,17 @@ def redundancy_summary(
     stable = is_stable(cloud)[evaluated]
     mean = grid.mean(distance.values, evaluated)
     known, share = np.isfinite(mean), _share(values > threshold)
-    heights = np.quantile(values, _SHARES) if len(values) else np.full(len(_SHARES), np.nan)
+    # A median scatters between the quantiles 1/2 ± 1/(2√n).
+    off = min(0.5, 0.5 / np.sqrt(max(len(values), 1)))
+    shares = [0.5, 0.5 - off, 0.5 + off, *_SHARES]
+    middle, low, high, *heights = np.quantile(values if len(values) else [np.nan], shares).tolist()
     return RedundancySummary(
         unit=distance.attrs.get("units", "1"),
         evaluated=int(stable.sum()),
         isolated=_share(np.isnan(distance.values[stable])),
-        median=float(np.median(values)) if len(values) else np.nan,
-        median_error=_median_error(values),
-        quantiles=dict(zip(_SHARES, heights.tolist(), strict=True)),
+        median=middle,
+        median_error=(high - low) / 2.0,
+        quantiles=dict(zip(_SHARES, heights, strict=True)),
         threshold=threshold,
         redundant_points=share,
         redundant_points_error=float(np.sqrt(share * (1.0 - share) / max(len(values), 1))),
@@ -301,12 +304,3 @@ def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
 
 def _share(which: Mask) -> float:
     return float(which.mean()) if which.size else np.nan
-
-
-def _median_error(values: Array) -> float:
-    """Half the distance of the quantiles 1/2 ± 1/(2√n), between which a median scatters."""
-    if not len(values):
-        return np.nan
-    reach = min(0.5, 0.5 / np.sqrt(len(values)))
-    low, high = np.quantile(values, [0.5 - reach, 0.5 + reach])
-    return float(high - low) / 2.0

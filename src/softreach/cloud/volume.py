@@ -164,8 +164,7 @@ def volume_curve(points: np.ndarray | xr.DataArray, alphas: ArrayLike) -> np.nda
     radii = as_floats("alphas", alphas)
     if not (radii >= 0).all():  # NaN too
         raise InvalidInput("alphas", radii, "radii of 0 or more [m]")
-    shape = _alpha_complex(_positions(points))
-    return np.asarray(shape.volume(radii))
+    return np.asarray(AlphaComplex(triangulation=delaunay(_positions(points))).volume(radii))
 
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
@@ -177,7 +176,7 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
 
 
 def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> float | str:
-    """The radius asked for [m], or ``"critical"``."""
+    """The radius [m], by default that for the length of the arm, or ``"critical"``."""
     allowed = "a radius > 0 [m], 'critical', or None"
     if alpha is None:
         if (length := getattr(points, "attrs", {}).get("length")) is None:
@@ -185,9 +184,7 @@ def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> flo
             hint = f"{hint} of {DEFAULT_RADIUS} of it"
             raise InvalidInput("alpha", None, "a radius [m] for these points", hint)
         return DEFAULT_RADIUS * float(length)
-    if isinstance(alpha, str):
-        if alpha != "critical":
-            raise InvalidInput("alpha", repr(alpha), allowed)
+    if isinstance(alpha, str) and alpha == "critical":
         return alpha
     radius = plain(alpha)
     if POSITIVE.admits(radius) or (isinstance(radius, float) and radius == np.inf):
@@ -195,16 +192,13 @@ def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> flo
     raise InvalidInput("alpha", as_given(alpha), allowed)
 
 
-def _alpha_complex(positions: np.ndarray) -> AlphaComplex:
-    return AlphaComplex(triangulation=delaunay(positions))
-
-
 def _shape(positions: np.ndarray, radius: float | str, part: Mask | None) -> tuple[Hull, float]:
     """The alpha shape, and the volume of that of a part; box by box if the radius is known."""
     if radius != "critical":
         return alpha_hull(positions, float(radius), part=part)
     clouds = [positions] if part is None else [positions, positions[part]]
-    shape, *of_part = parallel.in_order(partial(_alpha_complex, cloud) for cloud in clouds)
+    meshes = parallel.in_order(partial(delaunay, cloud) for cloud in clouds)
+    shape, *of_part = (AlphaComplex(triangulation=mesh) for mesh in meshes)
     hull = shape.hull(shape.critical_alpha())
     return hull, sum(each.hull(hull.alpha).volume for each in of_part)
 

@@ -69,10 +69,10 @@ class AlphaComplex:
             return partial(kernels.measure_cells, points, cells, names, WHOLE, scratch(), *results)
 
         parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))
-        object.__setattr__(self, "radii", np.ldexp(radii, exponent))
-        object.__setattr__(self, "least", np.ldexp(least, exponent))
-        object.__setattr__(self, "volumes", np.ldexp(volumes, 3 * exponent))
-        object.__setattr__(self, "flat", flat)
+        sizes = np.ldexp(radii, exponent), np.ldexp(least, exponent)
+        results = (*sizes, np.ldexp(volumes, 3 * exponent), flat)
+        for name, values in zip(("radii", "least", "volumes", "flat"), results, strict=True):
+            object.__setattr__(self, name, values)
 
     @lazy
     def _curve(self) -> tuple[np.ndarray, np.ndarray]:
@@ -138,13 +138,8 @@ def alpha_hull(
 ) -> tuple[Hull, float]:
     """`AlphaComplex.hull` of one radius on all threads, and the volume [m³] of that of a part.
 
-    The part comes first into the triangulation and is measured on the way.
-
-    Args:
-        points: Positions [m], shape (n, 3).
-        alpha: Radius [m].
-        part: Mask of the points to be measured by themselves, shape (n,).
-        boxes: Largest number of boxes; as many as there are threads if left out.
+    The part, a mask of points, comes first into the triangulation and is measured on the way. There
+    are as many boxes as threads, or fewer if so many are given.
     """
     scaled, exponent = unit_scale(points)
     radius = float(np.ldexp(alpha, -exponent))

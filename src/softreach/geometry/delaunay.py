@@ -25,25 +25,17 @@ def delaunay(points: np.ndarray) -> Delaunay:
         points: Finite positions [m], shape (n, 3).
     """
     scaled, _ = unit_scale(points)
-    cells = neighbors = np.empty((0, 4), np.int32)
-    order = same = np.arange(len(points))
+    tetrahedra = neighbors = np.empty((0, 4), np.int32)
     if len(points) >= 4:
         order = insertion_order(scaled)  # keeps the work local
-        cells, neighbors, same = triangulate(scaled[order], partial(lies_on_curve, scaled))
-    duplicate_of = np.empty(len(points), np.int64)
-    duplicate_of[order] = order[same]
-    if not len(cells):
-        _, first, inverse = np.unique(scaled, axis=0, return_index=True, return_inverse=True)
-        duplicate_of = first[inverse.reshape(-1)]
-    tetrahedra = order.astype(np.int32)[cells]
-    return Delaunay(
-        points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
-    )
+        cells, neighbors, _ = triangulate(scaled[order], partial(lies_on_curve, scaled))
+        tetrahedra = order.astype(np.int32)[cells]
+    return Delaunay(points=points, tetrahedra=tetrahedra, neighbors=neighbors)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Delaunay:
-    """Tetrahedra whose circumscribed spheres hold no other point.
+    """Tetrahedra whose circumscribed spheres hold no other point; of equal points one is a vertex.
 
     Points in one plane, on one line or fewer than four give no tetrahedra at all; nor do more than
     some hundreds on a curve in space, of which nearly every pair would have an edge.
@@ -55,8 +47,6 @@ class Delaunay:
     """Vertices as indices of points, positively oriented, shape (m, 4)."""
     neighbors: np.ndarray
     """Neighbor i shares the face opposite vertex i; -1 outside the hull. Shape (m, 4)."""
-    duplicate_of: np.ndarray
-    """For each point itself, or the equal point that stands for it; shape (n,)."""
 
 
 def lies_on_curve(points: Points) -> bool:
@@ -68,13 +58,8 @@ def local_dimension(points: Points) -> float:
     """The power with which the number of neighbors grows with distance: 1 on a curve, 2, 3.
 
     The estimate of largest likelihood over the 16 nearest others of 512 points at most; its
-    standard error is some percent. Bends and borders make it smaller, noise larger.
-
-    Args:
-        points: Positions, shape (n, 3); equal ones count once.
-
-    Returns:
-        The dimension [-]; 0 for fewer than 17 different points.
+    standard error is some percent. Bends and borders make it smaller, noise larger. 0 for fewer
+    than 17 different points.
 
     References:
         Levina, Bickel (2004), Maximum likelihood estimation of intrinsic dimension, NIPS 17.

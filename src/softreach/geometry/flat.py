@@ -29,14 +29,9 @@ class Plane(NamedTuple):
 
 
 def plane_of(points: Points, thickness: float) -> Plane | None:
-    """The plane that points lie in, by their principal axes; the first is that of the largest.
+    """The plane that points (n, 3) lie in to a thickness [m]; None if they lie in none.
 
-    Args:
-        points: [m], shape (n, 3).
-        thickness: Extent along its normal up to which they do [m].
-
-    Returns:
-        None if they lie in none.
+    Its axes are the principal ones of the points; the first is that of the largest extent.
     """
     origin = points.mean(axis=0)
     rotation = np.linalg.svd(points - origin, full_matrices=len(points) < 3)[2]
@@ -67,9 +62,7 @@ def enclosed_area(points: Points, edges: Faces) -> float:
 def are_inside(points: Points, edges: Array) -> Mask:
     """Mask of points inside of closed curves in the plane z = 0, by an odd number of crossings.
 
-    Args:
-        points: Shape (n, 3).
-        edges: Both ends of each edge of the curves, shape (e, 2, 3).
+    Edges are given by both of their ends, shape (e, 2, 3).
     """
     odd = np.zeros(len(points), bool)
     for (x, y, _), (u, v, _) in edges:
@@ -80,12 +73,7 @@ def are_inside(points: Points, edges: Array) -> Mask:
 
 
 def alpha_area(points: Points, alpha: float) -> float:
-    """Area [m²] of the α-shape of points in the plane z = 0, by Delaunay triangles.
-
-    Args:
-        points: [m], shape (n, 3).
-        alpha: Radius of the circumscribed circles [m].
-    """
+    """Area [m²] of the α-shape, of a radius α [m], of points in the plane z = 0, by triangles."""
     from scipy.spatial import Delaunay, QhullError
 
     try:

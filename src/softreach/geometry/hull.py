@@ -95,12 +95,9 @@ class Hull:
 
 
 def convex_hull(points: np.ndarray) -> Hull:
-    """The convex hull of a cloud by Qhull.
+    """The convex hull of a cloud (n, 3) [m] by Qhull.
 
     Points in one plane, on one line or fewer than four have volume 0 and no faces.
-
-    Args:
-        points: Finite positions [m], shape (n, 3).
     """
     vertices, faces = compact_surface(points, convex_faces(points))
     volume = enclosed_volume(vertices, faces)

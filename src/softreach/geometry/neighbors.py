@@ -37,14 +37,9 @@ def mean_value_distance(
     The ball is closed. Point i itself is not counted; another point at the same place is.
     Neighbors come from all points, whatever the queries.
 
-    Memory is a sorted copy of points and values and a few blocks, however many pairs there are;
-    the result does not depend on blocks and threads.
-
-    Args:
-        points: Positions [m], shape (n, 3).
-        values: A vector of any length for each point, shape (n, m).
-        radius: Of the ball [m]; 0 leaves the points at the same place.
-        queries: Indices of the points i, shape (q,); None for all.
+    Memory is a sorted copy of points (n, 3) and values (n, m) and a few blocks, however many pairs
+    there are; the result does not depend on blocks and threads. Queries are indices of points i,
+    shape (q,), or all; a radius of 0 [m] leaves the points at the same place.
 
     Returns:
         Means in the unit of the values, NaN where there is no neighbor, shape (q,); numbers of
@@ -128,13 +123,6 @@ class _Columns:
             cubes += ((points[:, axis] - low) / edge + 1.0).astype(np.int64)
         return np.flatnonzero(mask.ravel()[cubes])
 
-    def windows(self, keys: Index, along: Array) -> Index:
-        """First and last key of what each query can reach in its own column, shape (2, q)."""
-        first_last = np.empty((2, len(keys)), np.int64)
-        scale = 1.0 / self.widths[2]
-        window_keys(along, keys, self.margin, self.low[2], scale, *first_last)
-        return first_last
-
 
 def _means(
     cloud: _Sample, columns: _Columns, queries: _Sample, order: Index
@@ -155,7 +143,10 @@ def _means(
 
 def _sums(cloud: _Sample, columns: _Columns, queries: _Sample, part: slice) -> tuple[Array, Array]:
     """Sum of ‖v_j - v_i‖ over each query's ball, itself included, and the number of points."""
-    first, last = columns.windows(queries.keys[part], queries.points[2, part])
+    keys, scale = queries.keys[part], 1.0 / columns.widths[2]
+    first, last = np.empty((2, len(keys)), np.int64)  # keys of what each can reach in its column
+    along = queries.points[2, part]
+    window_keys(along, keys, columns.margin, columns.low[2], scale, first, last)
     places, amounts = queries.points[:, part].T.copy(), queries.values[:, part].T.copy()
     start, stop = np.empty((2, len(first)), np.int64)
     total, count = np.zeros((2, len(first)))

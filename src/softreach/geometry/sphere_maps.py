@@ -101,7 +101,7 @@ def sphere_roots(
         levels: How often the triangles of the first mesh are quartered.
         caution: How near an image must come to the value to be cut further, in its sags.
         starts: Where to look too, shape (n, 3).
-        most: About so many images may be asked for.
+        most: Largest number of images, about.
 
     Returns:
         The places, and whether the triangles were few enough to be cut until they were flat, or
@@ -124,8 +124,8 @@ def _candidates(seen: Map, levels: int, caution: float, most: int) -> tuple[Arra
     images, centers, few_enough = seen(points), [np.empty((0, 3))], False
     for level in range(levels, levels + _MOST_LEVELS):
         before, parents = len(points), triangles
-        cut = icosphere(level + 1) if level == levels else quartered(points, triangles)
-        points, triangles = cut
+        finer = icosphere(level + 1) if level == levels else quartered(points, triangles)
+        points, triangles = finer
         images = np.concatenate([images, seen(points[before:])])
         verdicts = np.empty(len(triangles), np.int8)
         judge_images(images, parents, triangles, caution, _FLAT, verdicts)
@@ -218,12 +218,9 @@ class Rings(NamedTuple):
 
 
 def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
-    """True if turning about an axis, and mirroring in a plane through it, changes nothing.
+    """True if turning about a unit vector, and mirroring in a plane through it, changes nothing.
 
-    Args:
-        image: The map.
-        axis: Unit vector, shape (3,).
-        tolerance: By which images may miss [rad].
+    Images may miss by the tolerance [rad].
     """
     polar = np.pi * (np.arange(_POLAR) + 0.5) / _POLAR
     around = 2 * np.pi * np.arange(_AROUND) / _AROUND + 0.1
@@ -237,12 +234,9 @@ def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
 
 
 def pole_rings(image: Map, axis: Array, near: Array) -> Rings:
-    """All circles of latitude that an axisymmetric map takes to its pole.
+    """All circles of latitude that an axisymmetric map takes to its pole, the axis (3,).
 
-    Args:
-        image: The map.
-        axis: Unit vector, shape (3,); the pole.
-        near: A point on the meridian that is asked, shape (3,); any meridian for the pole.
+    `near` (3,) is on the meridian that is looked at; any meridian will do for the pole itself.
     """
     aside = near - (near @ axis) * axis
     size = float(np.linalg.norm(aside))

@@ -84,14 +84,10 @@ class Surface:
 
 
 def level_set(field: Array, level: float) -> tuple[Points, Faces]:
-    """Triangles where what is known at the vertices of a grid has a value, by marching cubes.
-
-    Args:
-        field: Shape (i, j, k).
-        level: The value; triangles are oriented toward larger ones.
+    """Triangles where a field on a grid (i, j, k) has a value, by marching cubes.
 
     Returns:
-        Places in edges of the grid, shape (v, 3), and triangles, shape (f, 3).
+        Places in edges of the grid, shape (v, 3), and triangles toward larger values, (f, 3).
 
     Raises:
         MissingExtra: scikit-image is not installed.
@@ -113,11 +109,9 @@ def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
 
 
 def without_flakes(surface: Surface, error: float) -> Surface:
-    """A closed surface without its smallest parts, as long as these add up to less than an error.
+    """A closed surface without its smallest parts that add up to less than an error [m³].
 
-    Args:
-        surface: Triangles.
-        error: Volume that may be left out [m³]; the largest part always stays.
+    The largest part always stays.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -137,15 +131,10 @@ def without_flakes(surface: Surface, error: float) -> Surface:
 
 
 def simplified(vertices: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
-    """A coarser surface for pictures: vertices in one cube of a grid become their mean.
+    """A coarser surface of so many triangles at most, for pictures: vertices in a cube become one.
 
     Those that face other ways are kept apart, so that thin parts have two sides. The surface is
     closed where it was, but may touch itself.
-
-    Args:
-        vertices: Corners [m], shape (v, 3).
-        faces: Shape (f, 3).
-        most: Triangles that it may have.
     """
     facing = vertex_normals(vertices, faces)
     way = np.abs(facing).argmax(axis=1)
@@ -215,17 +204,10 @@ def surface_area(vertices: Points, faces: Faces) -> float:
 
 
 def plane_cut(surface: Surface, axis: int, at: float) -> list[Array]:
-    """Cut a surface by the plane where one coordinate has a value.
+    """Cut a surface by the plane where the coordinate along an axis has a value.
 
     A vertex in the plane counts as above it, so that every triangle that is cut gives one piece.
-
-    Args:
-        surface: Triangles.
-        axis: Of the coordinate, 0 to 2.
-        at: Its value, in the unit of the surface.
-
-    Returns:
-        Curves of shape (n, 3). Those of a closed surface are closed: they end where they begin.
+    Curves have the shape (n, 3). Those of a closed surface are closed: they end where they begin.
     """
     vertices, faces = np.asarray(surface.vertices, float), np.asarray(surface.faces)
     height = vertices[:, axis] - at
@@ -277,12 +259,8 @@ def parted(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     """A closed surface with two triangles at every edge; one that has them, or is open, as it is.
 
     A closed surface may touch itself along edges, as the boundary of an α-shape does: four of its
-    triangles meet there, and the solid fills wedges between them. Slicers ask for two. Each wedge
+    triangles meet there, and the solid fills wedges between them. Slicers need two. Each wedge
     gets a corner of its own, in the middle of the edge and a little within.
-
-    Args:
-        vertices: Corners, shape (v, 3).
-        faces: Turning outwards, shape (f, 3).
     """
     faces = np.asarray(faces, np.int64)
     starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -298,8 +276,8 @@ def parted(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     middles: list[Array] = []
     for k in several:
         sides = order[first[k] : first[k] + count[k]]
-        for one, other, place in _wedges(vertices, faces, sides):
-            corners[[one, other]] = len(vertices) + len(middles)
+        for side, other, place in _wedges(vertices, faces, sides):
+            corners[[side, other]] = len(vertices) + len(middles)
             middles.append(place)
     touching = corners.reshape(-1, 3)
     cut = (touching >= 0).any(axis=1)

@@ -25,8 +25,7 @@ def tube_surface(
     Args:
         centerline: Centers of the sections [m], shape (stations, 3), two or more.
         normal: Unit vectors in the sections, shape (stations, 3).
-        binormal: Unit vectors in the sections such that normal x binormal points along the
-            centerline, shape (stations, 3).
+        binormal: The same; normal x binormal points along the centerline.
         radii: Radius of each section, or one for all [m].
         sides: Corners of each section.
 
@@ -59,14 +58,10 @@ def tube_surface(
 
 
 def ribbon_surface(lower: ArrayLike, upper: ArrayLike) -> Surface:
-    """The closed skin between two surface patches: a ribbon with a thickness.
+    """The closed skin between two patches (stations, across, 3) [m]: a ribbon with a thickness.
 
-    Args:
-        lower: One patch [m], shape (stations, across, 3).
-        upper: The other, same shape, on the side that (along x across) points to.
-
-    Returns:
-        2 * stations * across vertices, those of `lower` first; outward faces.
+    The upper one is on the side that (along x across) points to. Vertices of the lower one come
+    first; faces are outward.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     index = np.arange(low.shape[0] * low.shape[1]).reshape(low.shape[:2])
@@ -79,11 +74,7 @@ def ribbon_surface(lower: ArrayLike, upper: ArrayLike) -> Surface:
 
 
 def grid_faces(stations: int, across: int) -> Faces:
-    """Triangles of an open grid of points (stations, across), turning from the first axis to it.
-
-    Returns:
-        Faces, shape (2 * (stations - 1) * (across - 1), 3).
-    """
+    """Triangles of an open grid of points (stations, across), turning from the first axis to it."""
     return _halves(_grid(np.arange(stations * across).reshape(stations, across)))
 
 

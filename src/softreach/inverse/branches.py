@@ -31,12 +31,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.inverse.nearest import descend
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import (
     Roots,
     conditions,
+    descend,
     no_roots,
     placed,
     roots_at,
@@ -67,13 +67,9 @@ _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is loo
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
-    """All roots inside the bounds, sorted by target.
+    """All roots inside the bounds of three free bundles, sorted by target.
 
     Sets of targets are solved together, each on a thread of its own.
-
-    Args:
-        prepared: A tip map of three free bundles.
-        request: Targets, and the residual that makes a root.
     """
     count = len(request.targets)
     if not count:
@@ -90,22 +86,21 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     if prepared.tip_map.supports_unstable or len(sets) == 1:
         parts = [_branches_of(prepared, request, chosen) for chosen in sets]
     else:
-        parts = list(
-            parallel.in_order(partial(_alone, prepared, request, chosen) for chosen in sets)
-        )
+        alone = parallel.undivided()(_branches_of)
+        parts = list(parallel.in_order(partial(alone, prepared, request, some) for some in sets))
     return joined_by("target", parts)
 
 
 def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     """The roots, and after those of each target the ones in other postures than from rest."""
-    found = [no_roots(prepared.tip_map)]
+    parts = [no_roots(prepared.tip_map)]
     for number, sheet in enumerate(prepared.sheets, 1):
         target, start = sheet.starts.starts(request.targets)
         ends = descend(sheet.tip_map, request.targets[target], start, request.residual)
         part = roots_at(sheet.tip_map, request.targets, target, ends.gamma)
         part = part._replace(sheet=np.full(len(target), number))
-        found.append(rows(part, part.residual <= request.reach_tol))
-    others = joined_by("target", found)
+        parts.append(rows(part, part.residual <= request.reach_tol))
+    others = joined_by("target", parts)
     if not len(others.target):
         return roots
     # A sheet goes on into activations at which its posture is that from rest.
@@ -113,11 +108,6 @@ def with_other_sheets(prepared: PreparedMap, request: Request, roots: Roots) -> 
     same = at_rest.residual <= request.reach_tol
     roots = distinct(prepared, request, roots.joined(rows(at_rest, same)))
     return roots.joined(distinct(prepared, request, rows(others, ~same)))
-
-
-def _alone(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
-    with parallel.undivided():
-        return _branches_of(prepared, request, chosen)
 
 
 def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
@@ -135,19 +125,22 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
     roots = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
     roots = _with_partners(prepared, some, roots)
     missing = roots.missing(len(chosen), some.residual)
-    starts = starts_from_cells(prepared, some, missing)  # step 9
-    goal = some.targets[starts.target]
-    ends = nearest_tips(prepared.tip_map, starts.gamma, goal, some.residual, CLOSELY)
-    late = roots_at(prepared.tip_map, some.targets, starts.target, ends.gamma)
-    roots = roots.joined(distinct(prepared, some, rows(late, late.residual <= some.residual)))
+    starts = starts_from_cells(prepared, some, missing)
+    if len(starts.target):  # step 9
+        goal = some.targets[starts.target]
+        ends = nearest_tips(prepared.tip_map, starts.gamma, goal, some.residual, CLOSELY)
+        late = roots_at(prepared.tip_map, some.targets, starts.target, ends.gamma)
+        roots = roots.joined(distinct(prepared, some, rows(late, late.residual <= some.residual)))
     return roots._replace(target=chosen[roots.target])
 
 
 def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     """Steps 5 and 8: damped Newton from every start; the roots that are within the bounds."""
     tip_map, goal = prepared.tip_map, request.targets[starts.target]
-    low, high = tip_map.box.low.copy(), tip_map.box.high.copy()
-    start, n = _improved(tip_map, goal, starts), len(goal)
+    if not len(goal):
+        return no_roots(tip_map)
+    low, high, n = tip_map.box.low.copy(), tip_map.box.high.copy(), len(goal)
+    start = _improved(tip_map, goal, starts)
     search = Search(
         target=goal,
         gamma=start.copy(),
@@ -159,8 +152,7 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
         state=np.full(n, RUNNING),
     )
     for _ in range(_MOST_ITERATIONS):
-        active = np.flatnonzero(search.state == RUNNING)
-        if not len(active):
+        if not len(active := np.flatnonzero(search.state == RUNNING)):
             break
         tips, slopes = tip_map.tips_and_slopes(search.trial[active])
         newton.newton_step(search, active, tips, slopes, low, high, request.residual)
@@ -294,13 +286,9 @@ class Starts(NamedTuple):
 def starts_from_cells(
     prepared: PreparedMap, request: Request, chosen: Index, with_root: bool = True
 ) -> Starts:
-    """Starts for some of the targets, sorted by target.
+    """Starts for targets `chosen`, ascending numbers, sorted by target.
 
-    Args:
-        prepared: The tip map, with its cells and their tree.
-        request: The request; targets that follow each other are best near to each other.
-        chosen: Numbers of the targets, ascending.
-        with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
+    `with_root` leaves out tetrahedra whose quadratic does not reach the target.
     """
     parts = [Starts.empty(0)]
     if not len(prepared.mesh.corner) or not len(chosen):

@@ -14,7 +14,7 @@ from softreach.kernels.image.activation_mesh import (
     interpolation_errors,
 )
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index, Mask, rows
+from softreach.support.arrays import Array, Index, rows
 from softreach.workspace.grid import cell_corners, cube_grid
 
 _REACH = 1.5  # widths of a cell within which a root is looked for
@@ -24,16 +24,12 @@ _TORN = 0.05  # interpolation error in L beyond which corners are taken to be on
 _LEAF = 24  # a node with no more tetrahedra is not divided
 _MOST_LEVELS = 10
 _MOST_ITEMS = 8_000_000
+Items = NDArray[np.int32]
 _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 
 
 def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornCells]:
-    """Cells of the activation box with tips and Jacobians at their corners; those without apart.
-
-    Args:
-        tip_map: A tip map of three bundles, each free to move.
-        cells: Cells along each axis of the box.
-    """
+    """Cells of the box of three free bundles, as many along each axis; those without tips apart."""
     gamma = tip_map.box.from_cube(cube_grid(cells))
     vertices, corner = _Vertices(gamma, *tip_map.tips_and_slopes(gamma)), cell_corners(cells, 3)
     mesh = _mesh(tip_map, vertices, corner)
@@ -44,8 +40,8 @@ def activation_cells(tip_map: TipMap, cells: int) -> tuple[ActivationMesh, TornC
     if torn.any():
         mesh = _mesh(tip_map, vertices, corner[~torn])
     vertex = np.unique(corner[torn])
-    found = rows(vertices, vertex[np.isfinite(vertices.tip[vertex, 0])])
-    return mesh, TornCells.at(found, tip_map.box.widths / cells)
+    known = rows(vertices, vertex[np.isfinite(vertices.tip[vertex, 0])])
+    return mesh, TornCells.at(known, tip_map.box.widths / cells)
 
 
 class _Vertices(NamedTuple):
@@ -55,22 +51,48 @@ class _Vertices(NamedTuple):
 
 
 def image_tree(mesh: ActivationMesh) -> SpaceTree:
-    """Divide space until few tetrahedra remain in each place."""
+    """Divide space, one depth after the other, until few tetrahedra remain in each place."""
     planes, boxes = np.empty((6 * len(mesh.corner), 4, 4)), _image_boxes(mesh)
     face_planes(mesh, _rounding(mesh), planes)
-    growing = _Growing(planes, boxes, *_root(boxes))
-    for _ in range(_MOST_LEVELS):
-        if not growing.divide():
+    low, size = _root(boxes)
+    corner, edge, nodes, listed = low[None], size, 1, 0
+    first, count = np.zeros(1, np.int64), np.array([len(planes)])
+    item, parts = np.arange(len(planes), dtype=np.int32), list[tuple[Index, Index, Index, Items]]()
+    for depth in range(_MOST_LEVELS + 1):
+        # The fullest nodes, as many as leave room for the lists, which are four times as long.
+        counts = np.sort(count)[::-1]
+        affordable = listed + 3 * np.cumsum(counts) + counts.sum() <= _MOST_ITEMS
+        largest = 0 if affordable.all() else int(counts[np.argmin(affordable)])
+        many = (count > max(_LEAF, largest)) & (depth < _MOST_LEVELS)
+        child, kept = np.zeros(len(many), np.int64), np.where(many, 0, count)
+        child[many] = nodes + 8 * np.arange(np.count_nonzero(many))
+        nodes += 8 * np.count_nonzero(many)
+        parts.append((child, listed + np.cumsum(kept) - kept, kept, item[np.repeat(~many, count)]))
+        listed += int(kept.sum())
+        if not many.any():
             break
-    return growing.finished()
+        edge /= 2
+        places = corner[many], edge, first[many], count[many], item
+        first, count, item = _divided(planes, boxes, *places)
+        corner = (corner[many][:, None] + edge * _OCTANTS).reshape(-1, 3)
+    return SpaceTree(planes, boxes, low, size, *map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _divided(
+    planes: Array, boxes: Array, corner: Array, edge: float, first: Index, count: Index, item: Items
+) -> tuple[Index, Index, Items]:
+    """Where lists of the eight children of each node begin, their lengths, and all lists."""
+    counts, meets = np.zeros((len(first), 8), np.int64), np.empty(len(item), np.uint8)
+    arguments = planes, boxes, corner, edge, first, count, item, meets
+    sort_into_children(*arguments, counts, counts, np.empty(0, np.int32))
+    starts = (np.cumsum(counts) - counts.ravel()).reshape(counts.shape)
+    items = np.empty(int(counts.sum()) + 1, np.int32)
+    sort_into_children(*arguments, np.empty_like(counts), starts, items)
+    return starts.ravel(), counts.ravel(), items[:-1]
 
 
 class ImageLeaves:
-    """Trees that are not divided: for few targets, of no more than what may cover them.
-
-    Args:
-        mesh: Cells of the activation box.
-    """
+    """Trees that are not divided: for few targets, of no more than what may cover them."""
 
     def __init__(self, mesh: ActivationMesh) -> None:
         self._mesh, self._boxes, self._rounding = mesh, _image_boxes(mesh), _rounding(mesh)
@@ -78,11 +100,7 @@ class ImageLeaves:
         self._root = _root(self._boxes)
 
     def around(self, targets: Array) -> SpaceTree:
-        """The tetrahedra of the cells in whose boxes some targets lie; planes of no others.
-
-        Args:
-            targets: Targets [m], shape (t, 3).
-        """
+        """The tetrahedra of cells in whose boxes some targets (t, 3) lie; planes of no others."""
         mesh, near = self._mesh, np.zeros(len(self._boxes), bool)
         for place in targets[:, :, None]:
             near |= ((self._low <= place) & (place <= self._high)).all(axis=0)
@@ -124,8 +142,8 @@ class TornCells(NamedTuple):
     def of_sheet(cls, tip_map: TipMap, gamma: Array, widths: Array) -> TornCells:
         """Places (n, 3) on a sheet in cells of these widths; its steep edges are seen from afar."""
         vertices = _Vertices(gamma, *tip_map.tips_and_slopes(gamma))
-        found = rows(vertices, np.isfinite(vertices.tip[:, 0]))
-        return cls.at(found, 2.0 * widths)._replace(most=_MOST_OF_SHEET)
+        known = rows(vertices, np.isfinite(vertices.tip[:, 0]))
+        return cls.at(known, 2.0 * widths)._replace(most=_MOST_OF_SHEET)
 
     def starts(self, targets: Array) -> tuple[Index, Array]:
         """Number of the target and activation of each start, sorted by target."""
@@ -146,11 +164,8 @@ def _mesh(tip_map: TipMap, vertices: _Vertices, corner: Index) -> ActivationMesh
     error, remainder = np.empty(len(corner)), np.empty(len(corner))
     interpolation_errors(*vertices, corner, error, remainder)
     error += 1e-9 * tip_map.length  # rounding must not put a target between two tetrahedra
-    slope = vertices.slope
-    change = np.sqrt(((slope[corner[:, 7]] - slope[corner[:, 0]]) ** 2).sum((1, 2)))
-    for bit in (1, 2, 4):
-        step = slope[corner[:, bit]] - slope[corner[:, 0]]
-        change += np.sqrt((step**2).sum((1, 2)))
+    first, *others = (vertices.slope[corner[:, k]] for k in (0, 7, 1, 2, 4))
+    change = np.sum([np.sqrt(((each - first) ** 2).sum((1, 2))) for each in others], axis=0)
     return ActivationMesh(*vertices, corner, error, remainder, change)
 
 
@@ -169,65 +184,3 @@ def _root(boxes: Array) -> tuple[Array, float]:
 def _rounding(mesh: ActivationMesh) -> float:
     """Distance beyond its faces at which a tetrahedron may still cover a place [m]."""
     return 1e-9 * float(np.nanmax(mesh.tip) - np.nanmin(mesh.tip))
-
-
-class _Growing:
-    """The tree down to one depth, with the nodes of that depth still open."""
-
-    def __init__(self, planes: Array, boxes: Array, low: Array, size: float) -> None:
-        self.planes, self.boxes, self.low, self.size = planes, boxes, low, size
-        self.edge = size
-        self.corner = low[None]
-        self.child: list[Index] = []
-        self.first, self.count = np.zeros(1, np.int64), np.array([len(planes)])
-        self.item = np.arange(len(planes), dtype=np.int32)
-        self.nodes = 1
-        self.done: list[tuple[Index, Index]] = []
-        self.items: list[NDArray[np.int32]] = []
-        self.listed = 0
-
-    def divide(self) -> bool:
-        """Divide every node of the last depth that holds many items; return whether any did."""
-        # The fullest nodes, as many as leave room for the lists, which are four times as long.
-        counts = np.sort(self.count)[::-1]
-        affordable = self.listed + 3 * np.cumsum(counts) + counts.sum() <= _MOST_ITEMS
-        largest = 0 if affordable.all() else int(counts[np.argmin(affordable)])
-        many = self.count > max(_LEAF, largest)
-        if not many.any():
-            return False
-        self._close(many)
-        self.edge /= 2
-        parent = self.corner[many]
-        corner = parent[:, None] + self.edge * _OCTANTS
-        first, count = self.first[many], self.count[many]
-        counts = np.zeros((len(first), 8), np.int64)
-        meets = np.empty(len(self.item), np.uint8)
-        arguments = (self.planes, self.boxes, parent, self.edge, first, count, self.item, meets)
-        sort_into_children(*arguments, counts, counts, np.empty(0, np.int32))
-        starts = (np.cumsum(counts) - counts.ravel()).reshape(counts.shape)
-        item = np.empty(int(counts.sum()) + 1, np.int32)
-        sort_into_children(*arguments, np.empty_like(counts), starts, item)
-        self.corner = corner.reshape(-1, 3)
-        self.first, self.count, self.item = starts.ravel(), counts.ravel(), item[:-1]
-        return True
-
-    def _close(self, open_nodes: Mask) -> None:
-        """Number the children of open nodes; list the items of the others for good."""
-        child = np.zeros(len(open_nodes), np.int64)
-        child[open_nodes] = self.nodes + 8 * np.arange(int(open_nodes.sum()))
-        self.nodes += 8 * int(open_nodes.sum())
-        self.child.append(child)
-        leaf = ~open_nodes
-        count = np.where(leaf, self.count, 0)
-        several = len(self.count) > 1
-        listed = np.repeat(leaf, self.count) if several else np.zeros(len(self.item), bool)
-        self.done.append((self.listed + np.cumsum(count) - count, count))
-        self.items.append(self.item[listed])
-        self.listed += int(count.sum())
-
-    def finished(self) -> SpaceTree:
-        self._close(np.zeros(len(self.count), bool))
-        first, count = (np.concatenate(part) for part in zip(*self.done, strict=True))
-        child, items = np.concatenate(self.child), np.concatenate(self.items)
-        space = self.planes, self.boxes, self.low, self.size
-        return SpaceTree(*space, child, first, count, items)

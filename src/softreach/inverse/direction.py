@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 
-from softreach.inverse.nearest import descend, first_of_each, nearest_at, starts
-from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.roots import Roots
+from softreach.inverse.roots import descend
 from softreach.kernels.box.bounded_descent import box_steps
 from softreach.rod.inputs import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
-from softreach.workspace.search import Nearest
 
 Evaluate = Callable[[Index, Array], tuple[Array, Array]]
 """(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
@@ -31,25 +27,13 @@ _PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
 """Rising; with a lower first one a small miss would buy a large change of activation."""
 
 
-def compromises(prepared: PreparedMap, request: Request, known: Roots | None = None) -> Nearest:
-    """The least |tip - target|²/L² + w² |d3 - direction|² found from seeds for each target.
+def compromises(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
+    """Minimize |tip - target|²/L² + w² |d3 - direction|² from each start, one for each target.
 
-    Args:
-        prepared: The tip map.
-        request: Targets, and directions to trade against distance.
-        known: Roots to begin from as well.
+    Returns:
+        Activations [-], shape (n, m), and half of what is minimized, shape (n,).
     """
-    tip_map, targets = prepared.tip_map, request.targets
-    assert request.direction is not None
-    target, start = starts(prepared, targets, known)
-    objective = Objective(
-        tip_map=tip_map,
-        targets=targets[target],
-        direction=request.direction[target],
-        direction_weight=request.direction_weight,
-    )
-    gamma, value = minimize(objective, start, tip_map.box)
-    return nearest_at(tip_map, targets, gamma[first_of_each(target, value, len(targets))])
+    return minimize(partial(objective, tip_map, request, 1.0, None), start, tip_map.box)
 
 
 def constrained_minima(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
@@ -57,11 +41,6 @@ def constrained_minima(tip_map: TipMap, request: Request, start: Array) -> tuple
 
     Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], whose inner searches respect the
     bounds, then descent to the target.
-
-    Args:
-        tip_map: The tip map.
-        request: A target for each start, and what is preferred.
-        start: Activations to begin with [-], shape (n, m).
 
     Returns:
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
@@ -73,16 +52,7 @@ def constrained_minima(tip_map: TipMap, request: Request, start: Array) -> tuple
         if not len(rows):
             break
         part = request.of(rows)
-        assert part.direction is not None
-        lagrangian = Objective(
-            tip_map=tip_map,
-            targets=part.targets,
-            penalty=penalty,
-            multiplier=multiplier[rows],
-            near=part.near,
-            direction=part.direction,
-            direction_weight=part.direction_weight,
-        )
+        lagrangian = partial(objective, tip_map, part, penalty, multiplier[rows])
         gamma[rows] = minimize(lagrangian, gamma[rows], tip_map.box)[0]
         error = (tip_map.tips_and_slopes(gamma[rows])[0] - part.targets) / tip_map.length
         multiplier[rows] += penalty * error  # theory (40)
@@ -100,14 +70,9 @@ def _multipliers(tip_map: TipMap, request: Request, gamma: Array) -> Array:
 
 
 def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Array, Array]:
-    """Minimize function i from start i, by damped Newton within the bounds.
+    """Minimize function i from start i, shape (n, m), by damped Newton within the bounds.
 
     Second derivatives are differences of the exact gradients.
-
-    Args:
-        evaluate: Values and gradients of some of the functions.
-        start: Inside the bounds [-], shape (n, m).
-        box: The bounds.
 
     Returns:
         Activations (n, m) of local minima, and the functions there, (n,).
@@ -124,7 +89,7 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Arra
         box_steps(gamma[active], gradient[active], hessian[active], damped, low, high, trial)
         still = (np.abs(trial - gamma[active]) / scales).max(axis=1, initial=0.0) <= _STEP_TOL
         ahead = _expanded(evaluate, active, trial, scales, ~still)
-        accepted = ahead.value <= value[active] + _VALUE_TOL * np.abs(value[active])
+        accepted = ahead[0] <= value[active] + _VALUE_TOL * np.abs(value[active])
         taken = active[accepted]
         gamma[taken] = trial[accepted]
         value[taken], gradient[taken], hessian[taken] = (part[accepted] for part in ahead)
@@ -134,60 +99,46 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Arra
     return gamma, value
 
 
-@dataclass(frozen=True, kw_only=True)
-class Objective:
+def objective(
+    tip_map: TipMap,
+    request: Request,
+    penalty: float,
+    multiplier: Array | None,
+    which: Index,
+    gamma: Array,
+) -> tuple[Array, Array]:
     """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
 
-    Theory (40). Without near and λ its minimum is a compromise of distance and direction; with near
-    and the right λ it is the least change that reaches the target (an augmented Lagrangian).
+    Theory (40). With the right λ its minimum is the least change that reaches the target (an
+    augmented Lagrangian); without λ, and then without the change, a compromise of distance and
+    direction. μ is the penalty and λ the multiplier of each search, shape (n, 3).
+
+    Returns:
+        Values (k,) and gradients (k, m) at activations (k, m) of some searches, numbers (k,).
     """
-
-    tip_map: TipMap
-    targets: Array
-    """One for each search [m], shape (n, 3)."""
-    direction: Array
-    """Unit vectors, shape (n, 3)."""
-    direction_weight: float
-    """w [-]."""
-    penalty: float = 1.0
-    """μ [-]."""
-    multiplier: Array | None = None
-    """λ, shape (n, 3)."""
-    near: Array | None = None
-    """Shape (n, m) [-]; None for no term of change."""
-
-    def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
-        """Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,)."""
-        motions = self.tip_map.tip_motions(gamma)
-        miss = (motions.tips - self.targets[which]) / self.tip_map.length
-        force = self.penalty * miss
-        value = 0.5 * self.penalty * _squares(miss)
-        if self.multiplier is not None:
-            force += self.multiplier[which]
-            value += np.einsum("ni,ni->n", self.multiplier[which], miss)
-        gradient = np.einsum("ni,nij->nj", force, motions.slopes / self.tip_map.length)
-        if self.near is not None:
-            change = gamma - self.near[which]
-            value += 0.5 * _squares(change)
-            gradient += change
-        wanted, squared_weight = self.direction[which], self.direction_weight**2
-        value += 0.5 * squared_weight * _squares(motions.directions - wanted)
-        # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
-        turn = np.cross(motions.directions, wanted)
-        gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
-        return value, gradient
-
-
-class _Expansion(NamedTuple):
-    value: Array
-    gradient: Array
-    hessian: Array
-    """NaN where it was not asked for."""
+    assert request.direction is not None
+    motions, wanted = tip_map.tip_motions(gamma), request.direction[which]
+    miss = (motions.tips - request.targets[which]) / tip_map.length
+    force, value = penalty * miss, 0.5 * penalty * _squares(miss)
+    if multiplier is not None:
+        force += multiplier[which]
+        value += np.einsum("ni,ni->n", multiplier[which], miss)
+    gradient = np.einsum("ni,nij->nj", force, motions.slopes / tip_map.length)
+    if multiplier is not None:
+        change = gamma - request.near[which]
+        value += 0.5 * _squares(change)
+        gradient += change
+    squared_weight = request.direction_weight**2
+    value += 0.5 * squared_weight * _squares(motions.directions - wanted)
+    # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
+    turn = np.cross(motions.directions, wanted)
+    gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
+    return value, gradient
 
 
 def _expanded(
     evaluate: Evaluate, which: Index, gamma: Array, scales: Array, curved: Mask
-) -> _Expansion:
+) -> tuple[Array, Array, Array]:
     """Values, gradients and, where `curved`, Hessians: gradients a step away along each axis.
 
     One call evaluates all: rods are computed in blocks that cost the same full or not.
@@ -207,7 +158,7 @@ def _expanded(
     # Next to where a function ends, steps down of a tenth of the ranges.
     size = np.abs(gradient[:n][torn] * scales).max(axis=1, initial=0.0)
     hessian[torn] = (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(m)
-    return _Expansion(value[:n], gradient[:n], hessian)
+    return value[:n], gradient[:n], hessian
 
 
 def _squares(rows: Array) -> Array:

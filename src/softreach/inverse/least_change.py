@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.inverse.direction import constrained_minima
-from softreach.inverse.nearest import Reached, descend, first_of_each, reach
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
+from softreach.inverse.roots import Reached, descend, first_of_each, reach
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.sequential_projection import (
     FIRST_PROXIMITY,
@@ -59,20 +59,16 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     The others are those nearest to random activations, whatever their direction, and apart from
     each other: fewer than `family` where further searches end at what is known.
 
-    Args:
-        prepared: The tip map.
-        request: Targets, and what is preferred.
-
     Returns:
         Number of the target and activation, sorted by target, those of least change first; and the
         best place found for every target, reached or not.
     """
     known = _in_blocks(prepared, replace(request, direction=None))
     reached = np.flatnonzero(known.residual <= request.residual)
-    asked = request.of(reached)
+    solved = request.of(reached)
     first = known.gamma[reached]
     if request.direction is not None:
-        first = _turned(prepared, asked, first)
+        first = _turned(prepared, solved, first)
     families = _Families(first, request.family, prepared.tip_map.box.scales)
     box, rng = prepared.tip_map.box, np.random.default_rng(request.seed)
     # One sequence for all targets, so that a target's family does not depend on its neighbors.
@@ -82,9 +78,9 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
         rows = np.flatnonzero(families.counts < request.family)
         if not len(rows):
             break
-        one = replace(asked.of(rows), near=np.tile(near, (len(rows), 1)), direction=None)
-        other = _in_blocks(prepared, one, families.members[rows, 0]).gamma
-        families.add(rows, other, None if request.direction is not None else asked.near[rows])
+        another = replace(solved.of(rows), near=np.tile(near, (len(rows), 1)), direction=None)
+        other = _in_blocks(prepared, another, families.members[rows, 0]).gamma
+        families.add(rows, other, None if request.direction is not None else solved.near[rows])
     return np.repeat(reached, families.counts), families.members[families.is_member], known
 
 
@@ -159,10 +155,12 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
     lost |= np.bincount(owner, coarse.residual <= _HIT * tip_map.length, count) == 0
     owner = owner[leading]
     ends = _best(owner, _on_target(tip_map, request, owner, fine), request)
-    left = np.flatnonzero(ends.residual > request.residual)
-    lost[left] = True
-    ends.gamma[left], ends.residual[left] = reach(prepared, request.of(left), ends.gamma[left])
-    return _searched_again(prepared, request, ends, np.flatnonzero(lost), *every)
+    if len(left := np.flatnonzero(ends.residual > request.residual)):
+        ends.gamma[left], ends.residual[left] = reach(prepared, request.of(left), ends.gamma[left])
+        lost[left] = True
+    if lost.any():
+        return _searched_again(prepared, request, ends, np.flatnonzero(lost), *every)
+    return ends
 
 
 def _leading(prepared: PreparedMap, request: Request, owner: Index, ends: Minima) -> Index:
@@ -210,14 +208,14 @@ def _searched_again(
     at = descend(tip_map, request.targets[owner], start, request.residual)
     hit = np.flatnonzero(at.distance <= request.residual)
     kept = search(tip_map, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY)
-    found = [
+    ends_of_all = [
         ends,
         _on_target(tip_map, request, owner, plain),
         Reached(at.gamma[hit], at.distance[hit]),
         _on_target(tip_map, request, owner[hit], kept),
     ]
     owners = [np.arange(len(request.targets)), owner, owner[hit], owner[hit]]
-    return _best(np.concatenate(owners), joined(found), request)
+    return _best(np.concatenate(owners), joined(ends_of_all), request)
 
 
 def _best(owner: Index, ends: Reached, request: Request) -> Reached:
@@ -298,7 +296,7 @@ def sqp(
         tip_map: The tip map.
         request: Targets, and what to stay near to.
         owner: Number of the target of each start, shape (n,).
-        start: Activations to begin with, inside the bounds [-], shape (n, m).
+        start: Inside the bounds [-], shape (n, m).
         penalty: Least penalty. A high one keeps a search near the target once it is there, as it
             must where the target lies next to a fold or to the boundary of the reachable set.
         proximity: σ of the first step, shape (n,) or one for all.
@@ -332,7 +330,7 @@ def _searched(
     bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
     running = _room(min(total, _TOGETHER), box.bundles)
     tips, ahead = np.empty_like(running.miss), np.empty_like(running.slope)
-    asked, length, begun, n = (request.targets, request.near), tip_map.length, 0, 0
+    wanted_of_all, length, begun, n = (request.targets, request.near), tip_map.length, 0, 0
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
         new, rows = slice(n, n + more), slice(begun, begun + more)
@@ -345,7 +343,7 @@ def _searched(
         if tip_map.supports_unstable:
             lost = np.isnan(tips[:n, 0])
             tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
-        n = judge(running, n, tips, ahead, owner, *asked, bounds, length, limits, ends)
+        n = judge(running, n, tips, ahead, owner, *wanted_of_all, bounds, length, limits, ends)
         center, slope, wanted = running.center[:n], running.slope[:n], running.wanted[:n]
         softness, low, high = running.softness[:n], running.low[:n], running.high[:n]
         multiplier = running.multiplier[:n]

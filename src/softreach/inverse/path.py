@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.nearest import descend
-from softreach.inverse.request import as_activations, as_residual, reach_tol
+from softreach.inverse.request import RESIDUALS, as_activations
+from softreach.inverse.roots import descend
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import as_tip_map, free_bundles, measured_bundles
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import InvalidInput
 
@@ -80,7 +81,7 @@ def track_path(
         )
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
-    residual = as_residual(residual_over_length)
+    residual = as_number("residual_over_length", residual_over_length, RESIDUALS)
     tracker = Continuation(free_bundles(tip_map), residual * tip_map.length)
     if start is not None:
         gamma = as_activations("start", start, tip_map.box, 1)[0]
@@ -122,7 +123,7 @@ class Continuation:
     def __init__(self, tip_map: TipMap, residual: float) -> None:
         """Set up for tips within `residual` [m] of their points, or as near as tips can tell."""
         self.tip_map, self.box, self.residual = tip_map, tip_map.box, residual
-        self.reach_tol = reach_tol(tip_map, residual)
+        self.reach_tol = max(residual, tip_map.tol * tip_map.length)
         self._torn = False  # whether the last correction met a place where the arm snaps
 
     def at(self, gamma: Array, tip_map: TipMap | None = None) -> BranchPoint:
@@ -150,27 +151,32 @@ class Continuation:
             part = min(part, 1.0 - done)
             last = part >= 1.0 - done
             target = end if last else begin + (done + part) * (end - begin)
-            substep = self._predicted(point, target)
-            if substep.end is not None and (beside := self._beside(point, target)) is not None:
-                substep = _Substep(point=beside)  # as near as tips can tell where a bound is met
-            if substep.end is not None:
-                return substep.end._replace(done=done, error=shortest * distance)
-            torn = torn or substep.torn
-            if substep.point is not None:
-                point, done, part = substep.point.kept(), 1.0 if last else done + part, 2 * part
+            ahead = self._predicted(point, target)
+            torn = torn or self._torn
+            if isinstance(ahead, BranchEnd):
+                # Where a bound is met, the tip may be as near as tips can tell.
+                beside = self._beside(point, target)
+                if beside is None:
+                    return ahead._replace(done=done, error=shortest * distance)
+                ahead = beside
+            if isinstance(ahead, BranchPoint):
+                point, done, part = ahead.kept(), 1.0 if last else done + part, 2 * part
                 torn = False
-            elif part * substep.shorten < (shortest_torn if torn else shortest):
+            elif part * ahead < (shortest_torn if torn else shortest):
                 if (beside := self._beside(point, end)) is not None:
                     return BranchEnd(PathStatus.FOLLOWED, beside, done=1.0)
                 why = PathStatus.SNAPS if torn else PathStatus.FOLD
                 return BranchEnd(why, point, done=done, error=part * distance)
             else:
-                part *= substep.shorten
+                part *= ahead
         return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
 
-    def _predicted(self, point: BranchPoint, target: Array) -> _Substep:
-        """Predict and correct; bundles that would leave their bounds are held there."""
-        gamma, bundle, upper = point.gamma, -1, False
+    def _predicted(self, point: BranchPoint, target: Array) -> BranchPoint | BranchEnd | float:
+        """Predict and correct; bundles that would leave their bounds are held there.
+
+        A number says by how much to shorten the substep.
+        """
+        gamma, bundle, upper, self._torn = point.gamma, -1, False, False
         moving = self.box.is_free
         while moving.sum() >= 3:
             step = _least_norm(point.slope, moving) @ (target - point.tip)
@@ -179,27 +185,25 @@ class Continuation:
             blocked = moving & self._at_bound(gamma) & (self.box.excess(ahead) > _AT_BOUND)
             if not blocked.any():
                 if size > _LONGEST:
-                    return _Substep(shorten=0.9 * _LONGEST / size)
+                    return float(0.9 * _LONGEST / size)
                 corrected = self._corrected(point.tip_map, ahead, target, moving)
-                if corrected is None:
-                    return _Substep(shorten=0.5, torn=self._torn)
-                if self._left_branch(point, ahead, corrected):
-                    return _Substep(shorten=0.5)
+                if corrected is None or self._left_branch(point, ahead, corrected):
+                    return 0.5
                 over = self.box.excess(corrected.gamma) > _AT_BOUND
                 if not over.any():
-                    return _Substep(point=self._clipped(corrected))
+                    return self._clipped(corrected)
                 blocked = over & self._at_bound(gamma)
                 if not blocked.any():  # end just inside the bounds
                     way = (corrected.gamma - gamma)[over]
                     bound = np.where(way > 0.0, self.box.high[over], self.box.low[over])
                     inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales[over] / np.abs(way)
                     part = (bound - gamma[over]) / way * np.minimum(inside, 1 - 1e-6)
-                    return _Substep(shorten=float(np.clip(part.min(), 1e-6, 0.9999)))
+                    return float(np.clip(part.min(), 1e-6, 0.9999))
                 ahead = corrected.gamma
             bundle = int(np.flatnonzero(blocked)[0])
             upper = bool(ahead[bundle] > self.box.high[bundle])
             moving = moving & ~blocked
-        return _Substep(end=BranchEnd(PathStatus.BOUND, point, bundle, upper))
+        return BranchEnd(PathStatus.BOUND, point, bundle, upper)
 
     def _beside(self, point: BranchPoint, target: Array) -> BranchPoint | None:
         """The point of the branch that is at a place as far as tips can tell; None if none is."""
@@ -292,16 +296,6 @@ class BranchEnd(NamedTuple):
     """Largest distance that the branch may go farther [m]."""
 
 
-class _Substep(NamedTuple):
-    """A substep: where it led, or by how much to shorten it, or the end of the branch."""
-
-    point: BranchPoint | None = None
-    shorten: float = 1.0
-    end: BranchEnd | None = None
-    torn: bool = False
-    """True if it met a place where the arm snaps."""
-
-
 def _least_norm(slope: Array, moving: Mask) -> Array:
     """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3): theory (39)."""
     return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)
@@ -331,8 +325,8 @@ def _dataset(
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
     activation, measures = np.full((len(points), box.bundles), np.nan), tip_map.measures
-    length, length_error = _end_length(points, n, end)
-    error = np.full(len(points), np.nan)
+    lengths, error = np.linalg.norm(np.diff(points, axis=0), axis=1), np.full(len(points), np.nan)
+    length = length_error = np.nan
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""
     if end is not None:
@@ -340,6 +334,9 @@ def _dataset(
         tips = np.array([point.tip for point in followed])
         error[:n] = np.linalg.norm(tips - points[:n], axis=1)
         end_activation, end_position = box.with_fixed(end.point.gamma[None])[0], end.point.tip
+        length, length_error = float(lengths[: n - 1].sum()), end.error
+        if end.status != PathStatus.FOLLOWED:
+            length += end.done * float(lengths[n - 1])
         if end.status == PathStatus.BOUND:
             bundle, bound = box.names[box.free[end.bundle]], "upper" if end.upper else "lower"
     return xr.Dataset(
@@ -361,13 +358,3 @@ def _dataset(
             "end_bound": bound,
         },
     )
-
-
-def _end_length(points: Array, followed: int, end: BranchEnd | None) -> tuple[float, float]:
-    if end is None:
-        return np.nan, np.nan
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    length = float(lengths[: followed - 1].sum())
-    if end.status != PathStatus.FOLLOWED:
-        length += end.done * float(lengths[followed - 1])
-    return length, end.error

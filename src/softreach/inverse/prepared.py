@@ -94,9 +94,8 @@ class PreparedMap:
     def prepare_branches(self, count: int) -> None:
         """Compute what searches for so many targets need, once for all threads."""
         self._searched[0] += count
-        divided = len(self.mesh.corner) and self._searched[0] > _FEW
-        for name in ("tip_map", "_cut", "tree")[: 3 if divided else 2]:
-            getattr(self, name)
+        if len(self.mesh.corner) and self._searched[0] > _FEW:
+            _ = self.tree
 
     @property
     def mesh(self) -> ActivationMesh:

@@ -36,16 +36,9 @@ def gap_bounds(
     n·(p - r(c)) - Σ hj |n·Jj| at least, for any unit vector n, and its distance from the image no
     smaller than that by more than the error of the linearization.
 
-    Args:
-        tip_map: The tip map.
-        coarse: Its cells.
-        targets: Shape (t, 3) [m].
-        gap: Distance of the best place known from each [m], shape (t,).
-        reach_tol: Distance that a bound must exceed to prove anything of the arm itself [m]; every
-            gap does.
-
-    Returns:
-        Bounds [m], shape (t,); 0 where nothing is proved.
+    Bounds [m], shape (t,), are 0 where nothing is proved, and no larger than the gap, the distance
+    of the best place known from each target (t, 3) [m]. To prove anything of the arm itself, a
+    bound must exceed `reach_tol` [m]; every gap does.
     """
     if tip_map.box.dimension == 0:
         return gap.copy()  # one place is reached

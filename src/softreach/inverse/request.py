@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.rod.inputs import ActivationBox
-from softreach.rod.tip_map import TipMap
-from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Index, as_floats, check_finite
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import unit_names
@@ -19,7 +17,8 @@ from softreach.support.units import TYPED, lengths_in
 _HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\])])")
 """Name of a column with its unit."""
 
-_RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
+RESIDUALS = Range(1e-13, 1e-2)
+"""|tip - target| that can be asked for, in L; below, rounding of the tips decides."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,13 +52,7 @@ class Request:
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
-    """An activation for each target, of the free bundles only, shape (t, dimension).
-
-    Args:
-        name: Name of the argument.
-        activations: Of all bundles [-], shape (bundles,) or (t, bundles).
-        box: The bounds of all bundles.
-        count: Number of targets t.
+    """Activations (bundles,) or (t, bundles) of all bundles as those of the free ones, (t, free).
 
     Raises:
         InvalidInput: Another shape, or values that are not finite.
@@ -72,28 +65,10 @@ def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count:
     return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
 
 
-def as_residual(residual_over_length: float) -> float:
-    """The largest |tip - target| in L, if that can be asked for."""
-    return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))
-
-
-def reach_tol(tip_map: TipMap, residual: float) -> float:
-    """|tip - target| [m] within which a target is reached: the error of tips, or a wider residual.
-
-    Args:
-        tip_map: The tip map.
-        residual: To which solutions are searched [m].
-    """
-    return max(residual, tip_map.tol * tip_map.length)
-
-
 def positions_in(text: str, source: str, length: float | None = None) -> list[list[float]]:
     """Positions [m] from lines x,y,z; a header is skipped, but for units such as x_mm,y_mm,z_mm.
 
-    Args:
-        text: Content of the file.
-        source: Its name in errors.
-        length: L [m], for places in L; None where it is not known.
+    Errors name the file by `source`; places in L need a `length` L [m].
 
     Raises:
         InvalidInput: A line that is not three lengths, an unknown unit in the header, or no line.
@@ -110,12 +85,7 @@ def positions_in(text: str, source: str, length: float | None = None) -> list[li
 
 
 def position_in(name: str, text: str, length: float | None = None) -> list[float]:
-    """One position [m] from x,y,z, each with its unit or all of them in m.
-
-    Args:
-        name: What errors call it.
-        text: What was typed.
-        length: L [m], for places in L; None where it is not known.
+    """One position [m] from x,y,z, each with its unit or all of them in m; in L with a length.
 
     Raises:
         InvalidInput: The text is not three lengths.
@@ -129,12 +99,7 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
 
 
 def length_in(name: str, text: str, length: float) -> float:
-    """One length [m] from what was typed, 0 or more, with its unit or in m.
-
-    Args:
-        name: What errors call it.
-        text: What was typed.
-        length: L [m], for lengths in L.
+    """One length [m] from what was typed, 0 or more, with its unit, in m or in a length L.
 
     Raises:
         InvalidInput: The text is not such a length.

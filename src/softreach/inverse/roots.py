@@ -1,7 +1,8 @@
-"""Roots of tip(γ) = target, and how well the tip can be moved there."""
+"""Roots of tip(γ) = target, how well the tip can be moved there, and searches for hard targets."""
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,16 @@ from softreach.inverse.request import Request
 from softreach.kernels.branches import newton
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, joined_by, rows
+from softreach.workspace.search import CLOSELY, Nearest, nearest_tips
 
-_EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
-"""Seeds near the target, most starts from them, their least distance in ranges."""
+_NEARLY_SINGULAR = ((500, 20, 0.1), (2000, 100, 0.08))
+_UNREACHED = ((1, 1, 0.0, 0), (24, 4, 0.15, 0), (128, 24, 0.1, 8), (1000, 150, 0.05, 100))
+"""Efforts: seeds near the target, most starts from them, their least distance in ranges, and
+searches from anywhere."""
+
+_SEED = 1
+_BEYOND = 1e-3  # of the residual, to which a descent goes on
+_MOST_STEPS = 60
 
 _BLOCK = 500  # targets at once
 _MOST_ITERATIONS = 60
@@ -25,7 +33,7 @@ _FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
 
 
 class Roots(NamedTuple):
-    """Activations of the free bundles, each a root for one of the targets."""
+    """Activations of the free bundles, each a root for one of the targets or the nearest tip."""
 
     target: Index
     """Number of the target, shape (n,)."""
@@ -60,15 +68,10 @@ def no_roots(tip_map: TipMap) -> Roots:
 
 
 def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
-    """Activations (n, m) as roots for targets `target` (n,), whatever their residual.
-
-    Args:
-        tip_map: A tip map of stable equilibria.
-        targets: Shape (t, 3) [m].
-        target: Shape (n,).
-        gamma: Shape (n, m).
-    """
+    """Activations (n, m) as roots for some of the targets (t, 3) [m], whatever their residual."""
     tips, slopes = tip_map.tips_and_slopes(gamma)
+    if not tip_map.supports_unstable:
+        tips = tip_map.tips(gamma)  # to the last bit those that users get
     residual = np.linalg.norm(tips - targets[target], axis=1)
     cell, sheet = np.full(len(target), -1), np.zeros(len(target), np.int64)
     return Roots(target, gamma, tips, slopes, residual, cell, sheet)
@@ -83,6 +86,22 @@ def placed(tip_map: TipMap, gamma: Array) -> Array:
     if not tip_map.supports_unstable:
         return tip_map.tips(gamma)
     return tip_map.tips_and_slopes(gamma)[0]
+
+
+def descend(
+    tip_map: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_STEPS
+) -> Nearest:
+    """The local minimum of distance to a target from each start, to well within the residual [m].
+
+    Starts are inside the bounds, shape (n, m), and there is a target for each, shape (n, 3) [m].
+    """
+    return nearest_tips(tip_map, start, targets, _BEYOND * residual, CLOSELY._replace(most=most))
+
+
+def first_of_each(owner: Index, value: Array, count: int) -> Index:
+    """The row of least value of each of `count` owners, all of whom have some, shape (count,)."""
+    order = np.lexsort((value, owner))
+    return order[np.searchsorted(owner[order], np.arange(count))]
 
 
 def smallest_singular_values(slope: Array) -> Array:
@@ -105,7 +124,7 @@ def conditions(slope: Array) -> Array:
 def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """Roots for some of the targets, those that no other search found, sorted by target."""
     roots = no_roots(prepared.tip_map)
-    for neighbors, most, apart in _EFFORTS:
+    for neighbors, most, apart in _NEARLY_SINGULAR:
         left = np.setdiff1d(chosen, roots.target)
         for first in range(0, len(left), _BLOCK):
             part = left[first : first + _BLOCK]
@@ -113,8 +132,8 @@ def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index
             owner, start = prepared.seeds.starts(near, most, apart)
             goal, owner = request.targets[part[owner]], part[owner]
             gamma = affine_invariant_newton(prepared.tip_map, goal, start, request.residual)
-            found = roots_at(prepared.tip_map, request.targets, owner, gamma)
-            roots = roots.joined(rows(found, found.residual <= request.residual))
+            ends = roots_at(prepared.tip_map, request.targets, owner, gamma)
+            roots = roots.joined(rows(ends, ends.residual <= request.residual))
     return roots
 
 
@@ -132,16 +151,12 @@ def affine_invariant_newton(
     along the others, and a straight step leaves the valley's floor. So each step ends with a few of
     Newton's method along that direction alone.
 
-    Args:
-        tip_map: The tip map of three free bundles.
-        targets: One for each start [m], shape (n, 3).
-        start: Shape (n, 3).
-        residual: |tip - target| at which a search may end [m].
+    There is a target for each start, shape (n, 3) both; a search may end within the residual [m].
     """
     box, scales = tip_map.box, tip_map.box.scales
-    low, high = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
-    valley = _Valley(tip_map, low, high)
-    gamma, miss, slope = valley.floor(targets, start, _FIRST_RETURNS)
+    bounds = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
+    floor = partial(_valley_floor, tip_map, bounds)
+    gamma, miss, slope = floor(targets, start, _FIRST_RETURNS)
     damping, active = np.ones(len(start)), np.flatnonzero(np.isfinite(miss[:, 0]))
     for _ in range(_MOST_ITERATIONS):
         if not len(active):
@@ -154,8 +169,8 @@ def affine_invariant_newton(
         step = np.einsum("nij,nj->ni", inverse, miss[active])
         size = np.linalg.norm(step, axis=1)
         factor = np.minimum(damping[active], _LONGEST_STEP / np.maximum(size, 1e-300))
-        trial = np.clip(gamma[active] + factor[:, None] * step * scales, low, high)
-        trial, away, new_slope = valley.floor(targets[active], trial, _RETURNS)
+        trial = np.clip(gamma[active] + factor[:, None] * step * scales, *bounds)
+        trial, away, new_slope = floor(targets[active], trial, _RETURNS)
         left = np.linalg.norm(np.einsum("nij,nj->ni", inverse, away), axis=1)
         accepted = left <= (1.0 - 0.25 * factor) * size
         taken = active[accepted]
@@ -174,27 +189,66 @@ def _closed_form(slope: Array) -> tuple[Array, Array]:
     return smallest, condition
 
 
-class _Valley(NamedTuple):
-    """Activations whose tips are right along the direction in which the tip moves most."""
+def _valley_floor(
+    tip_map: TipMap, bounds: tuple[Array, Array], targets: Array, gamma: Array, steps: int
+) -> tuple[Array, Array, Array]:
+    """Activations after steps along the direction in which the tip moves most, until it is right.
 
-    tip_map: TipMap
-    low: Array
-    high: Array
-
-    def floor(self, targets: Array, gamma: Array, steps: int) -> tuple[Array, Array, Array]:
-        """Activations after some steps along that direction, target - tip and ∂r/∂γ [m] there."""
-        tip, slope = self.tip_map.tips_and_slopes(gamma)
-        for _ in range(steps):
-            gamma = self._stepped(targets, gamma, tip, slope)
-            tip, slope = self.tip_map.tips_and_slopes(gamma)
-        return gamma, targets - tip, slope
-
-    def _stepped(self, targets: Array, gamma: Array, tip: Array, slope: Array) -> Array:
-        """Activations a step nearer to the floor; those without a tip stay."""
-        scales = self.tip_map.box.scales
-        lost = np.isnan(tip[:, 0]) if self.tip_map.supports_unstable else np.zeros(len(tip), bool)
+    And target - tip and ∂r/∂γ [m] there. Those without a tip stay.
+    """
+    scales, lost = tip_map.box.scales, np.zeros(len(gamma), bool)
+    tip, slope = tip_map.tips_and_slopes(gamma)
+    for _ in range(steps):
+        if tip_map.supports_unstable:
+            lost = np.isnan(tip[:, 0])
         known = np.where(lost[:, None, None], np.eye(3), slope * scales)
         left, sizes, right = np.linalg.svd(known)
         step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]
-        ahead = np.clip(gamma + scales * step[:, None] * right[:, 0], self.low, self.high)
-        return np.where(lost[:, None], gamma, ahead)
+        ahead = np.clip(gamma + scales * step[:, None] * right[:, 0], *bounds)
+        gamma = np.where(lost[:, None], gamma, ahead)
+        tip, slope = tip_map.tips_and_slopes(gamma)
+    return gamma, targets - tip, slope
+
+
+class Reached(NamedTuple):
+    """The best place found for each target."""
+
+    gamma: Array
+    """Activations [-], shape (t, m)."""
+    residual: Array
+    """|tip - target| [m], shape (t,)."""
+
+
+def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
+    """The activation found whose tip is nearest to each target, with growing effort.
+
+    Most targets are reached from `start`, shape (t, m), or the seed whose tip is nearest. The rest
+    lie where the map is singular or on the boundary of the reachable set, which is the image of
+    faces of the box on which few bundles are free: these are searched from many seeds, on such
+    faces too, that lie apart.
+    """
+    box, targets = prepared.tip_map.box, request.targets
+    first = descend(prepared.tip_map, targets, box.clip(start), request.residual)
+    gamma, residual = first.gamma, first.distance
+    rng = np.random.default_rng(_SEED)
+    for neighbors, most, apart, random in _UNREACHED:
+        # One set for all targets, so that no answer depends on the other targets.
+        anywhere = rng.uniform(box.low, box.high, (random, len(box.low)))
+        left = np.flatnonzero(residual > request.residual)
+        if not len(left):
+            break
+        for some in np.array_split(left, 1 + len(left) * neighbors // 100_000):
+            goal = targets[some]
+            starts = [(np.repeat(np.arange(len(some)), random), np.tile(anywhere, (len(some), 1)))]
+            every = [prepared.seeds]
+            if neighbors > 1:  # the nearest seed is enough for nearly all
+                every.append(prepared.face_seeds)
+            for seeds in every:
+                starts.append(seeds.starts(seeds.nearest(goal, neighbors), most, apart))
+            owner, start = map(np.concatenate, zip(*starts, strict=True))
+            ends = descend(prepared.tip_map, goal[owner], start, request.residual)
+            best = first_of_each(owner, ends.distance, len(some))
+            better = ends.distance[best] < residual[some]
+            gamma[some[better]] = ends.gamma[best[better]]
+            residual[some[better]] = ends.distance[best[better]]
+    return Reached(gamma, residual)

@@ -37,14 +37,7 @@ class Seeds:
     """Activations with known tips."""
 
     def __init__(self, gamma: Array, tip: Array, coarse: TipMap) -> None:
-        """Keep the tips; what finds them is made when it is first needed.
-
-        Args:
-            gamma: Activations [-], shape (n, m).
-            tip: Their tips [m], shape (n, 3).
-            coarse: A tip map by which seeds are moved, and by the ranges of whose bounds distances
-                of activations are measured.
-        """
+        """Keep activations (n, m) and their tips (n, 3) [m], and a map by which seeds are moved."""
         self.gamma, self.tip, self.scales, self._coarse = gamma, tip, coarse.box.scales, coarse
 
     @lazy
@@ -80,17 +73,11 @@ class Seeds:
     def near(
         self, targets: Array, near: Array, count: int, most: int, least_distance: float
     ) -> tuple[Index, Array]:
-        """Seeds with tips near each target, those nearest to an activation, that lie apart.
+        """Seeds with tips near each target (t, 3) [m], those nearest to an activation (t, m).
 
         Chosen twice: after each is moved to where its linearized tip meets the target, and as they
-        are.
-
-        Args:
-            targets: Shape (t, 3) [m].
-            near: An activation for each target, shape (t, m).
-            count: Seeds to look at, at least.
-            most: Largest number for one target, of either kind.
-            least_distance: Between any two of one kind, in ranges.
+        are. At least `count` are looked at; of either kind a target gets `most`, that lie apart, in
+        ranges.
 
         Returns:
             Number of the target and activation of each start, sorted by target.
@@ -127,12 +114,7 @@ class Seeds:
     def starts(
         self, candidates: Array, most: int = _STARTS, least_distance: float = _APART
     ) -> tuple[Index, Array]:
-        """A few candidates for each target that lie far from each other in the box.
-
-        Args:
-            candidates: Activations for each target, best first, shape (t, k, m).
-            most: Largest number for one target.
-            least_distance: Between any two, in ranges.
+        """A few candidates (t, k, m) for each target, best first, that lie apart, in ranges.
 
         Returns:
             Number of the target and activation of each start, sorted by target.
@@ -177,7 +159,5 @@ def face_seeds(tip_map: TipMap, coarse: TipMap) -> Seeds:
 
 def _with_tips(tip_map: TipMap, gamma: Array, coarse: TipMap) -> Seeds:
     tip = tip_map.tips(gamma)
-    if tip_map.supports_unstable:
-        known = np.isfinite(tip[:, 0])
-        gamma, tip = gamma[known], tip[known]
-    return Seeds(gamma, tip, coarse)
+    known = np.isfinite(tip[:, 0])
+    return Seeds(gamma[known], tip[known], coarse)

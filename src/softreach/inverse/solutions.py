@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Self, overload
@@ -165,12 +165,17 @@ class Solutions(Sequence[Solution]):
     @overload
     def __getitem__(self, index: slice) -> Solutions: ...
     def __getitem__(self, index: int | slice) -> Solution | Solutions:
-        if isinstance(index, slice):
-            return self._several(np.arange(len(self))[index])
-        return self._one(range(len(self))[index])
-
-    def __iter__(self) -> Iterator[Solution]:
-        return (self._one(i) for i in range(len(self)))
+        if not isinstance(index, slice):
+            i = range(len(self))[index]
+            rows = {"target": i, "solution": slice(self.offsets[i], self.offsets[i + 1])}
+            target, status, *others = self._of(rows).values()
+            return Solution(target, Status(status), *others, tip_maps=self.tip_maps)
+        chosen = np.arange(len(self))[index]
+        counts = self.counts[chosen]
+        offsets = np.concatenate([[0], np.cumsum(counts)])
+        inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
+        rows = {"target": chosen, "solution": np.repeat(self.offsets[chosen], counts) + inside}
+        return replace(self, offsets=offsets, **self._of(rows))
 
     def __repr__(self) -> str:
         outcomes = np.bincount(self.statuses, minlength=len(Status))
@@ -185,20 +190,8 @@ class Solutions(Sequence[Solution]):
         targets = counted(len(self), "target")
         return f"<Solutions for {targets}{': ' if parts else ''}{', '.join(parts)}>"
 
-    def _one(self, i: int) -> Solution:
-        rows = {"target": i, "solution": slice(self.offsets[i], self.offsets[i + 1])}
-        target, status, *others = self._of(rows).values()
-        return Solution(target, Status(status), *others, tip_maps=self.tip_maps)
-
     def _of(self, rows: Mapping[str, Any]) -> dict[str, Any]:
         return {name: getattr(self, name)[rows[axes[0]]] for name, (_, axes, _) in _COLUMNS.items()}
-
-    def _several(self, chosen: Index) -> Solutions:
-        counts = self.counts[chosen]
-        offsets = np.concatenate([[0], np.cumsum(counts)])
-        inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
-        rows = {"target": chosen, "solution": np.repeat(self.offsets[chosen], counts) + inside}
-        return replace(self, offsets=offsets, **self._of(rows))
 
     def to_dataset(self) -> xr.Dataset:
         """Labelled arrays over `target` and over `solution`, whose `target_of` names its target."""

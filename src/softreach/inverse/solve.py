@@ -9,11 +9,17 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch, with_other_sheets
 from softreach.inverse.direction import compromises
 from softreach.inverse.least_change import least_changes
-from softreach.inverse.nearest import nearest, nearest_at
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import Request, as_activations, as_residual, reach_tol
-from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
+from softreach.inverse.request import RESIDUALS, Request, as_activations
+from softreach.inverse.roots import (
+    Roots,
+    conditions,
+    first_of_each,
+    nearly_singular_roots,
+    no_roots,
+    roots_at,
+)
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import all_inputs, as_tip_map
@@ -22,7 +28,7 @@ from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask, as_directions, as_points, joined, rows
 from softreach.support.errors import Range
-from softreach.workspace.search import CLOSELY, Nearest, nearest_tips
+from softreach.workspace.search import CLOSELY, nearest_tips
 
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
@@ -101,12 +107,13 @@ def solve_inverse(
     preferred = np.zeros(box.bundles) if near is None else near
     measures = prepared.whole.measures
     unit = None if direction is None else as_directions("direction", direction, len(points))
-    residual = as_residual(residual_over_length) * prepared.whole.length
+    least = as_number("residual_over_length", residual_over_length, RESIDUALS)
+    residual = least * prepared.whole.length
     within = as_number("within", within, Range(0.0, unit="m"))
     request = Request(
         targets=points,
         residual=residual,
-        reach_tol=max(reach_tol(prepared.whole, residual), within),
+        reach_tol=max(residual, prepared.whole.tol * prepared.whole.length, within),
         near=as_activations("near", preferred, box, len(points)) / measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
@@ -130,12 +137,12 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
         roots = with_other_sheets(prepared, request, roots)
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
-    closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
-    bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
+    closest = joined([_closest(prepared, request, missing[block]) for block in blocks])
+    bounds = _gap_bounds(prepared, request, closest)
     # A target not proved to be out of reach may have roots that are nearly singular.
-    left = (closest.distance > request.residual) & (bounds == 0.0)
+    left = (closest.residual > request.residual) & (bounds == 0.0)
     if not prepared.proves:
-        left &= closest.distance <= _NEARLY * prepared.whole.length
+        left &= closest.residual <= _NEARLY * prepared.whole.length
     if left.any():
         late = nearly_singular_roots(prepared, request, missing[left])
         late = distinct(prepared, request, late)
@@ -146,27 +153,47 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     roots = every_branch(prepared, request) if prepared.dimension == 3 else None
-    closest = (nearest if request.direction is None else compromises)(prepared, request, roots)
+    closest = _closest(prepared, request, np.arange(len(request.targets)), roots)
     return _solutions(prepared, request, no_roots(prepared.tip_map), closest)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
-    target, gamma, best = least_changes(prepared, request)
-    roots = roots_at(prepared.tip_map, request.targets, target, gamma)
+    tip_map, (target, gamma, best) = prepared.tip_map, least_changes(prepared, request)
+    roots = roots_at(tip_map, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
     left, start = request.targets[missing], best.gamma[missing]
-    ends = nearest_tips(prepared.tip_map, start, left, request.residual, CLOSELY)
-    closest = nearest_at(prepared.tip_map, left, ends.gamma)
+    ends = nearest_tips(tip_map, start, left, request.residual, CLOSELY)
+    closest = roots_at(tip_map, request.targets, missing, ends.gamma)
     return _solutions(prepared, request, roots, closest)
 
 
-def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
+def _closest(
+    prepared: PreparedMap, request: Request, chosen: Index, known: Roots | None = None
+) -> Roots:
+    """The nearest tip, or the best compromise with a direction, from seeds and known roots."""
+    tip_map, targets = prepared.tip_map, request.targets[chosen]
+    if not len(chosen):
+        return no_roots(tip_map)
+    target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
+    if known is not None:
+        target = np.concatenate([target, known.target])
+        start = np.concatenate([start, known.gamma])
+    if request.direction is None:
+        gamma, _, left = nearest_tips(tip_map, start, targets[target], request.residual, CLOSELY)
+    else:
+        gamma, left = compromises(tip_map, request.of(chosen[target]), start)
+    best = first_of_each(target, left, len(chosen))
+    return roots_at(tip_map, request.targets, chosen, gamma[best])
+
+
+def _gap_bounds(prepared: PreparedMap, request: Request, closest: Roots) -> Array:
     """Lower bounds of the distance of targets to all tips; 0 where they prove nothing."""
+    gap = closest.residual
     bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.reach_tol)
     # Where the position yields to a direction, the gap says nothing of what can be reached.
     yielding = request.direction is not None and prepared.dimension <= 3
     if len(out) and not yielding and (prepared.proves or not prepared.dimension):
-        gaps = request.targets[out], gap[out], request.reach_tol
+        gaps = request.targets[closest.target[out]], gap[out], request.reach_tol
         bounds[out] = gap_bounds(prepared.tip_map, prepared.coarse_cells, *gaps)
     # Within the error of the tips, what is true of them need not be true of the arm.
     return np.where(bounds > request.reach_tol, bounds, 0.0)
@@ -176,23 +203,23 @@ def _solutions(
     prepared: PreparedMap,
     request: Request,
     roots: Roots,
-    closest: Nearest,
+    closest: Roots,
     bounds: Array | None = None,
 ) -> Solutions:
     """Join roots, sorted by target, and the nearest points to targets without; some are roots."""
     tip_map, whole, count = prepared.tip_map, prepared.whole, len(request.targets)
-    missing = roots.missing(count)
     if bounds is None:
-        bounds = _gap_bounds(prepared, request.of(missing), closest.distance)
-    hit = closest.distance <= request.reach_tol
-    roots = roots.joined(roots_at(tip_map, request.targets, missing[hit], closest.gamma[hit]))
+        bounds = _gap_bounds(prepared, request, closest)
+    hit = closest.residual <= request.reach_tol
+    roots = roots.joined(rows(closest, hit))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual
     roots = rows(roots, np.lexsort((beside, roots.target))) if beside.any() else roots
-    statuses = np.full(count, Status.REACHED, np.int8)
-    statuses[missing[~hit]] = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
-    best, proved_gaps = _nearest_of_all(request, roots, missing, closest), np.zeros(count)
-    proved_gaps[missing] = bounds
+    best = roots.joined(rows(closest, ~hit))
+    best = rows(best, np.unique(best.target, return_index=True)[1])
+    statuses, proved_gaps = np.full(count, Status.REACHED, np.int8), np.zeros(count)
+    out_of_reach = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
+    statuses[closest.target[~hit]], proved_gaps[closest.target] = out_of_reach, bounds
     activations = whole.box.with_fixed(roots.gamma)
     maps = [prepared, *prepared.sheets] if roots.sheet.any() else [prepared]
     return Solutions(
@@ -209,9 +236,9 @@ def _solutions(
         leans=_leans(whole, activations),
         sheets=roots.sheet,
         statuses=statuses,
-        nearest=best.tips,
+        nearest=np.where((best.residual > request.residual)[:, None], best.tip, request.targets),
         nearest_activations=whole.box.with_fixed(best.gamma),
-        gaps=best.distance,
+        gaps=best.residual,
         gap_bounds=proved_gaps,
     )
 
@@ -221,17 +248,3 @@ def _leans(tip_map: TipMap, activations: Array) -> Mask:
     if isinstance(known.rod, LoadedRod):
         return known.rod.leans(known.inputs.activations(activations))
     return np.zeros(len(activations), bool)
-
-
-def _nearest_of_all(request: Request, roots: Roots, missing: Index, closest: Nearest) -> Nearest:
-    """The first root of each target; the nearest point to those that are missing."""
-    count = len(request.targets)
-    gamma = np.empty((count, roots.gamma.shape[1]))
-    nearest = Nearest(gamma, request.targets.copy(), np.zeros(count))
-    reached, first = np.unique(roots.target, return_index=True)
-    nearest.gamma[reached], nearest.distance[reached] = roots.gamma[first], roots.residual[first]
-    off = nearest.distance[reached] > request.residual
-    nearest.tips[reached[off]] = roots.tip[first[off]]
-    for values, of_missing in zip(nearest, closest, strict=True):
-        values[missing] = of_missing
-    return nearest

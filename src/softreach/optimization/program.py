@@ -19,8 +19,7 @@ from softreach.rod.rods import as_tip_map, effective, in_steps, refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array
 from softreach.support.lazy import lazy
-from softreach.workspace.boundary import boundary_samples
-from softreach.workspace.gradient import VolumeGradient, gradient_of
+from softreach.workspace.gradient import VolumeGradient, boundary_samples, gradient_of
 from softreach.workspace.tip_derivatives import TipDerivatives
 
 OF_ARM: dict[str, Callable[[Manipulator], float]] = {

@@ -1,10 +1,11 @@
 """Reach of the tip with four free bundles or more, by search instead of by simplices.
 
 The box of m activations has m! simplices to a cell of its grid, its image has one boundary. So the
-image is found in space: a lattice tells how far its centers are from the nearest tip, and a surface
-of tips is wrapped around. Where this leaves a larger error, lines of sight through the centers that
-are reached add up to the volume. Each place that counts as reached has an activation that proves
-it; what searches miss is missing from the volume.
+image is found in space: a lattice tells how far its centers are from the nearest tip. A level set
+of these distances goes around both sides of a sheet and its rim, of whatever thinness; each of its
+vertices is drawn to the nearest tip. Where this leaves a larger error, lines of sight through the
+centers that are reached add up to the volume. Each place that counts as reached has an activation
+that proves it; what searches miss is missing from the volume.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.geometry.surface import Surface, corner_areas, level_set
+from softreach.kernels.box.box_projection import project
+from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
 from softreach.support import parallel
@@ -30,13 +34,14 @@ from softreach.workspace.measure import ConvexHull, Estimate, climbed_hull
 from softreach.workspace.postures import AllPostures
 from softreach.workspace.search import (
     CLOUD,
+    DISTANCE,
     ENOUGH,
+    Nearest,
     ReachedGrid,
     all_reached,
     cloud_on_faces,
     nearest_tips,
 )
-from softreach.workspace.wrap import Wrap, wrapped
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
@@ -48,7 +53,6 @@ _THICK = 3.0  # cells, on average
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
 
-
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
 _RULE = 2.5  # cells along the mean side of the bounding box, times the root of the accuracy
 _FEWEST = 16.0
@@ -57,8 +61,115 @@ _SHIFT = np.array([0.31, 0.17, 0.43])  # of a cell: lines on a plane of symmetry
 _MOST_ALONG = 96.0
 _THINNEST = 128.0  # cells along the mean side: below are no sheets
 _MOST_CELLS = 2.0**26
+_ASIDE = 1e-4  # cells by which both sides of a sheet are kept apart
+_SHEET = 2e-3  # of its width, the root of its area, that a sheet is thinner than
+_SHEET_TOL = 1e-9  # in L, as a sheet may be no thicker than tips are exact otherwise
+_WIDEST = 0.99  # of all thicknesses are below the one that the next pushes go beyond
+_STRETCH = 30.0  # times as much as one to the side, a miss along the normal counts
+_PUSHES, _PASSES = 12, 4
+_DAMPING = 1e-8  # of the mean square of the slopes
 CLIMBERS = 1024
-"""Of these, for the convex hull beside tips on the boundary: more make countless facets."""
+"""Tips of a cloud from which the convex hull is climbed, beside those on the boundary: more make
+countless facets."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Wrap(Surface):
+    """The surface, closed and outwards, a ten-thousandth of a cell outside of its tips."""
+
+    tip_map: TipMap
+    gamma: Array
+    """Activations that lead to the vertices, shape (v, bundles)."""
+    cell: float
+    """Edge of the cells that it was found with [m]."""
+    tight_volume: float
+    """Volume inside of the tips themselves [m³]."""
+
+    @lazy
+    def volume_of_tips(self) -> Estimate:
+        """The same; of a sheet that is far thinner than cells, its thickness over its area [m³].
+
+        No search for the nearest tip sees so small a change; so from each vertex the tip is pushed
+        along its normal, to which all columns of ∂r/∂γ are nearly square, to both sides. It errs by
+        where tips count as found and by their own errors.
+        """
+        half = 0.5 * self.area
+        thickness = self.tight_volume / half if half > 0.0 else np.inf
+        if self.tip_map.supports_unstable or thickness > _SHEET * np.sqrt(half):
+            off = ENOUGH * self.cell + self.tip_map.tol * self.tip_map.length
+            return Estimate(self.tight_volume, self.area * off)
+        tip_map = refined(self.tip_map, _SHEET_TOL)
+        areas = np.linalg.norm(self.corner_areas, axis=1)
+        tips, slopes = tip_map.tips_and_slopes(self.gamma)
+        normals = np.linalg.svd(slopes * tip_map.box.scales)[0][:, :, 2]
+        thick = np.zeros(len(tips))
+        for _ in range(_PASSES):
+            ways = (2.0 * thickness * normals, -2.0 * thickness * normals)
+            thick = sum(_pushed(tip_map, self.gamma, tips, way) for way in ways)
+            thickness = float(np.quantile(thick, _WIDEST))
+        return Estimate(0.5 * float(areas @ thick), self.area * _SHEET_TOL * tip_map.length)
+
+    @lazy
+    def cube(self) -> Array:
+        """Places of the vertices in the unit cube of the free bundles, shape (v, dimension)."""
+        box = self.tip_map.box
+        return box.to_cube(self.gamma)[:, box.free].clip(0.0, 1.0)
+
+    @lazy
+    def corner_areas(self) -> Array:
+        """Outward area that each vertex stands for [m²], shape (v, 3)."""
+        return corner_areas(self.vertices, self.faces)
+
+
+def _pushed(tip_map: TipMap, gamma: Array, tips: Array, way: Array) -> Array:
+    """How far tips go along a way that is too far, with little to the side [m], shape (n,)."""
+    size, box = np.linalg.norm(way, axis=1), tip_map.box
+    unit, target = way / size[:, None], tips + way
+    scale = np.eye(3) + (_STRETCH - 1.0) * unit[:, :, None] * unit[:, None, :]
+    center, multiplier, step = np.zeros_like(gamma), np.empty_like(tips), np.empty_like(gamma)
+    for _ in range(_PUSHES):
+        # Least |miss - J d|² + μ |d|² inside the bounds, with d measured in ranges (Levenberg).
+        at, slopes = tip_map.tips_and_slopes(gamma)
+        miss, stretched = scale @ (target - at)[:, :, None], scale @ slopes * box.scales
+        damping = _DAMPING * ((stretched**2).sum(axis=(1, 2)) / 3.0)
+        low, high = (box.low - gamma) / box.scales, (box.high - gamma) / box.scales
+        multiplier[:] = 0.0
+        project(center, stretched, miss[:, :, 0], damping, low, high, step, multiplier)
+        gamma = box.clip(gamma + step * box.scales)
+    return ((tip_map.tips(gamma) - tips) * unit).sum(axis=1)
+
+
+def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
+    """Nearest tips of places (n, 3) on edges of the lattice, in cells, from those at both ends."""
+    places = grid.lattice.places(at)
+    first, second = (
+        nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * grid.lattice.cell)
+        for cells in (end.astype(np.int64) @ grid.steps for end in (np.floor(at), np.ceil(at)))
+    )
+    closer = second.distance < first.distance
+    for kept, new in zip(first, second, strict=True):
+        kept[closer] = new[closer]
+    return first
+
+
+def wrapped(grid: ReachedGrid) -> Wrap:
+    """The surface around what was found.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    at, faces = level_set(grid.distances, DISTANCE)
+    gamma, tips, _ = drawn_tight(grid, at)
+    cell, away = grid.lattice.cell, grid.lattice.places(at) - tips
+    away /= np.linalg.norm(away, axis=1).clip(1e-9 * cell)[:, None]
+    return Wrap(
+        vertices=tips + _ASIDE * cell * away,
+        faces=faces,
+        tip_map=grid.tip_map,
+        cell=cell,
+        gamma=gamma,
+        tight_volume=Surface(vertices=tips, faces=faces).volume,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,19 +185,9 @@ class ReachedCells:
     hull: ConvexHull | None = None
 
     @property
-    def tip_map(self) -> TipMap:
-        """The tip map."""
-        return self.grid.tip_map
-
-    @property
     def lattice(self) -> Lattice:
         """The cells."""
         return self.grid.lattice
-
-    @property
-    def reached(self) -> Mask:
-        """True for cells whose centers are reached."""
-        return self.grid.reached
 
     @property
     def is_thick(self) -> bool:
@@ -101,18 +202,15 @@ class ReachedCells:
     @lazy
     def volume(self) -> Estimate:
         """By the wrap; by lines of sight if these tell the volume better, and agree [m³]."""
-        tight, edge = self.wrap.volume_of_tips, self.lattice.cell
+        tight, edge, tip_map = self.wrap.volume_of_tips, self.lattice.cell, self.grid.tip_map
         change = abs(tight.value - self.coarse.volume_of_tips.value)
         volume = Estimate(tight.value, change + tight.error)
         if self.is_thick:
             lines, missed = self.swept
             area = len(lines.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
             seen = line_volume(lines)
-            error = (
-                seen.error
-                + missed
-                + area * (ENOUGH * edge + self.tip_map.tol * self.tip_map.length)
-            )
+            off = ENOUGH * edge + tip_map.tol * tip_map.length
+            error = seen.error + missed + area * off
             if error < volume.error and abs(seen.value - volume.value) <= error + volume.error:
                 volume = Estimate(seen.value, error)
         return volume
@@ -120,13 +218,13 @@ class ReachedCells:
     @property
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """1 at centers that are reached and 0 elsewhere; no orientation, 0."""
-        return self.reached.astype(np.int32), np.zeros(self.reached.shape, np.int32)
+        return self.grid.reached.astype(np.int32), np.zeros(self.lattice.shape, np.int32)
 
     def are_deep(self, points: Array) -> Mask:
         """Mask of points [m] with all centers of the cells around reached, beyond neighbors."""
         from scipy.ndimage import binary_erosion
 
-        cubes = covered_cubes(np.asarray(binary_erosion(self.reached), bool))
+        cubes = covered_cubes(np.asarray(binary_erosion(self.grid.reached), bool))
         index = np.floor(self.lattice.coordinates(points)).astype(np.int64)
         within = ((index >= 0) & (index < cubes.shape)).all(axis=1)
         return within & cubes[tuple(np.where(within, i, 0) for i in index.T)]
@@ -147,7 +245,7 @@ class ReachedCells:
         enough = _ON * self.lattice.cell
 
         def search(left: Index, start: Array) -> None:
-            nearest = nearest_tips(self.tip_map, start, points[left], enough)
+            nearest = nearest_tips(self.grid.tip_map, start, points[left], enough)
             out[left] = np.minimum(out[left], nearest.distance)
 
         for known, start in self._starts_inside(points):
@@ -192,15 +290,9 @@ def smallest_memory(tip_map: TipMap) -> float:
 def searched_set(
     tip_map: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
 ) -> ReachedCells:
-    """The image of a box of four free bundles or more.
+    """The image of a box of four free bundles or more, whose arguments are those of the set.
 
-    Args:
-        tip_map: The tip map.
-        accuracy: Relative error asked of the volume: cells become smaller until it is met, or
-            `memory` is used.
-        cell: Edge of a cell [m], instead of the rule's.
-        memory: Memory that the search may use [bytes]; a quarter of what is free if None.
-        progress: Called with the number of centers searched since its last call.
+    Cells become smaller until the volume is as accurate as asked, or the memory is used.
 
     Raises:
         InvalidInput: No activation has a stable equilibrium, too little memory, or cells too small
@@ -208,12 +300,12 @@ def searched_set(
     """
     least = smallest_memory(tip_map)
     memory = max(free_memory() / 4.0, least) if memory is None else memory
-    if not least <= memory < np.inf:
+    if memory < least:
         raise InvalidInput("memory", memory, f"at least {least:.3g} bytes")
     cloud = gamma, tips = cloud_on_faces(tip_map, 0)
     sides = np.ptp(tips, axis=0)
     smallest = _smallest_cell(tip_map, sides, memory)
-    if cell is not None and not smallest <= cell < np.inf:  # NaN too
+    if cell is not None and cell < smallest:
         raise InvalidInput("cell", cell, f"at least {smallest:.3g} m for {memory:.2g} bytes")
     mean = float(np.cbrt(np.prod(sides)))
     target = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * mean
@@ -229,10 +321,10 @@ def searched_set(
     hull = climbed_hull(tip_map, begin.clip(0.0, 1.0), accuracy)
     while True:
         grid = of_cells(edge)
-        found = ReachedCells(grid, cloud, wrapped(grid), coarse, hull)
-        if cell is not None or not _may_meet(found, accuracy, smallest, mean / _THINNEST):
-            return found
-        edge, coarse = edge / _FINER, found.wrap
+        cells = ReachedCells(grid, cloud, wrapped(grid), coarse, hull)
+        if cell is not None or not _may_meet(cells, accuracy, smallest, mean / _THINNEST):
+            return cells
+        edge, coarse = edge / _FINER, cells.wrap
 
 
 def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: float) -> bool:
@@ -255,13 +347,11 @@ def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: 
 def cells_of(
     tip_map: TipMap, cell: float, inside: Callable[[Array], Mask] | None = None
 ) -> ReachedCells:
-    """What is reached of the image of a box of any number of free bundles, without its hull.
+    """What any number of free bundles reach, without its hull.
 
-    Args:
-        tip_map: The tip map.
-        cell: Edge of a cell [m]; larger where that takes more than 96 cells along the longest side.
-        inside: Of places [m], shape (n, 3), tells some that are reached, (n,): there is no search,
-            and nothing but the surface is right.
+    The edge of a cell [m] is larger where it takes more than 96 along the longest side. A mask of
+    places (n, 3) [m] that are known to be reached spares searches; then nothing but the surface is
+    right.
     """
     cloud = cloud_on_faces(tip_map, 0)
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)
@@ -296,10 +386,10 @@ def _bytes(tip_map: TipMap) -> tuple[float, float]:
 
 
 def _smallest_cell(tip_map: TipMap, sides: Array, memory: float) -> float:
+    """Edge of as many cells as memory holds, with eight more along each side [m]."""
     fixed, each = _bytes(tip_map)
-    most = min((memory - fixed) / each, _MOST_CELLS)
-    low, high = 0.0, 1.0 + float(sides.max())
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if np.prod(sides / middle + 8.0) <= most else (middle, high)
-    return high
+    count = np.poly1d([1.0])
+    for side in sides:
+        count *= np.poly1d([side, 8.0])  # over 1 / edge
+    roots = (count - min((memory - fixed) / each, _MOST_CELLS)).roots
+    return float(1.0 / roots[np.isreal(roots)].real.max())

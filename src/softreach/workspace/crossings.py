@@ -76,12 +76,15 @@ class Crossings:
         crossings.enclose(np.arange(n))
         return crossings
 
+    def coordinates(self, which: Index, t: Array) -> Array:
+        """Places on edges, t cells from the reached center, in cells, shape (n, 3)."""
+        at = np.stack(np.unravel_index(self.cell[which], self.lattice.shape), axis=-1).astype(float)
+        at[np.arange(len(which)), self.axis[which]] += self.sense[which] * t
+        return at
+
     def points(self, which: Index, t: Array) -> Array:
-        """Places on edges, t cells from the reached center [m], shape (n, 3)."""
-        lattice = self.lattice
-        index = np.stack(np.unravel_index(self.cell[which], lattice.shape), axis=-1).astype(float)
-        index[np.arange(len(which)), self.axis[which]] += self.sense[which] * t
-        return lattice.origin + lattice.cell * index
+        """The same [m]."""
+        return self.lattice.places(self.coordinates(which, t))
 
     def enclose(self, which: Index) -> None:
         """Bring `low` and `high` together on some of the edges."""
@@ -196,18 +199,11 @@ def runs_along(crossings: Crossings, axis: int) -> Runs:
 
 
 def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
-    """Length of what is reached on each line that has a run, in cells, from some of the centers.
+    """What each run adds to the length that is reached on its line, in cells, shape (runs,).
 
-    A stretch shorter than the spacing s holds a center with a chance of length / s only: counted as
-    s where it does, it is right on average over where the centers lie. So are gaps.
-
-    Args:
-        runs: Stretches between crossings.
-        spacing: Every how many centers are looked at.
-        parity: Number of the first of them.
-
-    Returns:
-        Shape (runs,): what each run adds to its line.
+    Every so many centers are looked at, from the one of number `parity` on. A stretch shorter than
+    the spacing s holds a center with a chance of length / s only: counted as s where it does, it is
+    right on average over where the centers lie. So are gaps.
     """
     length = np.maximum(runs.end - runs.start, 0.0)
     seen = (runs.last - parity) // spacing * spacing + parity >= runs.first

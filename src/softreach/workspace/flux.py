@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +10,8 @@ from numpy.typing import NDArray
 from softreach.geometry.surface import Surface, corner_areas
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index
-from softreach.workspace.grid import grid_ticks
+from softreach.support.arrays import Array
+from softreach.workspace.grid import box_slopes, grid_ticks
 
 _TOL = 1e-11  # in L: there are few nodes, so that steps may be short
 _ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
@@ -31,15 +30,10 @@ def signed_volume(tip_map: TipMap, nodes: int | None = None, *, enough: float = 
     any power of the number of nodes. They are added until tips are no more exact than the rule. Of
     maps with kinks it is the volume in mapped triangles, which needs no slopes.
 
-    Args:
-        tip_map: The tip map.
-        nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
-            tips are then less exact.
-        enough: Relative change of the volume that ends the adding of nodes; those of free arms are
-            then as exact as `rod` says.
-
-    Returns:
-        Value and error are NaN if a node has no stable equilibrium.
+    With a number of nodes along each side, the rule is taken for this and two thirds of it alone;
+    tips are then less exact. `enough` is the relative change of the volume that ends the adding of
+    nodes; tips of free arms are then as exact as those of the map. Value and error are NaN if a
+    node has no stable equilibrium.
     """
     if tip_map.supports_unstable:
         tip_map = refined(tip_map, _LOADED_TOL)
@@ -109,15 +103,10 @@ def flux_tol(tip_map: TipMap) -> float:
 def face_image(tip_map: TipMap, cells: int = _CELLS) -> Surface:
     """The closed image of the surface of the box of three free bundles, oriented outwards.
 
-    Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
-    has edges: sharp rims stay sharp, and parts of any thinness stay whole.
-
-    Args:
-        tip_map: A tip map that is one to one inside the box.
-        cells: Of the grid along each edge of the box.
-
-    Returns:
-        With vertices of NaN where an activation on the faces has no stable equilibrium.
+    The map is one to one inside the box, and the grid has so many cells along each of its edges.
+    Vertices lie on the boundary to the tolerance of the tips, and so do edges where the box has
+    edges: sharp rims stay sharp, and parts of any thinness stay whole. Vertices are NaN where an
+    activation on the faces has no stable equilibrium.
     """
     cube = grid_faces(cells)
     tips = tip_map.tips(tip_map.box.from_free_cube(cube))
@@ -127,52 +116,6 @@ def face_image(tip_map: TipMap, cells: int = _CELLS) -> Surface:
     return surface
 
 
-class FaceNodes(NamedTuple):
-    """Nodes of a rule of integration on the faces of the unit cube, each face in one block."""
-
-    cube: Array
-    """Places, shape (n, 3)."""
-    weights: Array
-    """Of each node, shape (n,); they add up to 1 on each face."""
-    sense: Array
-    """1 on faces at 1, -1 on those at 0: where the cross product of sides points, shape (n,)."""
-    axis: Index
-    """Axis that the face is normal to, shape (n,)."""
-
-    def area_vectors(self, slopes: Array) -> Array:
-        """∂r/∂a × ∂r/∂b outwards, times the weights [m²], shape (n, 3).
-
-        The map is taken to keep the orientation.
-
-        Args:
-            slopes: ∂r/∂x of the unit cube at the nodes [m], shape (n, 3, 3).
-        """
-        rows = np.arange(len(slopes))
-        first = slopes[rows, :, (self.axis + 1) % 3]
-        second = slopes[rows, :, (self.axis + 2) % 3]
-        return (self.sense * self.weights)[:, None] * cross_products(first, second)
-
-
-def cross_products(a: Array, b: Array) -> Array:
-    """Vector products of rows (n, 3), in a third of the time of `np.cross`."""
-    (x, y, z), (u, v, w) = a.T, b.T
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
-
-
-@lru_cache(maxsize=8)
-def gauss_faces(nodes: int) -> FaceNodes:
-    """Gauss and Legendre's nodes on all six faces, as many along each side."""
-    x, w = np.polynomial.legendre.leggauss(nodes)
-    a, b = (each.ravel() for each in np.meshgrid(*[(1.0 + x) / 2.0] * 2, indexing="ij"))
-    both, blocks = np.outer(w / 2.0, w / 2.0).ravel(), []
-    for axis in range(3):
-        for side in (0.0, 1.0):
-            cube = np.empty((len(a), 3))
-            cube[:, axis], cube[:, (axis + 1) % 3], cube[:, (axis + 2) % 3] = side, a, b
-            blocks.append((cube, both, np.full(len(a), 2 * side - 1), np.full(len(a), axis)))
-    return FaceNodes(*(np.concatenate(parts) for parts in zip(*blocks, strict=True)))
-
-
 def grid_faces(cells: int) -> Array:
     """Vertices of a grid of cells³ boxes that lie on the faces of the unit cube, each once."""
     outside = np.ones((cells + 1,) * 3, bool)
@@ -180,25 +123,20 @@ def grid_faces(cells: int) -> Array:
     return np.argwhere(outside) / cells
 
 
-def box_slopes(tip_map: TipMap, cube: Array) -> tuple[Array, Array]:
-    """Tips [m] and their derivatives by places in the unit cube of the free bundles.
-
-    Args:
-        tip_map: The tip map.
-        cube: Places in [0, 1], shape (n, dimension).
-
-    Returns:
-        Shapes (n, 3) and (n, 3, dimension); NaN where there is no stable equilibrium.
-    """
-    tips, slopes = tip_map.tips_and_slopes(tip_map.box.from_free_cube(cube))
-    free = tip_map.box.free
-    return tips, slopes[:, :, free] * tip_map.box.widths[free]
-
-
 def _flux(tip_map: TipMap, nodes: int) -> Flux:
-    faces = gauss_faces(nodes)
-    tips, slopes = box_slopes(tip_map, faces.cube)
-    return _flux_of(tip_map, faces.cube, tips, faces.area_vectors(slopes))
+    """By Gauss and Legendre's nodes, as many along each side, all of a face one after the other."""
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    weights, cube = np.outer(w / 2.0, w / 2.0).reshape(-1, 1), np.empty((3, 2, nodes**2, 3))
+    for axis in range(3):
+        cube[axis, :, :, axis] = [[0.0], [1.0]]
+        cube[axis, :, :, (axis + 1) % 3] = np.repeat((1.0 + x) / 2.0, nodes)
+        cube[axis, :, :, (axis + 2) % 3] = np.tile((1.0 + x) / 2.0, nodes)
+    tips, slopes = box_slopes(tip_map, cube.reshape(-1, 3))
+    area = np.empty(cube.shape)  # ∂r/∂a × ∂r/∂b outwards, times the weights
+    for axis, face in enumerate(slopes.reshape(3, 2, -1, 3, 3)):
+        across = np.cross(face[..., (axis + 1) % 3], face[..., (axis + 2) % 3])
+        area[axis] = [-weights * across[0], weights * across[1]]
+    return _flux_of(tip_map, cube.reshape(-1, 3), tips, area.reshape(-1, 3))
 
 
 def _flux_of(tip_map: TipMap, cube: Array, tips: Array, area: Array) -> Flux:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,22 +18,22 @@ from softreach.support import parallel
 from softreach.support.arguments import as_names, as_number
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.quantity import quantity
-from softreach.workspace.boundary import BoundarySamples, boundary_samples
-from softreach.workspace.cells import ReachedCells
+from softreach.workspace.cells import ReachedCells, Wrap
 from softreach.workspace.flux import Flux, face_image, flux_tol, grid_faces, signed_volume
-from softreach.workspace.image import Image
+from softreach.workspace.image import Image, Lattice
 from softreach.workspace.measure import FLUX_PART, Estimate, HullCorners, outer_vertices
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.tip_derivatives import Shifts, TipDerivatives, shifts_along
-from softreach.workspace.wrap import Wrap
 
 if TYPE_CHECKING:
     import xarray as xr
     from scipy.spatial import KDTree
 
+_CLASSES = 4  # every other line along both directions
 _LINES = 2  # times as many lines of sight along each direction as for the volume itself
 _TOL = 3e-10  # in L, of what the flux alone tells
 _HULL_CELLS = 28  # along each edge of the box, of which corners of a hull are at least
@@ -47,7 +47,6 @@ _MEANINGS = {
     "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
     "unreachability": ("1 per unit", "derivative of the unreachability"),
 }
-
 
 _CELLS = 40  # along each edge of the box, where its faces are the boundary
 _BLOCK = 1 << 21  # numbers at once
@@ -104,13 +103,9 @@ def volume_gradient(
 def gradient_of(
     solid: ReachableSet, names: tuple[str, ...], accuracy: float, progress: Progress = silent
 ) -> VolumeGradient:
-    """As `volume_gradient`, of a reachable set that is known.
+    """As `volume_gradient`, of a reachable set that is known to an accuracy.
 
-    Args:
-        solid: Reachable set of three free bundles or more.
-        names: Names of parameters.
-        accuracy: That to which the set was computed.
-        progress: Called with the number of parameters done since its last call, often with 0.
+    The progress is called with the number of parameters done since its last call, often with 0.
     """
     if solid.dimension < 3:
         raise InvalidInput("arm", "a set without a volume", "one of three free bundles or more")
@@ -355,13 +350,7 @@ class MovingBoundary:
 
         Where the map is one to one, its triangles are images of triangles on the faces of the box;
         elsewhere they are found in the raster and move as the nearest place does at which a line
-        of sight cuts the boundary.
-
-        Raises:
-            InvalidInput: A parameter counts something, has no value, or its change holds or frees a
-                bundle.
-            InvalidDesign: The design has no neighbors with other values of a parameter.
-            MissingExtra: scikit-image is not installed.
+        of sight cuts the boundary. Raises as `TipDerivatives` and `ReachableSet.surface`.
         """
         tips = TipDerivatives(solid.tip_map, parameters)
         by_faces = solid.route == "flux"
@@ -381,14 +370,7 @@ class MovingBoundary:
         return cls(centers, np.linalg.norm(area, axis=1), swept)
 
     def lost(self, changes: Array) -> Array:
-        """Volume of what is no longer reached after changes of the parameters [m³].
-
-        Args:
-            changes: Shape (draws, parameters).
-
-        Returns:
-            Shape (draws,).
-        """
+        """Volume of what is no longer reached after changes (draws, parameters) [m³], (draws,)."""
         out, swept = np.empty(len(changes)), self.swept.astype(np.float32)
 
         def task(block: slice) -> None:
@@ -418,13 +400,96 @@ class MovingBoundary:
         """Distance to the center of the nearest triangle [m], shape (n,)."""
         return np.asarray(self._tree.query(points)[0])
 
-    @cached_property
+    @lazy
     def _wide(self) -> Index:
         """Numbers of the triangles that are no slivers."""
         return np.flatnonzero(self.area > _SLIVER * self.area.mean())
 
-    @cached_property
+    @lazy
     def _tree(self) -> KDTree:
         from scipy.spatial import KDTree
 
         return KDTree(self.places[self._wide])
+
+
+@dataclass(frozen=True, eq=False)
+class BoundarySamples:
+    """Nodes on the boundary, with the activations that lead there.
+
+    Lines of sight through cell centers along an axis cut the boundary at places that each stand for
+    a square of a cell, seen along the axis. Together those along all three axes are nodes for what
+    flows through the boundary, theory (98), and need no normals.
+    """
+
+    cube: Array
+    """In the unit cube of the free bundles, shape (n, dimension)."""
+    places: Array
+    """Places [m], shape (n, 3)."""
+    area: Array
+    """Outward area vectors [m²], shape (n, 3)."""
+    group: Index
+    """Number of the set of lines that each is on: an axis, and every other line, shape (n,)."""
+
+    def derivative(self, slopes: Array, weights: Array | None = None) -> Array:
+        """Derivatives of the volume, swept by the boundary, theory (98), shape (parameters,).
+
+        By ∂r/∂p at the nodes, shape (n, 3, parameters). Weights (n,) that are 1 in a region and 0
+        elsewhere give the derivative of the volume of the part of the set in that region.
+        """
+        area = self.area if weights is None else self.area * weights[:, None]
+        return np.einsum("ni,nip->p", area, slopes)
+
+    def noise(self, slopes: Array) -> Array:
+        """Two standard deviations of `derivative` from where the lines lie, shape (parameters,).
+
+        Every other line along both directions tells how much.
+        """
+        groups = np.zeros((3 * _CLASSES, slopes.shape[2]))
+        np.add.at(groups, self.group, np.einsum("ni,nip->np", self.area, slopes))
+        of_axes = groups.reshape(3, _CLASSES, -1)
+        off = _CLASSES * of_axes - of_axes.sum(axis=1, keepdims=True)
+        return np.sqrt((off**2).mean(axis=1).sum(axis=0))
+
+
+def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySamples:
+    """Nodes on all of the boundary of an image; the vertices of what is wrapped.
+
+    With the orientation that the larger part of a map of three bundles keeps, 1 or -1, nodes are
+    those where the image is not one to one, the boundary less what of it the degree tells, for the
+    derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
+    """
+    if isinstance(image, ReachedCells):
+        return _of_cells(image)
+    lattice, cuts = image.lattice, list[tuple[Array, Index, Array, Index]]()
+    for axis, spans in enumerate(image.spans):
+        jumps = np.diff((spans.cover > 0).astype(np.int64), prepend=0)
+        jumps -= sense * np.diff(spans.degree, prepend=0)
+        which = np.flatnonzero(jumps)
+        i, j = np.divmod(spans.column[which], lattice.shape[(axis + 2) % 3])
+        at = np.roll(np.stack([spans.start[which], i, j], axis=1), axis, axis=1)
+        cube = image.cube_places(spans, axis, which)
+        cuts.append((cube, np.full(len(which), axis), at, -jumps[which]))
+    return _on_lines(lattice, *(np.concatenate(parts) for parts in zip(*cuts, strict=True)))
+
+
+def _of_cells(cells: ReachedCells) -> BoundarySamples:
+    tip_map, wrap = cells.grid.tip_map, cells.wrap
+    if not cells.is_thick:
+        group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
+        return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
+    crossings, _ = cells.swept
+    cube = tip_map.box.to_cube(crossings.beyond)[:, tip_map.box.free].clip(0.0, 1.0)
+    at = crossings.coordinates(np.arange(len(cube)), crossings.place)
+    return _on_lines(cells.lattice, cube, crossings.axis, at, crossings.sense)
+
+
+def _on_lines(
+    lattice: Lattice, cube: Array, axis: Index, at: Array, sense: Index
+) -> BoundarySamples:
+    """Nodes at coordinates (n, 3) in cells, where lines along an axis leave the set or enter it."""
+    every = np.arange(len(at))
+    i, j = (at[every, (axis + k) % 3].astype(np.int64) for k in (1, 2))
+    area = np.zeros((len(every), 3))
+    area[every, axis] = lattice.cell**2 * sense
+    group = _CLASSES * axis + 2 * (i % 2) + j % 2
+    return BoundarySamples(cube, lattice.places(at), area, group)

@@ -18,7 +18,6 @@ from scipy.sparse.csgraph import connected_components
 
 from softreach.kernels.box.simplices import corner_steps
 from softreach.kernels.image.contour import stretches
-from softreach.rod.rods import refined
 from softreach.rod.tip_map import Held, TipMap, no_equilibrium
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
@@ -26,7 +25,6 @@ from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
 
 _BLOCK = 1 << 16  # vertices
-_TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
 _NEARLY_ALL = 0.9
 _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
@@ -34,9 +32,7 @@ _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of th
 def grid_ticks(tip_map: TipMap, cells: int) -> list[Array]:
     """Ticks of a grid along each free bundle in the unit cube, kinks of the map among them.
 
-    Args:
-        tip_map: The tip map.
-        cells: Along each axis, a multiple of four; so are those between kinks.
+    The number of cells along each axis is a multiple of four; so are those between kinks.
     """
     box, ticks = tip_map.box, list[Array]()
     for k in box.free:
@@ -51,23 +47,16 @@ def grid_ticks(tip_map: TipMap, cells: int) -> list[Array]:
 def grid_tips(
     tip_map: TipMap, cells: int, progress: Progress = silent, ticks: list[Array] | None = None
 ) -> Array:
-    """Tips [m] of the grid of cells^m boxes over the free bundles, in C order.
+    """Tips [m] of the grid of cells^m boxes over the free bundles, in C order, (nodes, 3).
 
-    Args:
-        tip_map: The tip map.
-        cells: Along each axis.
-        progress: Called with 0 now and then, so that it can raise.
-        ticks: Along each axis, if they are not even.
-
-    Returns:
-        Shape ((cells + 1)^m, 3), the last free bundle varying fastest; NaN where there is no stable
-        equilibrium.
+    NaN where there is no stable equilibrium. The progress is called with 0 now and then, so that it
+    can raise; ticks along each axis are even if none are given.
 
     Raises:
-        InvalidInput: There is none anywhere.
+        InvalidInput: There is no stable equilibrium anywhere.
     """
     even = [np.linspace(0.0, 1.0, cells + 1)] * tip_map.box.dimension
-    places = _product(ticks or even)
+    places = product_of(ticks or even)
     tips = np.empty((len(places), 3))
     for rows in blocks(len(places), _BLOCK):
         tips[rows] = tip_map.tips(tip_map.box.from_free_cube(places[rows]))
@@ -82,37 +71,17 @@ def cube_grid(cells: int, m: int = 3) -> Array:
     return np.indices((cells + 1,) * m).reshape(m, -1).T / cells
 
 
-def image_measure(tip_map: TipMap, nodes: int) -> float:
-    """Length or area of the image of one or two free bundles, ∫ √det(JᵀJ) dγ.
+def box_slopes(tip_map: TipMap, cube: Array) -> tuple[Array, Array]:
+    """Tips [m] (n, 3) and their derivatives (n, 3, dimension) by places in the unit cube.
 
-    By Gauss and Legendre's rule, as the map is smooth: its error falls faster than any power of the
-    number of nodes. Places reached more than once count as often.
-
-    Args:
-        tip_map: The tip map, with one or two free bundles.
-        nodes: Nodes along each axis of the box.
-
-    Returns:
-        Length [m] or area [m²]; NaN if a node has no stable equilibrium.
+    The cube is that of the free bundles; NaN where there is no stable equilibrium.
     """
-    x, w = np.polynomial.legendre.leggauss(nodes)
-    m = tip_map.box.dimension
-    gamma = tip_map.box.from_free_cube(_product([(1.0 + x) / 2.0] * m))
-    weights = np.prod(_product([w / 2.0] * m), axis=1) * tip_map.box.volume
-    # Not a BLAS product, whose rounding would depend on its threads.
-    return float((weights * _jacobian_size(refined(tip_map, _TOL), gamma)).sum())
+    tips, slopes = tip_map.tips_and_slopes(tip_map.box.from_free_cube(cube))
+    free = tip_map.box.free
+    return tips, slopes[:, :, free] * tip_map.box.widths[free]
 
 
-def _jacobian_size(tip_map: TipMap, gamma: Array) -> Array:
-    """The change of measure of the map at each activation: det J where J is square."""
-    slopes = tip_map.tips_and_slopes(gamma)[1][:, :, tip_map.box.free]
-    with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
-        if tip_map.box.dimension == 3:
-            return np.linalg.det(slopes)
-        return np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
-
-
-def _product(ticks: list[Array]) -> Array:
+def product_of(ticks: list[Array]) -> Array:
     """All combinations of the values, the last varying fastest, shape (n, len(ticks))."""
     if not ticks:
         return np.zeros((1, 0))
@@ -189,7 +158,9 @@ class LiftedGrid:
         unsure = np.abs(dets) <= _DIFFERENCES / n**2 * largest
         small = np.flatnonzero((unsure | (not tip_map.is_smooth)) & used)
         places = np.stack(np.unravel_index(small, shape), axis=1) / n
-        dets[small] = _jacobian_size(tip_map, tip_map.box.from_free_cube(places))
+        slopes = tip_map.tips_and_slopes(tip_map.box.from_free_cube(places))[1]
+        with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
+            dets[small] = np.linalg.det(slopes[:, :, tip_map.box.free])
         dets[~np.isfinite(dets)] = 0.0
         return dets
 
@@ -198,8 +169,8 @@ class LiftedGrid:
         n, m = self.n // times, self.is_lifted.ndim
         if self.is_torn:
             return LiftedGrid.of(self.tip_map, n)
-        tips, one = every_node(self.tips, times, self.n, m), np.zeros((n,) * m, bool)
-        return LiftedGrid(self.tip_map, tips, one, self.lifted, finer=self)
+        tips, uncut = every_node(self.tips, times, self.n, m), np.zeros((n,) * m, bool)
+        return LiftedGrid(self.tip_map, tips, uncut, self.lifted, finer=self)
 
 
 def every_node(values: Array, times: int, n: int, m: int = 3) -> Array:
@@ -275,9 +246,9 @@ def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
     parted = label[forked][first]
     parts = sheet[parted]
     parts[part, corner[forked]] = state[forked]
-    whole = np.setdiff1d(np.arange(len(sheet)), parted)
-    every = np.concatenate([whole, parted])
-    return of_cell[every], np.concatenate([sheet[whole], parts])
+    simple = np.setdiff1d(np.arange(len(sheet)), parted)
+    every = np.concatenate([simple, parted])
+    return of_cell[every], np.concatenate([sheet[simple], parts])
 
 
 def _joined(held: Held, states: Index) -> Index:
@@ -309,9 +280,9 @@ def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
     pairs = np.stack([slot, len(row) + of_key], axis=1)
     label = components(pairs, len(row) + len(keys))
     groups, group = np.unique(label[: len(row)], return_inverse=True)
-    found = np.searchsorted(keys, ends := held.ends @ [1, total]).clip(max=max(len(keys) - 1, 0))
-    known = np.flatnonzero(keys[found] == ends) if len(keys) else found[:0]
-    group_of_end = np.searchsorted(groups, label[len(row) + found[known]])
+    place = np.searchsorted(keys, ends := held.ends @ [1, total]).clip(max=max(len(keys) - 1, 0))
+    known = np.flatnonzero(keys[place] == ends) if len(keys) else place[:0]
+    group_of_end = np.searchsorted(groups, label[len(row) + place[known]])
     tips = _means(held.end_tips[known], group_of_end, len(groups))
     for _ in range(corners.shape[1]):  # corners that no edge of a cell leads to
         around = _means(tips[group], row, len(states))

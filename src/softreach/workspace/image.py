@@ -9,10 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
 
-from softreach.geometry.surface import Surface, compact_surface
+from softreach.geometry.surface import Surface, compact_surface, enclosed_volume, level_set
 from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
 from softreach.kernels.image import contour, raster
+from softreach.picture.shading import vertex_normals
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
@@ -30,6 +32,7 @@ _MARGIN = 3  # empty cells around the image
 _ROWS = 1 << 20  # triangles a task may have to judge
 _POINTS = 1 << 14
 _TRIANGLES = 1 << 14  # critical triangles that a task rasterizes
+_AWAY, _EVENED, _FAR = 1.0, 0.7, 3.0  # cells: a level set, widths of a filter, and no farther
 
 
 class Lattice(NamedTuple):
@@ -59,6 +62,10 @@ class Lattice(NamedTuple):
     def coordinates(self, points: Array) -> Array:
         """Points [m] in cells from the center of cell (0, 0, 0)."""
         return (points - self.origin) / self.cell
+
+    def places(self, coordinates: Array | Index) -> Array:
+        """Such coordinates as points [m]."""
+        return self.origin + self.cell * coordinates
 
 
 def covered_cubes(covered: Mask) -> Mask:
@@ -146,13 +153,7 @@ class Image:
         return replace(self, lattice=finer, unit=self.unit / times)
 
     def cube_places(self, spans: Spans, axis: int, which: Index) -> Array:
-        """Places of the unit cube of a grid of n³ boxes that go to where spans begin, (n, 3).
-
-        Args:
-            spans: Those along an axis.
-            axis: The axis.
-            which: Numbers of the spans.
-        """
+        """Places of the unit cube that go to where some spans along an axis begin, (n, 3)."""
         corners = self.triangles[spans.triangle[which], :3]
         at = np.stack(np.divmod(spans.column[which], self.lattice.shape[(axis + 2) % 3]), axis=1)
         plane = [(axis + 1) % 3, (axis + 2) % 3]
@@ -305,14 +306,7 @@ def image_of(
     progress: Progress = silent,
     half: LiftedGrid | None = None,
 ) -> Image:
-    """The image of a grid of three free bundles.
-
-    Args:
-        grid: The grid.
-        lattice: Cells to rasterize on.
-        progress: Called with the number of nodes done since its last call.
-        half: Of half as many cells, where it is known already and takes time.
-    """
+    """The image of a grid of three free bundles; `half` is that of half as many cells, if known."""
     scaled, nodes = lattice.coordinates(grid.tips), (grid.n + 1) ** 3
     places = scaled[:nodes].reshape(*(grid.n + 1,) * 3, 3)
     steps = [np.nanmax(np.abs(np.diff(places, axis=axis))) for axis in range(3)]
@@ -371,3 +365,56 @@ def _critical_triangles(
 
     parallel.run(partial(task, number) for number in range(len(blocks)))
     return np.concatenate(parts)
+
+
+def boundary_surface(image: Image, volume: float) -> Surface:
+    """The closed surface around a volume where the field is constant, by marching cubes.
+
+    The image of a grid is a little small where it is convex: a small offset, the same everywhere,
+    gives the surface the extrapolated volume.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    surface = _level_set(image, 0.0)
+    if surface.area == 0.0:
+        return surface
+    offset = (volume - surface.volume) / (surface.area * image.lattice.cell)
+    return _level_set(image, float(np.clip(offset, -0.5, 0.5)))
+
+
+def _level_set(image: Image, level: float) -> Surface:
+    field = image.signed_field
+    if not (field < level).any():
+        return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
+    vertices, faces = level_set(field, level)
+    return Surface(vertices=image.lattice.places(vertices), faces=faces)
+
+
+def wrapped_surface(image: Image, volume: float) -> Surface:
+    """A closed surface around a volume without teeth and holes, however thin and rough parts are.
+
+    It is the level set one cell away from the image, evened out, each of whose vertices is then
+    moved back along its normal, all as far, until the stated volume is enclosed. Gaps below two
+    cells are filled.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    vertices, faces = level_set(gaussian_filter(_distances(image), _EVENED), _AWAY)
+    places = image.lattice.places(vertices)
+    back = _AWAY * image.lattice.cell * vertex_normals(places, faces)
+    far, near = (enclosed_volume(places - part * back, faces) for part in (0.0, 1.0))
+    part = float(np.clip((far - volume) / (far - near), 0.5, 1.5))
+    return Surface(vertices=places - part * back, faces=faces)
+
+
+def _distances(image: Image) -> Array:
+    """From cell centers to an image, 0 inside, in cells up to three."""
+    covered, surface = image.counts[0] > 0, image.critical_surface
+    near = covered & ~np.asarray(binary_erosion(covered), bool)
+    near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
+    near = np.asarray(binary_dilation(near, np.ones((3, 3, 3)), iterations=2), bool) & ~covered
+    distances, centers = np.where(covered, 0.0, _FAR), image.lattice.places(np.argwhere(near))
+    distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)
+    return distances

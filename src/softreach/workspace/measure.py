@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.geometry.flat import enclosed_area
 from softreach.geometry.hull import convex_faces, convex_hull
 from softreach.geometry.surface import compact_surface, corner_areas, enclosed_volume
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Faces, Index
+from softreach.support.arrays import Array, Faces, Index, Points
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.grid import LiftedGrid
 from softreach.workspace.image import Image, Spans, covered_cubes, image_of
@@ -20,7 +21,6 @@ _LEFT = 0.35  # of what is removed of hulls; for four bundles 0.28 to 0.34 of it
 SURE_ACCURACY = 3e-3  # down from which integrals are as exact as a raster can ever use
 FLUX_PART = 0.01  # of a larger accuracy: relative error of what flows through the faces
 _NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
-
 
 _ROUNDS = 8
 _LESS = 0.5  # of the error before, that another round must leave
@@ -36,6 +36,15 @@ class Estimate(NamedTuple):
 
     value: float
     error: float = np.nan
+
+
+def named(**estimates: Estimate) -> dict[str, Any]:
+    """Numbers with their errors, such as `volume` and `volume_error`."""
+    return {
+        f"{name}{suffix}": value
+        for name, estimate in estimates.items()
+        for suffix, value in zip(("", "_error"), estimate, strict=True)
+    }
 
 
 def extrapolated(fine: float, coarse: float, share: float = 1.0) -> Estimate:
@@ -57,14 +66,8 @@ def solid_volume(image: Image, accuracy: float = SURE_ACCURACY) -> Estimate:
     through the faces; the second lives only where the image folds or overlaps and is taken from
     the rasterized images. What is rasterized errs by O(1/n²), which both grids together remove. All
     that they remove is the error stated: folds that a coarse grid makes up vanish faster than that.
-
-    Args:
-        image: Of the grid of n cells.
-        accuracy: Relative error that is asked for: above 0.003, the integral may err by a hundredth
-            of it.
-
-    Returns:
-        NaN if a node of the integral has no stable equilibrium.
+    Where a relative error above 0.003 is asked for, the integral may err by a hundredth of it.
+    NaN if a node of the integral has no stable equilibrium.
     """
     rough = accuracy > SURE_ACCURACY
     nodes, enough = None if rough else _NODES, FLUX_PART * accuracy * rough
@@ -122,12 +125,6 @@ def multiply_covered(image: Image) -> tuple[dict[int, float], float]:
 def fold_volume(image: Image) -> float:
     """Volume reached with both orientations [m³]; it errs by as much as the volume itself."""
     return float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
-
-
-def convex_volume(image: Image) -> Estimate:
-    """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
-    both = image, image.coarse
-    return extrapolated_hull(*(each.places[outer_vertices(each)] for each in both))
 
 
 def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
@@ -190,6 +187,10 @@ def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
     return np.squeeze(mean * image.lattice.cell**3)
 
 
+HullOf = Callable[[Points], Faces]
+"""Faces or edges of the convex hull of points."""
+
+
 class HullCorners(NamedTuple):
     """Activations whose tips are the corners of a convex hull."""
 
@@ -198,16 +199,14 @@ class HullCorners(NamedTuple):
     tips: Array
     """[m], shape (n, 3)."""
     faces: Faces
-    """Outwards, shape (f, 3)."""
-
-    hull_of = staticmethod(convex_faces)
+    """Outwards, shape (f, 3); edges of a hull in the plane z = 0, shape (e, 2)."""
 
     @classmethod
-    def of(cls, tips: Array, cube: Array) -> Self:
+    def of(cls, tips: Array, cube: Array, hull_of: HullOf = convex_faces) -> Self:
         """Corners of the hull of some tips at places of the cube; tips that are NaN are none."""
         known = np.isfinite(tips[:, 0])
         tips, cube = tips[known], cube[known]
-        every = cls.hull_of(tips)
+        every = hull_of(tips)
         vertices, faces = compact_surface(tips, every)
         return cls(cube[np.unique(every)], vertices, faces)
 
@@ -218,14 +217,15 @@ class HullCorners(NamedTuple):
 
     @property
     def facets(self) -> Array:
-        """Outward area vectors of the faces [m²], shape (f, 3)."""
-        a, b, c = np.moveaxis(self.tips[self.faces], 1, 0)
-        return 0.5 * np.cross(b - a, c - a)
+        """Outward area vectors of the faces [m²], shape (f, 3); of edges their normals [m]."""
+        a, b, *c = np.moveaxis(self.tips[self.faces], 1, 0)
+        return 0.5 * np.cross(b - a, c[0] - a) if c else np.cross(b - a, [0.0, 0.0, 1.0])
 
     @property
     def volume(self) -> float:
-        """Of the hull [m³]."""
-        return enclosed_volume(self.tips, self.faces)
+        """Of the hull [m³]; in a plane its area [m²]."""
+        is_flat = self.faces.shape[1] == 2
+        return (enclosed_area if is_flat else enclosed_volume)(self.tips, self.faces)
 
 
 class ConvexHull(NamedTuple):
@@ -238,17 +238,13 @@ class ConvexHull(NamedTuple):
 
 
 def climbed_hull(
-    tip_map: TipMap, cube: Array, accuracy: float, kind: type[HullCorners] = HullCorners
+    tip_map: TipMap, cube: Array, accuracy: float, hull_of: HullOf = convex_faces
 ) -> ConvexHull:
-    """The convex hull of the image of a box.
+    """The convex hull of the image of a box, climbed until its volume is as accurate as asked.
 
-    Args:
-        tip_map: The tip map.
-        cube: Places of the box to begin with, in the unit cube, shape (n, dimension).
-        accuracy: Relative error of the volume that ends the climbing.
-        kind: Of corners, with edges for faces in a plane.
+    It begins with places in the unit cube, shape (n, dimension).
     """
-    corners = kind.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube)
+    corners = HullCorners.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube, hull_of)
     before = corners
     if not len(corners.faces):
         return ConvexHull(Estimate(0.0, 0.0), corners, corners)
@@ -259,7 +255,7 @@ def climbed_hull(
         area = np.linalg.norm(vectors, axis=1)
         normals = vectors / np.maximum(area, np.finfo(float).tiny)[:, None]
         start = corners.cube[corners.faces[:, 0]]
-        found, tips, top = _climbed(tip_map, start, normals, _ENOUGH * accuracy * size, size)
+        ends, tips, top = _climbed(tip_map, start, normals, _ENOUGH * accuracy * size, size)
         every = np.concatenate([corners.tips, tips])
         for rows in range(0, len(top), _TOGETHER):
             block = slice(rows, rows + _TOGETHER)
@@ -267,7 +263,7 @@ def climbed_hull(
             top[block] = np.fmax(top[block], attained)
         offset = np.einsum("fi,fi->f", corners.tips[corners.faces[:, 0]], normals)
         high = low + float(area @ (top - offset).clip(0.0))
-        corners = kind.of(every, np.concatenate([corners.cube, found]))
+        corners = HullCorners.of(every, np.concatenate([corners.cube, ends]), hull_of)
         last, error = error, 0.5 * (high - corners.volume)
         if error <= accuracy * high or error > _LESS * last:
             break

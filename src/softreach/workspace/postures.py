@@ -66,8 +66,8 @@ class AllPostures(TipMap):
         every = [each.gamma for each in self.sheets]
         number = np.repeat(np.arange(len(every)) + 1.0, [len(gamma) for gamma in every])
         gamma = np.column_stack([np.concatenate(every), number]).astype(np.float64)
-        found = np.isfinite(tips := self.tips(gamma)).all(axis=1)
-        return gamma[found], tips[found]
+        held = np.isfinite(tips := self.tips(gamma)).all(axis=1)
+        return gamma[held], tips[held]
 
     @lazy
     def box(self) -> ActivationBox:
@@ -108,14 +108,8 @@ def all_postures(tip_map: TipMap, cells: int | None = None) -> AllPostures | Non
     """All postures that an arm holds, on sheets that are known at the nodes of a grid.
 
     A sheet that is narrower than the cells may be missing. Each goes on beyond its last nodes, as
-    far as the cells beside.
-
-    Args:
-        tip_map: The tip map.
-        cells: Of the grid along each free bundle; by default as many as 8,192 nodes allow.
-
-    Returns:
-        None where all are those to which activations lead straight from rest.
+    far as the cells beside. The grid has so many cells along each free bundle, by default as many
+    as 8,192 nodes allow. None where all are those to which activations lead straight from rest.
     """
     m, box = tip_map.box.dimension, tip_map.box
     if not tip_map.supports_unstable:

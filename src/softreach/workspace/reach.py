@@ -15,7 +15,7 @@ from softreach.workspace.cells import lost_share, searched_set
 from softreach.workspace.flux import grid_faces, signed_volume
 from softreach.workspace.grid import LiftedGrid
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.measure import Estimate
+from softreach.workspace.measure import Estimate, named
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.thin import planar_set, plane_of_tips, thin_set
 
@@ -107,17 +107,13 @@ def reachable_set(
         finer += "" if cell is None else ", and a smaller cell"
     else:
         cells = searched_set(tip_map, accuracy, cell, memory, progress)
-        hull = cells.hull
-        assert hull is not None
+        assert cells.hull is not None
         result = ReachableSet(
             tip_map=tip_map,
-            volume=cells.volume.value,
-            volume_error=cells.volume.error,
-            convex_volume=hull.volume.value,
-            convex_volume_error=hull.volume.error,
             lost_share=lost_share(tip_map),
             route="search",
             covering=cells,
+            **named(volume=cells.volume, convex_volume=cells.hull.volume),
         )
         allowed = accuracy
         finer = "a smaller cell" if cell is not None else "more memory"
@@ -134,12 +130,8 @@ def rasterized_set(
 ) -> ReachableSet:
     """Reach of three free bundles by one raster, whether the map is one to one or not.
 
-    Args:
-        tip_map: The tip map.
-        cells: Of the activation grid along each axis, even.
-        cell: Edge of a cell in space [m]; by the accuracy if None.
-        accuracy: Relative error of the volume that the cell is chosen for.
-        progress: Called with the number of grid vertices done since its last call.
+    The activation grid has an even number of cells along each axis; the edge of a cell in space [m]
+    is by the accuracy if None.
 
     Raises:
         InvalidInput: No activation has a stable equilibrium, or memory does not hold the cells.
@@ -149,20 +141,13 @@ def rasterized_set(
 
 
 def allowed_error(solid: ReachableSet, accuracy: float) -> float:
-    """The error of the volume that has to do, relative.
+    """The relative error of the volume that is enough.
 
-    Of several sheets it falls as 1/n and no faster: twice what is asked has to do for them, but on
-    grids that take no time.
+    Of several sheets it falls as 1/n and no faster: for them twice as much is enough, but on grids
+    that take no time.
     """
     has_sheets = solid.is_torn and solid.cells > _QUICK
     return (_TORN if has_sheets else 1.0) * accuracy
-
-
-def is_worthwhile(solid: ReachableSet, accuracy: float) -> bool:
-    """True if the volume errs too much, and grids that memory holds may be fine enough."""
-    most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)
-    errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
-    return errs and (2 * solid.cells + 1) ** 3 <= most
 
 
 def _of_three(
@@ -177,7 +162,9 @@ def _of_three(
         if tip_map.is_smooth and not tip_map.supports_unstable and image.is_one_to_one:
             return _by_faces(image)
         solid = _by_raster(image, accuracy)
-        if not is_worthwhile(solid, accuracy):
+        most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)  # that memory holds
+        errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
+        if not errs or (2 * cells + 1) ** 3 > most:
             return solid
         cells, before = 2 * cells, grid
 
@@ -191,21 +178,20 @@ def _by_faces(image: Image) -> ReachableSet:
     return ReachableSet(
         tip_map=grid.tip_map,
         cells=grid.n,
-        volume=abs(flux.value),
-        volume_error=flux.error,
         multiplicity={1: abs(flux.value)},
         multiplicity_error=0.0,
         fold_volume=0.0,
         route="flux",
-        convex_volume=convex.value,
-        convex_volume_error=convex.error,
         covering=image,
+        **named(volume=Estimate(abs(flux.value), flux.error), convex_volume=convex),
     )
 
 
 def _by_raster(image: Image, accuracy: float) -> ReachableSet:
     """The solid of any image."""
-    grid, volume, convex = image.grid, Estimate(np.nan, np.nan), measure.convex_volume(image)
+    grid, volume = image.grid, Estimate(np.nan, np.nan)
+    corners = (each.places[measure.outer_vertices(each)] for each in (image, image.coarse))
+    convex = measure.extrapolated_hull(*corners)
     if not grid.is_torn:
         volume = measure.solid_volume(image, accuracy)
     several, change = measure.multiply_covered(image)
@@ -216,8 +202,6 @@ def _by_raster(image: Image, accuracy: float) -> ReachableSet:
     return ReachableSet(
         tip_map=grid.tip_map,
         cells=grid.n,
-        volume=volume.value,
-        volume_error=volume.error,
         multiplicity={1: volume.value - sum(several.values()), **several},
         multiplicity_error=max(volume.error, change),
         fold_volume=measure.fold_volume(image),
@@ -225,9 +209,8 @@ def _by_raster(image: Image, accuracy: float) -> ReachableSet:
         hysteresis_share=grid.hysteresis_share,
         is_torn=grid.is_torn,
         route="raster",
-        convex_volume=convex.value,
-        convex_volume_error=convex.error,
         covering=image,
+        **named(volume=volume, convex_volume=convex),
     )
 
 
@@ -242,9 +225,8 @@ def lattice_around(grid: LiftedGrid, cell: float | None, accuracy: float) -> Lat
     if cell is None:
         edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
         # An image that is almost flat would need countless cells along it.
-        return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
-    smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
-    if not smallest <= cell < np.inf:  # NaN too
+        cell = float(max(edge, sides.max() / 1024.0))
+    elif cell < (smallest := float(np.cbrt(np.prod(sides) / _MOST_CELLS))):
         allowed = f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
         raise InvalidInput("cell", cell, allowed)
-    return Lattice.around(tips, float(cell))
+    return Lattice.around(tips, cell)

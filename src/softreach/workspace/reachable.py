@@ -1,4 +1,4 @@
-"""Everything that the tip of an arm can reach, as a value to be asked."""
+"""Everything that the tip of an arm can reach: sizes with their errors, surface, distances."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra, NotPossible, counted
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
-from softreach.workspace.boundary import boundary_surface, wrapped_surface
 from softreach.workspace.cells import Covering, ReachedCells, cells_of
 from softreach.workspace.flux import face_image
-from softreach.workspace.image import DIAGONAL, Image
+from softreach.workspace.image import DIAGONAL, Image, boundary_surface, wrapped_surface
 from softreach.workspace.measure import Estimate, extrapolated
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
@@ -39,6 +38,8 @@ _MEANINGS = {
     "convex_area": ("m2", "convex hull's area"),
     "unreachability": ("1", "share of the convex hull out of reach"),
     "fold_volume": ("m3", "volume reached with both orientations"),
+    "shell_area": ("m2", "area of the thin set"),
+    "shell_thickness": ("m", "thickness of the thin set"),
 }
 _ROUTES = {
     "flux": "one to one: by flux through the faces of the activation box",
@@ -253,11 +254,7 @@ class ReachableSet:
         """
         if self.dimension < 2:
             raise self._is_thin("surface")
-        if self.mesh is not None:
-            return self.mesh
-        if self.route == "flux":
-            return self._face_image
-        return without_flakes(self._boundary, self.volume_error)
+        return self._surface
 
     def sheets(self) -> Sheets:
         """The boundary of a solid as the sheets it consists of: images of faces, and folds.
@@ -349,26 +346,20 @@ class ReachableSet:
         numbers: _Stored = {}
         if self.shell is not None:
             area, thickness = self.shell
-            numbers |= _with_error("shell_area", *area, "m2", "area of the thin set")
-            numbers |= _with_error("shell_thickness", *thickness, "m", "thickness of the thin set")
+            numbers |= _with_error("shell_area", *area) | _with_error("shell_thickness", *thickness)
         hull = () if self.outline is None else ("convex_area",)
         for name in (SIZES[self.dimension], *hull, "convex_volume", "unreachability"):
-            numbers |= self._with_error(name)
+            numbers |= _with_error(name, getattr(self, name), getattr(self, f"{name}_error"))
         if self.multiplicity:
             about = {"units": "m3", "long_name": "error of the volume reached more than once"}
             numbers["multiplicity_error"] = (), self.multiplicity_error, about
-            numbers |= self._with_error("fold_volume")
+            numbers |= _with_error("fold_volume", self.fold_volume, self.fold_volume_error)
         if self.tip_map.supports_unstable:
             meanings = {"lost": "without a posture", "hysteresis": "with two postures"}
             for name, meaning in meanings.items():
                 about = {"units": "1", "long_name": f"share of the activation box {meaning}"}
                 numbers[f"{name}_share"] = (), getattr(self, f"{name}_share"), about
         return numbers
-
-    def _with_error(self, name: str) -> _Stored:
-        return _with_error(
-            name, getattr(self, name), getattr(self, f"{name}_error"), *_MEANINGS[name]
-        )
 
     def __repr__(self) -> str:
         size, *details = self._lines()
@@ -404,8 +395,9 @@ class ReachableSet:
             lines.insert(0, f"{sheet}thickness {quantity(thickness.value, 'm', thickness.error)}")
         if self.multiplicity:
             again = quantity(self._several, "m³", self.multiplicity_error)
-            behind = quantity(self.fold_volume, "m³", self.fold_volume_error)
-            lines.append(f"reached more than once {again}, behind folds {behind}")
+            lines.append(
+                f"reached more than once {again}, behind folds {self._text('fold_volume')}"
+            )
         raster = "" if self.route == "flux" else f", cells of {self.image.lattice.cell:.3g} m"
         return [*lines, _ROUTES[self.route] + raster]
 
@@ -423,8 +415,8 @@ class ReachableSet:
         try:
             return html_card(repr(self), Skin(self.surface().vertices, self.surface().faces))
         except MissingExtra:  # cells instead of a surface
-            lattice, cells = self.image.lattice, np.argwhere(self.image.counts[0] > 0)
-            return html_card(repr(self), Dots(lattice.origin + lattice.cell * cells))
+            cells = np.argwhere(self.image.counts[0] > 0)
+            return html_card(repr(self), Dots(self.image.lattice.places(cells)))
 
     @property
     def _several(self) -> float:
@@ -464,12 +456,17 @@ class ReachableSet:
         return Sheets.of(self.surface())
 
     @lazy
-    def _face_image(self) -> Surface:
-        return face_image(self.tip_map)
+    def _surface(self) -> Surface:
+        if self.mesh is not None:
+            return self.mesh
+        if self.route == "flux":
+            return face_image(self.tip_map)
+        return without_flakes(self._boundary, self.volume_error)
 
 
-def _with_error(name: str, value: float, error: float, unit: str, meaning: str) -> _Stored:
+def _with_error(name: str, value: float, error: float) -> _Stored:
     """A number and its error, as they are stored."""
+    unit, meaning = _MEANINGS[name]
     return {
         name: ((), value, {"units": unit, "long_name": meaning}),
         f"{name}_error": ((), error, {"units": unit, "long_name": f"error of the {meaning}"}),

@@ -108,8 +108,7 @@ class ReachedGrid:
 
     def centers(self, cells: Index) -> Array:
         """Places [m] of cells given by flat index, shape (n, 3)."""
-        index = np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1)
-        return self.lattice.origin + self.lattice.cell * index
+        return self.lattice.places(np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1))
 
     def add_inside(self, inside: Callable[[Array], Mask]) -> None:
         """Take centers for reached, without a search, that are within a part known to be [m]."""
@@ -162,14 +161,8 @@ def nearest_tips(
 ) -> Nearest:
     """The activations whose tips come closest to targets, as far as a descent from `start` finds.
 
-    Only stable equilibria are taken.
-
-    Args:
-        tip_map: The tip map.
-        start: Activations to begin with, within the bounds, shape (n, bundles).
-        targets: Places [m], shape (n, 3).
-        enough: Distance at which a target counts as reached [m].
-        stop: When to give up.
+    Starts are within the bounds, shape (n, bundles), and each has a target, shape (n, 3) [m], which
+    counts as reached at the distance `enough` [m]. Only stable equilibria are taken.
     """
     gamma = np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
@@ -274,8 +267,6 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     cube[bound] = rng.integers(0, 2, int(bound.sum()))
     gamma = np.ascontiguousarray(box.from_free_cube(cube))
     tips = tip_map.tips(gamma)
-    if not tip_map.supports_unstable:
-        return gamma, tips
     stable = np.isfinite(tips[:, 0])
     if not stable.any():
         raise no_equilibrium(len(tips))

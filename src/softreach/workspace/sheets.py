@@ -22,8 +22,8 @@ from softreach.picture.shading import vertex_normals
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Faces, Mask
-from softreach.workspace.flux import box_slopes, face_triangles, grid_faces
-from softreach.workspace.grid import cube_grid
+from softreach.workspace.flux import face_triangles, grid_faces
+from softreach.workspace.grid import box_slopes, cube_grid
 from softreach.workspace.image import Image
 
 _FACE_CELLS = 40
@@ -53,11 +53,7 @@ class Sheets(Surface):
 
 
 def outer_sheets(tip_map: TipMap, image: Image) -> Sheets:
-    """The faces and folds that bound an image.
-
-    Args:
-        tip_map: The tip map, of three free bundles, one smooth branch.
-        image: Of the grid of cubes over its activation box.
+    """The faces and folds that bound the image of a map of three free bundles on one smooth branch.
 
     Raises:
         MissingExtra: scikit-image is not installed.
@@ -100,13 +96,10 @@ def _sheets(tip_map: TipMap, cube: Array, faces: Faces) -> Sheets:
 def clipped(
     faces: Faces, kept: Mask, cut: Callable[[NDArray[np.int32]], Array]
 ) -> tuple[Faces, NDArray[np.int32], Array]:
-    """Triangles cut along the line between vertices that are kept and others.
+    """Triangles (f, 3) cut along the line between vertices that are kept and others.
 
-    Args:
-        faces: Shape (f, 3).
-        kept: For each vertex.
-        cut: Of pairs of vertices (kept, not kept), shape (n, 2), the share of the way to the second
-            where the line is, shape (n,).
+    Of pairs of vertices (kept, not kept), shape (n, 2), `cut` gives the share of the way to the
+    second where the line is, shape (n,).
 
     Returns:
         Triangles, whose vertices beyond those that are kept are new: one for each cut pair, the

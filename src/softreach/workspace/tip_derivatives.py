@@ -45,12 +45,9 @@ class TipDerivatives:
     ) -> None:
         """Make the neighbors.
 
-        Args:
-            tip_map: The tip map of the design; its tolerance is also that of the derivatives,
-                per change of a parameter by itself.
-            parameters: The parameters.
-            tol: A larger tolerance of a free arm, for which fewer steps are made: theory (27).
-            progress: Called with 0 before each parameter, from any thread; it may raise to stop.
+        The tolerance of the map is also that of the derivatives, per change of a parameter by
+        itself; for a larger one a free arm has fewer steps, theory (27). The progress is called
+        with 0 before each parameter, from any thread, and may raise to stop.
 
         Raises:
             InvalidInput: A parameter counts something, has no value, or its change holds or frees a
@@ -71,13 +68,9 @@ class TipDerivatives:
         """Error of a derivative by each parameter [m per unit], shape (parameters,)."""
 
     def at(self, cube: Array) -> Array:
-        """Derivatives at places of the unit cube of the free bundles: bounds move as they do.
+        """Derivatives [m per unit] at places (n, dimension) of the unit cube of the free bundles.
 
-        Args:
-            cube: Places in [0, 1], shape (n, dimension).
-
-        Returns:
-            [m per unit], shape (n, 3, parameters); NaN without a stable equilibrium.
+        Shape (n, 3, parameters); NaN without a stable equilibrium. Bounds move as parameters do.
         """
         out = np.zeros((len(cube), 3, len(self._shifts)))
 
@@ -129,12 +122,8 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
     """Neighbors of a design along a parameter: on both sides, or on one at the end of its range.
 
     Where several parts share the parameter, each moves from its own value by the same amount.
-
-    Args:
-        arm: The design.
-        parameter: The parameter that changes.
-        reach: Steps to either side; twice as many to one side.
-        relative: Size of a step as a part of the parameter, of the smallest where parts differ.
+    `reach` is the number of steps to either side, twice as many to one side, and `relative` their
+    size as a part of the parameter, of the smallest where parts differ.
 
     Raises:
         InvalidInput: The parameter counts something, or has no value.
