@@ -199,7 +199,7 @@ def some(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("some") / "a.zarr"
     asked = command(gapped_space(), **SMALL)
     store = AtlasStore.begin(place, asked)
-    begin_design(store, asked.metrics, 1)()
+    begin_design(store, 1)()
     store.write_status(3, "no luck")
     return place
 
