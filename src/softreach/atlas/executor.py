@@ -45,9 +45,11 @@ OnOutcome = Callable[[Outcome], None]
 
 @runtime_checkable
 class DaskClient(Protocol):
-    """A `dask.distributed.Client`; its executors compute equal tasks once if they are pure."""
+    """A `dask.distributed.Client`."""
 
-    def get_executor(self, *, pure: bool) -> Executor: ...
+    def get_executor(self, *, pure: bool) -> Executor:
+        """An executor on its cluster; those that are pure compute equal tasks once."""
+        ...
 
 
 ExecutorLike = Executor | DaskClient | None

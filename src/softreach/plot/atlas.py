@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.atlas import over_length
 from softreach.plot.coloring import COLORMAP
-from softreach.plot.style import figure_style, small_axes
+from softreach.plot.style import styled_axes
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
@@ -79,8 +79,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
     if metric not in atlas or atlas[metric].dims != atlas["status"].dims:
         raise InvalidInput("metric", metric, "a metric of the atlas")
     values = over_length(atlas, metric).values.T
-    with figure_style(ax):
-        ax = small_axes() if ax is None else ax
+    with styled_axes(ax) as ax:
         filled = _fill(ax, across, up, np.ma.masked_invalid(values))
         if np.isfinite(values).any():
             _mark_best(ax, across, up, values, smallest="unreachability" in metric)

@@ -24,11 +24,10 @@ from softreach.plot.lengths import Unit, common_unit, unit_of
 from softreach.plot.style import (
     LENGTH,
     PAGE,
-    as_axes,
     figure_style,
     new_figure,
     place_panels,
-    small_axes,
+    styled_axes,
     write_note,
 )
 from softreach.schema import a_cloud
@@ -232,7 +231,7 @@ def plot_curvature(
         InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
             the arm, or designs of which only one knows L.
     """
-    ax, variables = as_axes(ax), ("bending_count", "Z")
+    variables = "bending_count", "Z"
     statistics = as_mapping("statistics", statistics, lambda *x: as_dataset(*x, *variables))
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
@@ -246,8 +245,7 @@ def plot_curvature(
     symbol, per_length = _SYMBOLS[quantity], quantity != "extension"
     if per_length:
         symbol += "L" if counted.relative else f" [1/{counted.name}]"
-    with figure_style(ax):
-        ax = small_axes() if ax is None else ax
+    with styled_axes(ax) as ax:
         sides = (-1, 1) if len(statistics) == 2 else (0,)
         for (label, data), side, color in zip(statistics.items(), sides, SIDES, strict=False):
             scale = units[label].size if per_length else 1.0
