@@ -14,7 +14,7 @@ from softreach.picture.projection import View, sight_axis
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.arm import arm_images, arm_points, draw_markers, shapes_of
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.coloring import color_samples, draw_figure_key, draw_key
+from softreach.plot.coloring import color_samples, draw_figure_key, draw_key, key_height
 from softreach.plot.lengths import Unit, common_unit, unit_for, unit_of
 from softreach.plot.style import LENGTH, PAGE, PLACE, SIZE, figure_style, place_panels, write_note
 from softreach.rod.kinematics import rest_configuration
@@ -37,7 +37,8 @@ Images = tuple[ZBuffer, ZBuffer | None]
 """An image, and what shows through it."""
 
 _VIEWS = ("front", "side", "top", "oblique")
-_AROUND, _GAP = (0.55, 0.12, 0.42, 0.42), 0.60  # left, right, bottom and top of four views [inch]
+_BESIDE = {True: (0.55, 0.12), False: (0.60, 0.22)}  # left and right of four views, in L or not
+_ROOM, _GAP = 0.42, 0.60  # below them and for their key at least, and between them [inch]
 _LOWER = 0.126  # of the oblique view, whose numbers stand outside of its box [inch]
 
 
@@ -206,7 +207,9 @@ def plot_views(
     coloring = color_samples(cloud, color)
     with figure_style():
         x, y, z = np.ptp(box, axis=0)
-        figure, axes = place_panels(PAGE, (x, y), (z, y), _AROUND, (_GAP, _GAP))
+        room = max(_ROOM, key_height(coloring.key))
+        around = (*_BESIDE[counted.relative], _ROOM, room)
+        figure, axes = place_panels(PAGE, (x, y), (z, y), around, (_GAP, _GAP))
         low, height = axes[1, 1].get_position(), figure.get_size_inches()[1]
         axes[1, 1].set_position(low.translated(0.0, -_LOWER / height))
         pairs = zip(axes.ravel().tolist(), _VIEWS, strict=True)
@@ -223,5 +226,5 @@ def plot_views(
                 panel.show(image, within)
             if arm is not None:
                 draw_markers(panel, arm, shapes, 0.0)
-        draw_figure_key(figure, coloring.key, _AROUND[3] / height)
+        draw_figure_key(figure, coloring.key, room)
     return figure

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,10 +23,16 @@ from softreach.plot.arm import plot_arm
 from softreach.plot.atlas import SheetAxis, plot_metric_map, sheet_axes
 from softreach.plot.axes import bounding_box, view_extent
 from softreach.plot.clouds import drawn_tips, plot_cloud, point_size
-from softreach.plot.coloring import bundle_activations, bundle_names, color_samples, draw_figure_key
+from softreach.plot.coloring import (
+    bundle_activations,
+    bundle_names,
+    color_samples,
+    draw_figure_key,
+    key_height,
+)
 from softreach.plot.lengths import Unit, unit_of
 from softreach.plot.statistics import SIDES, plot_curvature
-from softreach.plot.style import DPI, PAGE, as_box, figure_style, new_figure, place_panels
+from softreach.plot.style import DPI, PAGE, as_box, figure_style, place_panels
 from softreach.schema import a_cloud, is_stable
 from softreach.support import parallel
 from softreach.support.arguments import as_integer, as_mapping
@@ -40,7 +47,8 @@ if TYPE_CHECKING:
 
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
-_KEY = 0.45  # inches above a sheet for its colors
+_KEY = 0.45  # inches for the key of colors at least
+_LETTERS = 90  # of titles side by side
 _VIEW = "oblique"  # of sheets
 _METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
 
@@ -204,18 +212,23 @@ def plot_opposite_sides(
     if around is None:
         tips = (drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values())
         around = bounding_box(*tips)
+    key = color_samples(next(iter(clouds.values())), "rgb").key
+    room, columns = max(_KEY, key_height(key)), [1.0] * len(clouds)
+    beside, right = (0.58, 0.26) if unit in (None, "L") else (0.75, 0.48)
+    titles = [f"({k + 1})  {title}" for k, title in enumerate(clouds)]
+    titles = [fill(title, round(_LETTERS / len(clouds))) for title in titles]
+    top = room + 0.16 * max(1 + title.count("\n") for title in titles)
     with figure_style():
-        figure = new_figure(figsize=(PAGE, 2 * PAGE / len(clouds) + 0.5))
-        panels = figure.subplots(2, len(clouds), squeeze=False)
-        figure.subplots_adjust(0.085, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
-        for k, (title, cloud) in enumerate(clouds.items()):
+        edges = (beside + 0.07, right, 0.45, top)
+        figure, panels = place_panels(PAGE, columns, [1.1, 1.1], edges, (beside, 0.45))
+        for k, cloud in enumerate(clouds.values()):
             arm = design_of(cloud)
             box = np.asarray(around) * arm.length
-            panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
+            panels[0, k].set_title(titles[k], pad=4)
             for ax, side in zip(panels[:, k], sides, strict=True):
                 plot_cloud(cloud, ax=ax, view=side, color="rgb", key=False, box=box, unit=unit)
                 plot_arm(arm, ax=ax, view=side, box=box, unit=unit)
-        draw_figure_key(figure, color_samples(next(iter(clouds.values())), "rgb").key, 0.09)
+        draw_figure_key(figure, key, room)
     return figure
 
 
@@ -231,10 +244,12 @@ def _sheet(
     picked = _thinned(atlas, as_integer("panels", panels, 1))
     across, up = sheet_axes(picked)
     with figure_style():
+        first = _first_cloud(picked) if keyed else None
+        key = None if first is None else color_samples(first.isel(sample=slice(1)), "rgb").key
         extent = panel_extent(box, _VIEW)
         wide, high = extent.size.tolist()
         columns, rows = [wide] * len(across.values), [high] * len(up.values)
-        top = _KEY if keyed else _TOP
+        top = max(_KEY, key_height(key)) if keyed else _TOP
         figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
         grid = grid[::-1]  # row 0 at the bottom
         _label_sheet(grid, across, up)
@@ -251,9 +266,7 @@ def _sheet(
                 ax.imshow(rgba, extent=extent, interpolation="none", aspect="auto")
             ax.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
         _draw_scale(figure, grid[0, 0])
-        if keyed and (cloud := _first_cloud(picked)) is not None:
-            key = color_samples(cloud.isel(sample=slice(1)), "rgb").key
-            draw_figure_key(figure, key, top / figure.get_size_inches()[1])
+        draw_figure_key(figure, key, top)
     return figure
 
 

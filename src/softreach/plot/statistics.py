@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,7 +52,8 @@ if TYPE_CHECKING:
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
 _BINS = 60
-_AROUND, _GAPS = (0.75, 0.1, 0.4, 0.55), (0.12, 0.95)  # of panels [inch]
+_AROUND, _GAPS = (0.1, 0.4, 0.55), (0.12, 0.95)  # right, below, above and between panels [inch]
+_LEFT, _LINE, _LETTERS = 0.75, 0.14, 24  # inches left of them, for each more line of titles
 _a_distance = partial(as_dataset, kind="DataArray")
 SIDES = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
 _SYMBOLS = {"bending": "κ", "torsion": "u₃", "extension": "ζ"}
@@ -174,7 +176,10 @@ def plot_redundancy(
     high = largest_distance(distances.values())
     with figure_style():
         x, y, z = np.ptp(box, axis=0)
-        figure, rows = place_panels(PAGE, (x, x, y, x), [z] * len(clouds), _AROUND, _GAPS)
+        names = {title: fill(title, _LETTERS) for title in clouds}
+        left = _LEFT + _LINE * max(name.count("\n") for name in names.values())
+        around = (left, *_AROUND)
+        figure, rows = place_panels(PAGE, (x, x, y, x), [z] * len(clouds), around, _GAPS)
         for (title, cloud), row in zip(clouds.items(), rows, strict=True):
             coloring = color_samples(cloud, bundle_activations(cloud).shape[1] - 1)
             rgb, counted = coloring.rgb / 255, units[title]
@@ -190,7 +195,7 @@ def plot_redundancy(
                     figure.colorbar(color_map(key), cax=bar, **options)
             for ax in row[1:]:
                 ax.set(ylabel="", yticklabels=[])
-            row[0].set_ylabel(f"{title}\n{row[0].get_ylabel()}")
+            row[0].set_ylabel(f"{names[title]}\n{row[0].get_ylabel()}")
     return figure
 
 
