@@ -24,8 +24,8 @@ from softreach.plot import (
     plot_volume_curve,
     save_figure,
 )
+from softreach.plot.atlas import evenly
 from softreach.plot.coloring import BundleKey, ScalarKey, color_samples
-from softreach.plot.sheets import evenly
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import activation_colors, bundle_color
 from tests.test_redundancy import made_up

@@ -30,7 +30,7 @@ from softreach.cli import atlas as atlas_command
 from softreach.cli.app import run
 from softreach.picture.projection import view_axes
 from softreach.plot import plot_metric_map
-from softreach.plot.sheets import box_over_length, hull_over_length, panel_extent
+from softreach.plot.atlas import box_over_length, hull_over_length, panel_extent
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import (
     SMALL,

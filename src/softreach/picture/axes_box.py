@@ -91,11 +91,7 @@ def _seen(ends: Array, toward: Array, picture: Array) -> Array:
 
 
 def _room(seen: Array, focal: float, apart: tuple[float, float]) -> float:
-    """The least step, in units of a length, of texts that touch neither beside nor above.
-
-    That length leads so far to the right and up in focal lengths [pixel], shape (2,); texts are so
-    many pixels apart, beside or above each other.
-    """
+    """The least step of texts some pixels apart, in units of a length seen in focal lengths."""
     return float((np.array(apart) / ((seen + 1e-9) * focal)).min())
 
 
@@ -172,14 +168,12 @@ def _round_step(span: float) -> float:
 
 def _edges(low: Array, high: Array, side: Side) -> list[Array]:
     """The edges, shape (2, 3) each, but those between two faces that the camera sees."""
-    edges = []
+    corners, edges = np.stack([low, high]), []
     for axis in range(3):
         others = [k for k in range(3) if k != axis]
         for pick in np.ndindex(2, 2):
-            if all(2 * p - 1 == side.visible[k] for k, p in zip(others, pick, strict=True)):
-                continue
-            ends = np.stack([low, high])
-            for k, p in zip(others, pick, strict=True):
-                ends[:, k] = high[k] if p else low[k]
-            edges.append(ends)
+            if tuple(2 * p - 1 for p in pick) != tuple(side.visible[k] for k in others):
+                ends = corners.copy()
+                ends[:, others] = corners[pick, others]
+                edges.append(ends)
     return edges

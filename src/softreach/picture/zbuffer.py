@@ -94,9 +94,11 @@ class ZBuffer:
     def rgba(self) -> NDArray[np.uint8]:
         """The image from top to bottom, shape (rows, columns, 4); transparent where nothing is."""
         image = np.zeros((*self.shape, 4), np.uint8)
-        rows, columns = _extent_of_content(self._keys, self.oversample)
         by = self.oversample
-        keys = self._keys[by * rows.start : by * rows.stop, by * columns.start : by * columns.stop]
+        rows = _filled(self._keys, 1, by)
+        keys = self._keys[by * rows.start : by * rows.stop]
+        columns = _filled(keys, 0, by)
+        keys = keys[:, by * columns.start : by * columns.stop]
         image[rows, columns] = _rounded(_averaged(keys, by), self.color_step)
         return image
 
@@ -159,14 +161,9 @@ def _rounded(rgba: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
     return np.concatenate([levels[rgba[..., :3]], rgba[..., 3:]], axis=-1)
 
 
-def _extent_of_content(keys: Keys, by: int) -> tuple[slice, slice]:
-    """Rows and columns, in blocks of pixels, outside of which nothing is drawn."""
-    rows = _range_of(keys.max(axis=1, initial=0) > 0, by)
-    return rows, _range_of(keys[by * rows.start : by * rows.stop].max(axis=0, initial=0) > 0, by)
-
-
-def _range_of(some: NDArray[np.bool_], by: int) -> slice:
-    indices = np.flatnonzero(some)
+def _filled(keys: Keys, axis: int, by: int) -> slice:
+    """Rows (axis 1) or columns (axis 0), in blocks of pixels, outside of which nothing is drawn."""
+    indices = np.flatnonzero(keys.max(axis=axis, initial=0))
     return slice(indices[0] // by, indices[-1] // by + 1) if len(indices) else slice(0, 0)
 
 

@@ -39,7 +39,7 @@ _ROOM = np.array([2.8, 3.2])  # inches for the image
 _AROUND = np.array([0.6, 0.7])  # inches for labels and key
 _LEAST = {True: 1.6, False: 2.5}  # inches for a view along an axis or a box in space, labeled
 _TICK_ROOM = 0.42  # inches between ticks at least
-_BOX_TICK_ROOM = 0.22  # and along the edges of a box in space
+_BOX_TICK_ROOM = 0.17  # and along the edges of a box in space
 _UNIT_MARK = "_counted in "  # the label of an image, which no legend shows
 
 

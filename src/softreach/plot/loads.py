@@ -140,10 +140,10 @@ def plot_compliance(
         allowed = f"{len(shapes)}, one for each configuration"
         raise InvalidInput("compliance", f"{len(matrices)} matrices", allowed)
     if force is None:  # that keeps the ellipsoids small
-        softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
+        softest = float(np.linalg.norm(matrices, ord=2, axis=(1, 2)).max())
+        if not 0 < softest < np.inf:
+            raise InvalidInput("compliance", f"{softest:g} m/N at most", "finite, and not zero")
         force = round_below(_LARGEST * arm.length / softest)
-    if not 0 < force < np.inf:
-        raise InvalidInput("force", force, "> 0 N")
     counted = unit_for(arm.length, unit)
     tips = counted.of([shape["position"].values[-1] for shape in shapes])
     axes = counted.of(force * matrices)

@@ -101,8 +101,7 @@ def plot_distance(
         pixels = max(3.0, buffer.shape[1] / np.sqrt(1.2 * max(len(tips), 1)))
         buffer.draw_points(seen, scale_colors(values, 0.0, high, _ISOLATED), pixels)
         panel.show(buffer)
-        if key:
-            draw_key(panel.ax, ScalarKey(_LABEL, 0.0, high))
+        draw_key(panel.ax, ScalarKey(_LABEL, 0.0, high) if key else None)
     return panel.ax
 
 
