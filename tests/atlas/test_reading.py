@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 from functools import partial
 from pathlib import Path
 
@@ -252,6 +253,7 @@ def test_the_status_counts_every_design_once(some):
     assert counts == (4, 1, 1, 1, 1)
     assert status.messages[3] == "no luck"
     assert "leaves no tip" in status.messages[2]
+    assert re.search(r"^number 3 +no luck$", str(status), re.MULTILINE)
 
 
 def test_a_part_of_an_atlas_keeps_the_numbers_of_its_designs(some):
@@ -336,15 +338,6 @@ def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
     taper = float(best.taper[0])
     assert sr.Manipulator.load(design) == sr.designs.minimal_trunk(taper=taper)
     assert run(["atlas", "best", store, "volume", "--where", "volume>=9", "--out", "a.toml"]) == 2
-
-
-def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
-    store = AtlasStore.begin(tmp_path / "a.zarr", command(gapped_space(), **SMALL))
-    store.write_status(3, "no luck")
-    assert run(["atlas", "status", str(tmp_path / "a.zarr")]) == 0
-    said = capsys.readouterr().out
-    assert "number 3" in said
-    assert "no luck" in said
 
 
 # Atlases over numbers of parts, called by their paths in Python, files and commands alike

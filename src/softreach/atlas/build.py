@@ -182,10 +182,8 @@ def _run(
     with bar("computing designs", len(indices)) as shown:
 
         def on_outcome(outcome: tuple[int, str]) -> None:
-            index, failure = outcome
             with lock:
-                if failure:
-                    failures[index] = failure
+                failures.update([outcome] if outcome[1] else [])
                 (progress or shown)(1)
 
         run_designs(atlas, indices, executor, on_outcome)

@@ -123,10 +123,9 @@ def _run_in_pool(
 
 
 class _Remote(NamedTuple):
-    """A store as it travels to a worker elsewhere, where designs are read and written.
+    """A store as it travels to a worker, with the functions of metrics, which are in no store.
 
-    The command travels along, as the functions of metrics are in no store; unpickling it imports
-    the modules that these and the kinds of the design's parts are in.
+    Unpickling it imports the modules that these and the kinds of the design's parts are in.
     """
 
     command: Command
@@ -190,8 +189,10 @@ def _finish(store: AtlasStore, index: int, needed: Intermediates, values: Values
         tips = needed.tips if command.keep_clouds else None
     except Exception as error:
         return _fail(store, index, error)
-    ended = () if stable.any() else (UNSTABLE, no_equilibrium_message(len(stable)))
-    store.write(index, values, tips, *ended)
+    if stable.any():
+        store.write(index, values, tips)
+    else:
+        store.write(index, values, tips, UNSTABLE, no_equilibrium_message(len(stable)))
     return index, ""
 
 

@@ -203,7 +203,7 @@ def _sheet(
     picked = _thinned(atlas, as_integer("panels", panels, 1))
     across, up = sheet_axes(picked)
     with figure_style():
-        places = np.ndindex(picked["status"].shape if keyed else 0)
+        places = np.ndindex(picked["status"].shape if keyed else (0,))
         clouds = (cloud for at in places if (cloud := _cloud_at(picked, *at)) is not None)
         first = next(clouds, None)
         key = None if first is None else color_samples(first.isel(sample=slice(1)), "rgb").key

@@ -276,9 +276,10 @@ def plot_opposite_sides(
     if around is None:
         tips = (drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values())
         around = bounding_box(*tips)
-    key = color_samples(next(iter(clouds.values())), "rgb").key
+    first = next(iter(clouds.values()))
+    key, relative = color_samples(first, "rgb").key, unit_of(first["tip"], unit).relative
     room, columns = max(_ROOM, key_height(key)), [1.0] * len(clouds)
-    beside, right = (0.58, 0.26) if unit in (None, "L") else (0.75, 0.48)
+    beside, right = (0.58, 0.26) if relative else (0.75, 0.48)
     titles = [f"({k + 1})  {title}" for k, title in enumerate(clouds)]
     titles = [fill(title, round(_LETTERS / len(clouds))) for title in titles]
     top = room + 0.16 * max(1 + title.count("\n") for title in titles)
