@@ -103,11 +103,13 @@ class _Errors:
         colors = pyplot().get_cmap("tab10")
         self.colors = [colors(k % 10) for k in range(data.sizes["marker"])]
 
-    def scatter(self, ax: Axes, x: Array, marker: int) -> None:
-        size = {"s": 9 if len(x) < 300 else 4, "linewidths": 0.6, "zorder": 3}
-        color: Any = self.colors[marker]
-        for rows, face in ((~self.held, color), (self.held, "none")):
-            ax.scatter(x[rows], self.distance[rows, marker], color=face, edgecolors=color, **size)
+    def scatter(self, ax: Axes, x: Array) -> None:
+        """Distances of all markers over x, shape (sample,) or (marker, sample)."""
+        size = {"s": 9 if x.shape[-1] < 300 else 4, "linewidths": 0.6, "zorder": 3}
+        places = np.broadcast_to(x, self.distance.T.shape)
+        for own, distance, color in zip(places, self.distance.T, self.colors, strict=True):
+            for rows, face in ((~self.held, color), (self.held, "none")):
+                ax.scatter(own[rows], distance[rows], color=face, edgecolors=color, **size)
 
     def frame(self, ax: Axes) -> None:
         ax.set_ylim(0.0, self.top)
@@ -142,9 +144,9 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
 
 
 def _draw_markers(ax: Axes, shown: _Errors) -> None:
-    rng = np.random.default_rng(0)
+    apart = 0.25 * (2.0 * np.random.default_rng(0).random(shown.distance.T.shape) - 1.0)
+    shown.scatter(ax, np.arange(len(apart))[:, None] + apart)
     for k in range(len(shown.markers)):
-        shown.scatter(ax, k + 0.25 * (2.0 * rng.random(len(shown.distance)) - 1.0), k)
         for rows, style in ((~shown.held, "-"), (shown.held, ":")):
             own = shown.distance[rows, k]
             if np.isfinite(own).any():
@@ -160,8 +162,7 @@ def _draw_markers(ax: Axes, shown: _Errors) -> None:
 
 def _draw_order(ax: Axes, shown: _Errors) -> None:
     rank = shown.data["rank"].values
-    for k in range(len(shown.markers)):
-        shown.scatter(ax, rank, k)
+    shown.scatter(ax, rank)
     runs = shown.data["run"].values[np.argsort(rank)]
     for end in np.flatnonzero(np.diff(runs)):
         ax.axvline(end + 0.5, color="0.85", linewidth=0.5, zorder=1)
@@ -172,8 +173,7 @@ def _draw_order(ax: Axes, shown: _Errors) -> None:
 def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
     unit, values = str(shown.data["input_unit"].values[k]), shown.data["input_value"].values[:, k]
     name, size = readable_unit(unit, 1e3, _MILLIMETER)
-    for marker in range(len(shown.markers)):
-        shown.scatter(ax, values / size, marker)
+    shown.scatter(ax, values / size)
     label = str(shown.data["input"].values[k])
     ax.set_xlabel(f"{label} [{name}]" if name else label)
     shown.frame(ax)
