@@ -12,6 +12,7 @@ import warnings
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from softreach.atlas.command import Command
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Need
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
-from softreach.atlas.store import AtlasStore, Result
+from softreach.atlas.store import AtlasStore
 from softreach.support.errors import SoftreachWarning
 
 ALPHA, ACCURACY, TOL = 0.05, 3e-3, 1e-6
@@ -72,9 +73,10 @@ def parts(rows: int, columns: int, n: int, _: str = "") -> Times:
 
 def one_design(store: AtlasStore, index: int, times: Times) -> None:
     command = store.command
-    arm, sizes = command.design(index), command.profile_sizes
-    found = Intermediates(arm, store.cube, command, ())  # the convex hull by itself
-    shared = Intermediates(arm, store.cube, command, command.metrics)
+    arm, sizes = command.space.design(index), command.profile_sizes
+    alone = replace(command, metrics=())
+    found = Intermediates(arm, store.cube, alone)
+    shared = Intermediates(arm, store.cube, command)
     values = {}
 
     def measure(part: str, results: Intermediates, *groups: str) -> None:
@@ -90,7 +92,7 @@ def one_design(store: AtlasStore, index: int, times: Times) -> None:
     measure("concave", shared, "extent", "convex", "concave")
     measure("curvature", found, "curvature")
     with clock(times["writing"]):
-        store.write(index, Result(values, tips))
+        store.write(index, values, tips)
 
 
 @contextmanager

@@ -54,7 +54,7 @@ def trunk() -> Manipulator:
 def coarse() -> Iterator[None]:
     """Few pixels, since laws do not depend on their number, and PDF files without fonts."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("axes", "sheets", "style"):
+        for module in ("atlas", "axes", "style"):
             patch.setattr(f"softreach.plot.{module}.DPI", 60)
         patch.setitem(style._SAVING, "pdf.use14corefonts", True)
         yield

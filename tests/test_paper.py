@@ -19,7 +19,7 @@ from softreach.paper.reproduce import CLAIMS
 from softreach.paper.sections import uniqueness
 from softreach.paper.sections.misprints import printed_deltas
 from softreach.paper.sections.sweep import shapes
-from softreach.plot import axes, sheets, style
+from softreach.plot import atlas, axes, style
 from softreach.support.errors import InvalidInput
 
 TINY = replace(
@@ -40,7 +40,7 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduce, "QUICK", TINY)
-        for module in (style, axes, sheets):  # pictures are small
+        for module in (style, axes, atlas):  # pictures are small
             patch.setattr(module, "DPI", 60)
         assert run(["paper", "--out", str(out), "--quick"]) == 0
     return out

@@ -17,6 +17,7 @@ from softreach.plot import (
     plot_designs,
     plot_distance,
     plot_distance_histograms,
+    plot_opposite_sides,
     plot_redundancy,
     plot_slab,
     plot_slice,
@@ -24,8 +25,8 @@ from softreach.plot import (
     plot_volume_curve,
     save_figure,
 )
+from softreach.plot.atlas import evenly
 from softreach.plot.coloring import BundleKey, ScalarKey, color_samples
-from softreach.plot.sheets import evenly
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import activation_colors, bundle_color
 from tests.test_redundancy import made_up
@@ -219,6 +220,36 @@ class TestFigures:
         drawing = (tmp_path / "cloud.svg").read_text()
         assert "x / L</text>" in drawing
         assert drawing.count("<image") == 1
+
+
+LONG = "outer oblique left, after the second calibration"
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda arm, _: plot_arm(arm, view="oblique", unit="mm"),
+        lambda arm, _: plot_arm(arm, view="front", unit="mm"),
+        lambda arm, _: plot_designs([DesignPanel(LONG, arm), DesignPanel(LONG, arm)]),
+        lambda arm, _: plot_designs([DesignPanel("one", arm, "oblique")]),
+        lambda arm, cloud: plot_views(cloud, arm, unit="mm"),
+        lambda _, cloud: plot_opposite_sides(dict.fromkeys([LONG, "b", "c"], cloud), unit="mm"),
+    ],
+    ids=["oblique", "front", "names", "panel", "views", "sides"],
+)
+def test_no_label_is_cut_of_slim_arms_many_bundles_and_long_names(draw):
+    from matplotlib.text import Text
+
+    arm = designs.elephant_trunk()
+    figure = draw(arm, compute_cloud(arm, n=100)).get_figure(root=True)
+    figure.canvas.draw()
+    axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
+    ticks = {id(label) for axis in axes for label in axis.get_ticklabels()}
+    for text in figure.findobj(Text):
+        if text.get_text() and id(text) not in ticks:
+            low, high = text.get_window_extent().get_points()
+            assert (low >= -1).all(), text
+            assert (high <= figure.bbox.max + 1).all(), text
 
 
 # Laws of the pictures of designs: sectors where the bundles are, one scale, curves in L

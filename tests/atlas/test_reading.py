@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 from functools import partial
 from pathlib import Path
 
@@ -30,7 +31,7 @@ from softreach.cli import atlas as atlas_command
 from softreach.cli.app import run
 from softreach.picture.projection import view_axes
 from softreach.plot import plot_metric_map
-from softreach.plot.sheets import box_over_length, hull_over_length, panel_extent
+from softreach.plot.atlas import box_over_length, hull_over_length, panel_extent
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import (
     SMALL,
@@ -199,7 +200,7 @@ def some(tmp_path_factory) -> Path:
     place = tmp_path_factory.mktemp("some") / "a.zarr"
     asked = command(gapped_space(), **SMALL)
     store = AtlasStore.begin(place, asked)
-    begin_design(store, asked.metrics, 1)()
+    begin_design(store, 1)()
     store.write_status(3, "no luck")
     return place
 
@@ -252,6 +253,7 @@ def test_the_status_counts_every_design_once(some):
     assert counts == (4, 1, 1, 1, 1)
     assert status.messages[3] == "no luck"
     assert "leaves no tip" in status.messages[2]
+    assert re.search(r"^number 3 +no luck$", str(status), re.MULTILINE)
 
 
 def test_a_part_of_an_atlas_keeps_the_numbers_of_its_designs(some):
@@ -336,15 +338,6 @@ def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
     taper = float(best.taper[0])
     assert sr.Manipulator.load(design) == sr.designs.minimal_trunk(taper=taper)
     assert run(["atlas", "best", store, "volume", "--where", "volume>=9", "--out", "a.toml"]) == 2
-
-
-def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
-    store = AtlasStore.begin(tmp_path / "a.zarr", command(gapped_space(), **SMALL))
-    store.write_status(3, "no luck")
-    assert run(["atlas", "status", str(tmp_path / "a.zarr")]) == 0
-    said = capsys.readouterr().out
-    assert "number 3" in said
-    assert "no luck" in said
 
 
 # Atlases over numbers of parts, called by their paths in Python, files and commands alike

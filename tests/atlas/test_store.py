@@ -26,7 +26,7 @@ from softreach.atlas import (
 )
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.store import AtlasStore, Result
+from softreach.atlas.store import AtlasStore
 from softreach.rod import TipMap
 from softreach.support.errors import InvalidInput, SoftreachError, SoftreachWarning
 from tests.atlas.families import SMALL, TINY, assert_same, command, gapped_space, small_space
@@ -99,11 +99,10 @@ def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun,
     asked = command(gapped_space(), **TINY)
     sizes = asked.profile_sizes
     ones = {m.name: np.ones([sizes[dim] for dim in m.over]) for m in asked.metrics}
-    result = Result(ones, np.ones((10, 3)))
 
     def overtakes():
         other = AtlasStore.begin(place, command(gapped_space(), **TINY))
-        other.write(1, result)
+        other.write(1, ones, np.ones((10, 3)))
         other.write_status(3, "no luck")
 
     for write in range(0, begun.writes, 5):

@@ -131,8 +131,14 @@ def build_atlas(
     )
     if space.gaps:
         _warn_of_gaps(space)
-    atlas = AtlasStore.begin(store, command, durable=durable)
-    _run(atlas, _missing(atlas, np.arange(first, space.size, count)), executor, progress)
+    atlas, numbers = (
+        AtlasStore.begin(store, command, durable=durable),
+        range(first, space.size, count),
+    )
+    content = contents(atlas, tips_of=numbers)
+    content.warn_of_damage("; what is damaged is computed again")
+    ended = np.isin(content.status, (DONE, GAP, UNSTABLE))
+    _run(atlas, [k for k in numbers if not ended[k]], executor, progress)
     built = open_atlas(store)
     _warn_of_metrics(built)
     return built
@@ -144,15 +150,6 @@ def _shard_of(name: str, value: Any) -> tuple[int, int]:
         return pair
     shown = "/".join(map(str, pair)) if len(pair) == 2 else as_given(value)
     raise InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
-
-
-def _missing(atlas: AtlasStore, indices: np.ndarray) -> list[int]:
-    """Those of some designs that have not ended, or are damaged."""
-    content = contents(atlas, tips_of=indices.tolist())
-    if content.damage:
-        warn(f"{content.damage}; what is damaged is computed again")
-    ended = np.isin(content.status[indices], (DONE, GAP, UNSTABLE))
-    return indices[~ended].tolist()
 
 
 def _warn_of_gaps(space: DesignSpace) -> None:
@@ -185,10 +182,8 @@ def _run(
     with bar("computing designs", len(indices)) as shown:
 
         def on_outcome(outcome: tuple[int, str]) -> None:
-            index, failure = outcome
             with lock:
-                if failure:
-                    failures[index] = failure
+                failures.update([outcome] if outcome[1] else [])
                 (progress or shown)(1)
 
         run_designs(atlas, indices, executor, on_outcome)

@@ -18,6 +18,7 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
+from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -27,7 +28,7 @@ import numpy as np
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, Need
-from softreach.atlas.store import UNSTABLE, AtlasStore, Result
+from softreach.atlas.store import UNSTABLE, AtlasStore
 from softreach.rod.tip_map import no_equilibrium_message
 from softreach.support import parallel
 from softreach.support.arrays import Array
@@ -66,15 +67,14 @@ def run_designs(
         StoreFailed: The store cannot be written.
         NotPossible: A worker died, and with it the executor.
     """
-    metrics = store.command.metrics
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
-        begun = (begin_design(store, metrics, index) for index in indices)
+        begun = (begin_design(store, index) for index in indices)
         tasks = (partial(lambda task: on_outcome(task()), task) for task in begun)
         # Threads start with the second task: with one before all they get the first design at once.
         parallel.run(chain([lambda: None], tasks))
         return
-    for metric in metrics if isinstance(executor, ProcessPoolExecutor) else ():
+    for metric in store.command.metrics if isinstance(executor, ProcessPoolExecutor) else ():
         try:
             pickle.dumps(metric.compute)
         except Exception:
@@ -123,10 +123,9 @@ def _run_in_pool(
 
 
 class _Remote(NamedTuple):
-    """A store as it travels to a worker elsewhere, where designs are read and written.
+    """A store as it travels to a worker, with the functions of metrics, which are in no store.
 
-    The command travels along, as the functions of metrics are in no store; unpickling it imports
-    the modules that these and the kinds of the design's parts are in.
+    Unpickling it imports the modules that these and the kinds of the design's parts are in.
     """
 
     command: Command
@@ -139,7 +138,7 @@ class _Remote(NamedTuple):
 def _run_remotely(remote: _Remote, index: int) -> Outcome:
     """Compute and store a design in a worker; a repeated call gives the same result."""
     try:
-        return begin_design(_store_of(remote), remote.command.metrics, index)()
+        return begin_design(_store_of(remote), index)()
     except SoftreachError as error:
         raise StoreFailed(str(error)) from None  # this one can be sent back
 
@@ -156,55 +155,53 @@ def _store_of(remote: _Remote) -> AtlasStore:
                 where = "in the memory of another process"
                 raise NotPossible(f"the store is {where}; use a path or a URL")
         _opened.clear()
-        _opened[key] = AtlasStore.open(remote.location, durable=remote.durable)
+        store = AtlasStore.open(remote.location, durable=remote.durable)
+        _opened[key] = replace(store, command=remote.command)  # which has all functions
     return _opened[key]
 
 
 @no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
-def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Callable[[], Outcome]:
+def begin_design(store: AtlasStore, index: int) -> Callable[[], Outcome]:
     """Do the part of a design that uses all threads; return the rest as a function to call.
 
     All threads compute the tips of one design while the hulls of others are computed, one on each
     thread. A failure of the design is stored and returned, one of the store is raised.
     """
+    command = store.command
     try:
-        arm = store.command.space.design(index)
-        found = Intermediates(arm, store.cube, store.command, metrics)
-        threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
-        values = _values(store, threaded, found)  # none but NaN where nothing is stable
-        found.forget(Need.REACHABLE_SET)
+        needed = Intermediates(command.space.design(index), store.cube, command)
+        threaded = [metric for metric in command.metrics if Need.REACHABLE_SET in metric.needs]
+        values = _values(threaded, needed, command)  # none but NaN where nothing is stable
+        needed.forget(Need.REACHABLE_SET)
     except StoreFailed:
         raise
     except Exception as error:
         return partial(_fail, store, index, error)
-
-    @no_warnings()
-    def finish() -> Outcome:
-        try:
-            rest = [metric for metric in metrics if metric.name not in values]
-            result = Result(
-                values | _values(store, rest, found),
-                found.tips if store.command.keep_clouds else None,
-            )
-        except Exception as error:
-            return _fail(store, index, error)
-        if found.stable.any():
-            store.write(index, result)
-        else:
-            store.write(index, result, UNSTABLE, no_equilibrium_message(len(found.stable)))
-        return index, ""
-
-    return finish
+    return partial(_finish, store, index, needed, values)
 
 
-def _values(store: AtlasStore, metrics: Sequence[Metric], found: Intermediates) -> Values:
+@no_warnings()
+def _finish(store: AtlasStore, index: int, needed: Intermediates, values: Values) -> Outcome:
+    command, stable = store.command, needed.stable
+    try:
+        rest = [metric for metric in command.metrics if metric.name not in values]
+        values |= _values(rest, needed, command)
+        tips = needed.tips if command.keep_clouds else None
+    except Exception as error:
+        return _fail(store, index, error)
+    if stable.any():
+        store.write(index, values, tips)
+    else:
+        store.write(index, values, tips, UNSTABLE, no_equilibrium_message(len(stable)))
+    return index, ""
+
+
+def _values(metrics: Sequence[Metric], needed: Intermediates, command: Command) -> Values:
     """Metrics by name; where no sample is stable there is none but the share that is lost."""
-    sizes = store.command.profile_sizes
-    if found.stable.any():
-        return {metric.name: metric.value(found, sizes) for metric in metrics}
+    sizes, is_stable = command.profile_sizes, needed.stable.any()
     return {
-        metric.name: metric.value(found, sizes)
-        if metric.needs == (Need.LOST_SHARE,)
+        metric.name: metric.value(needed, sizes)
+        if is_stable or metric.needs == (Need.LOST_SHARE,)
         else np.full([sizes[dim] for dim in metric.over], np.nan)
         for metric in metrics
     }

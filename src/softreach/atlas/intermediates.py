@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -27,13 +27,14 @@ _SPACINGS = 1.6  # of samples that fill the box evenly, over L: radius of the al
 
 
 class Settings(NamedTuple):
-    """Settings for the metrics of a single design, as a `Command` has them for many."""
+    """What a `Command` says of the metrics of many designs, for a single one."""
 
     tol: float  # Error of tips over L
     accuracy: float  # Relative error of volumes of reachable sets
     alpha_over_length: float  # Radius of alpha shapes over L
     stations: tuple[float, ...] = (1.0,)  # Over L, where curvatures are taken
     quantiles: tuple[float, ...] = (0.5,)  # Of these
+    metrics: tuple[Metric, ...] = ()  # That will be computed
 
 
 class Intermediates:
@@ -42,8 +43,7 @@ class Intermediates:
     Args:
         arm: The design.
         cube: Unit activations that all designs share, shape (n, bundles).
-        command: Radius, accuracy, tolerance, stations and quantiles.
-        metrics: The metrics that will be computed.
+        command: Metrics, radius, accuracy, tolerance, stations and quantiles.
         sets: Source of the reachable set, if it is known elsewhere.
     """
 
@@ -52,11 +52,9 @@ class Intermediates:
         arm: Manipulator,
         cube: Array,
         command: Command | Settings,
-        metrics: Sequence[Metric] = (),
         sets: Callable[[], Any] | None = None,
     ) -> None:
         self.arm, self.cube, self.command, self.known_set = arm, cube, command, sets
-        self.needs = frozenset(need for metric in metrics for need in metric.needs)
         self._cache: dict[Need, Any] = {}
 
     @classmethod
@@ -66,7 +64,7 @@ class Intermediates:
         """Of one design, with a radius of alpha shapes that its samples, a power of 2, allow."""
         cube = sample_cube("sobol", samples, max(arm.inputs, 1))
         alpha = _SPACINGS / float(np.cbrt(samples))
-        return cls(arm, cube, Settings(_TOL, accuracy, alpha), sets=sets)
+        return cls(arm, cube, Settings(_TOL, accuracy, alpha), sets)
 
     @cached_property
     def rod(self) -> TipMap:
@@ -95,7 +93,7 @@ class Intermediates:
         return self._cache[need]
 
     def forget(self, need: Need) -> None:
-        """Free the memory of a result that is no longer needed."""
+        """Free memory."""
         self._cache.pop(need, None)
 
 
@@ -111,7 +109,7 @@ def _stable(of: Intermediates, values: Array) -> Array:
 
 def _convex_volume(of: Intermediates) -> float:
     """From the triangulation, if one is needed anyway."""
-    if Need.ALPHA_COMPLEX in of.needs:
+    if any(Need.ALPHA_COMPLEX in metric.needs for metric in of.command.metrics):
         return float(of[Need.ALPHA_COMPLEX].volumes.sum())
     return convex_hull(of[Need.TIPS]).volume
 

@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
-from softreach.atlas.layout import MESSAGE, PER_DESIGN, STATUS
+from softreach.atlas.layout import MESSAGE, OF, PER_DESIGN, STATUS
 from softreach.atlas.metric import Metric, Need
-from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, OF, UNSTABLE, AtlasStore
+from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, UNSTABLE, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, stored_names, with_status
 from softreach.support.arguments import (
@@ -255,8 +255,7 @@ def best_designs(
     return stacked.isel(rank=order[allowed[order]][:count])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Contents:
+class Contents(NamedTuple):
     """Contents of an atlas but its tips, each chunk checked."""
 
     status: NDArray[np.uint8]
@@ -266,30 +265,19 @@ class Contents:
     tables: dict[str, Any]
     """Arrays `metrics` and `curvature`; fill values where they are damaged."""
 
-    @property
-    def damage(self) -> str:
-        """Number of damaged designs, and the first of them; empty if none is."""
-        damaged = np.flatnonzero(self.status == DAMAGED).tolist()
-        if not damaged:
-            return ""
-        verb = "is" if len(damaged) == 1 else "are"
-        first = damaged[0]
-        return (
-            f"{counted(len(damaged), 'design')} {verb} damaged, "
-            f"first number {first}: {self.messages[first]}"
-        )
+    def warn_of_damage(self, then: str) -> None:
+        """Say how many designs are damaged, and what is wrong with the first of them."""
+        if damaged := np.flatnonzero(self.status == DAMAGED).tolist():
+            what = (
+                f"{counted(len(damaged), 'design')} {'is' if len(damaged) == 1 else 'are'} damaged"
+            )
+            warn(f"{what}, first number {damaged[0]}: {self.messages[damaged[0]]}{then}")
 
 
 def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] = ()) -> Contents:
-    """Read and check what an atlas holds of its designs.
+    """Read and check what an atlas holds of its designs; it misses their chunks from now on.
 
-    Args:
-        store: The atlas; from now on it misses the chunks that its designs must have.
-        metrics: Whether to read the metrics; without, only the status and messages are checked.
-        tips_of: Numbers of designs whose tips are checked too; these are read but not kept.
-
-    Raises:
-        DamagedStore: What describes an array is damaged, so that no design can be read.
+    Without `metrics` only the status and messages are checked; tips are read, but not kept.
     """
     damaged: dict[int, str] = {}
 
@@ -321,18 +309,14 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     for index in tips_of if command.keep_clouds else ():
         if known[index]:
             read("tip", place_of(index))
-    explained_ones = np.flatnonzero(explained).tolist()
-    texts = {index: str(read("message", place_of(index)).item()) for index in explained_ones}
+    numbers = np.flatnonzero(explained).tolist()
+    texts = {index: str(read("message", place_of(index)).item()) for index in numbers}
     status[[*damaged]] = DAMAGED
-    return Contents(status=status, messages=dict(sorted((texts | damaged).items())), tables=tables)
+    return Contents(status, dict(sorted((texts | damaged).items())), tables)
 
 
 def a_store(name: str, value: Any, allowed: str = "a path, a URL or a Zarr store") -> Any:
-    """A place where an atlas may be.
-
-    Raises:
-        InvalidInput: Neither text nor a path nor a Zarr store.
-    """
+    """A place where an atlas may be."""
     from zarr.abc.store import Store
     from zarr.storage import StorePath
 
@@ -344,15 +328,7 @@ def a_store(name: str, value: Any, allowed: str = "a path, a URL or a Zarr store
 
 
 def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
-    """The dataset that a question about an atlas is asked of.
-
-    Args:
-        atlas: A store, which is opened, or a dataset from `open_atlas` or a part of one.
-        metrics: Whether the metrics are asked for; reading all of a large store takes time.
-
-    Raises:
-        InvalidInput: Another dataset, anything else, or no atlas.
-    """
+    """The dataset that answers questions; reading all metrics of a large store takes time."""
     import xarray as xr
 
     allowed = "a store, or a dataset from open_atlas"
@@ -421,9 +397,8 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
 
     store = AtlasStore.open(location, "r")
     content, space = contents(store, metrics=metrics), store.command.space
-    if content.damage:
-        then = "left out; the command that built the atlas computes again what is damaged"
-        warn(f"{content.damage} ({then})")
+    then = "left out; the command that built the atlas computes again what is damaged"
+    content.warn_of_damage(f" ({then})")
     with storage_errors(f"{store.location} cannot be read"):
         raw = xr.open_zarr(store.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates: dict[str, Any] = {
@@ -452,13 +427,11 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
         "message": (dims, texts.reshape(shape), MESSAGE),
     }
     done = np.isin(content.status, KNOWN).reshape(shape)
-    if (table := content.tables.get("metrics")) is not None:
-        for k, metric in enumerate(command.numbers):
-            values = np.where(done, table[..., k], np.nan)
-            variables[metric.name] = dims, values, _attributes(command, metric)
-    if (table := content.tables.get("curvature")) is not None:
-        for k, metric in enumerate(command.profiles):
-            values = np.where(done[..., None, None], table[..., k, :, :], np.nan)
+    for name, metrics in (("metrics", command.numbers), ("curvature", command.profiles)):
+        for k, metric in enumerate(metrics if name in content.tables else ()):
+            table = np.moveaxis(content.tables[name], len(dims), 0)[k]
+            known = np.expand_dims(done, (*range(done.ndim, table.ndim),))
+            values = np.where(known, table, np.nan)
             variables[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
     return variables
 

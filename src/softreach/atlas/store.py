@@ -18,13 +18,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.atlas.command import Command
-from softreach.atlas.layout import CUBE, MISSING, PER_DESIGN, Plan, array_plans
+from softreach.atlas.layout import CUBE, MISSING, OF, PER_DESIGN, array_plans
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, warn
@@ -49,7 +49,6 @@ from softreach.support.files.stores import (
 )
 
 if TYPE_CHECKING:
-    from zarr import Group
     from zarr.storage import StoreLike, StorePath
 
 
@@ -57,16 +56,6 @@ TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
 KNOWN = (DONE, UNSTABLE)  # The status of designs of which metrics are stored
 
 CUBE_DIGEST = "unit_activation_sha256"  # Attribute of the root: digest of the activations
-
-OF = "command_sha256"  # Attribute of each array: digest of the command
-
-
-class Result(NamedTuple):
-    """Stored result of one design."""
-
-    metrics: Mapping[str, ArrayLike]  # Every metric of the command by name
-    tips: Array | None
-    """Tips [m], shape (n, 3), NaN without equilibrium; None if clouds are not kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +71,7 @@ class AtlasStore:
     def begin(cls, location: StoreLike, command: Command, *, durable: bool = False) -> Self:
         """Create the store, or open one that the same command began, and mend what is damaged.
 
-        Args:
-            location: Where it is.
-            command: What it holds.
-            durable: Whether a power cut may lose nothing that was written.
+        Where it is durable, a power cut loses nothing that was written.
 
         Raises:
             InvalidInput: The place holds something else, or an atlas of another command, and how
@@ -94,22 +80,21 @@ class AtlasStore:
             StoreFailed: It cannot be written to.
         """
         location = absolute(location)
+        opened = None
         with writing(location):
-            try:
+            with suppress(DamagedStore):
                 opened = opened_store(location, "atlas", "r+", durable=durable)
-            except DamagedStore:
-                opened = None
             if opened is None:
                 _write_root(location, command, durable)
                 opened = opened_store(location, "atlas", "r+", durable=durable)
-        stored = _command_of(opened, location, "a new folder, or an atlas; it holds something else")
+        allowed = "a new folder, or an atlas; it holds something else"
+        opened, stored = _with_command(opened, location, allowed)
         if (begun := stored.softreach_version) != (now := command.softreach_version):
             command = command.continuing(stored)
             warn(f"{location} was begun by softreach {begun}, and goes on with {now}")
         if differences := command.differences(stored):
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
-        assert opened is not None
         store = cls(location, command, opened)  # this command has all functions
         with writing(location), opened.watch.noting():  # what is damaged counts as missing
             _complete(store)
@@ -128,22 +113,18 @@ class AtlasStore:
         location = absolute(location)
         opened = opened_store(location, "atlas", mode, durable=durable)
         why = f"it does not exist, or has no {ROOT}" if opened is None else "this is no atlas"
-        command = _command_of(opened, location, f"an atlas written by build_atlas; {why}")
-        assert opened is not None
+        allowed = f"an atlas written by build_atlas; {why}"
+        opened, command = _with_command(opened, location, allowed)
         opened.check_arrays()
         return cls(location, command, opened)
 
     @property
     def watch(self) -> Watch:
-        """Watch over damage that is found."""
+        """What notices damage."""
         return self.opened.watch
 
     def array(self, name: str) -> Any:
-        """One of the arrays, which writes also chunks that are empty.
-
-        Raises:
-            DamagedStore: It is missing, or what describes it is damaged.
-        """
+        """One of the arrays, which writes also chunks that are empty."""
         if name not in self._arrays:
             # No message is no chunk; all else is written, so that what is missing is damaged.
             config: Any = {"write_empty_chunks": name != "message"}
@@ -164,43 +145,39 @@ class AtlasStore:
         return int(np.ravel_multi_index((chunk.place or ())[: len(shape)], shape))
 
     def message(self, index: int) -> str:
-        """Message of a design that has no numbers; empty if there is no reason."""
+        """Why a design has no numbers; empty if there is no reason."""
         return str(np.asarray(self.array("message")[self.command.space.place(index)]).item())
 
     @cached_property
     def cube(self) -> Array:
-        """Unit activations that all designs share, shape (n, bundles).
-
-        Raises:
-            DamagedStore: They are not what they were when the store was created.
-        """
+        """Unit activations that all designs share, shape (n, bundles)."""
         with storage_errors(f"{self.location} cannot be read"):
             return np.asarray(self.array(CUBE)[...])
 
-    def write(self, index: int, result: Result, status: int = DONE, message: str = "") -> None:
-        """Store a design; its status comes last.
+    def write(
+        self,
+        index: int,
+        metrics: Mapping[str, ArrayLike],
+        tips: Array | None,
+        status: int = DONE,
+        message: str = "",
+    ) -> None:
+        """Store metrics by name and tips [m], shape (n, 3), of a design; its status comes last.
 
-        Raises:
-            StoreFailed: It cannot be written.
+        Tips are NaN without equilibrium, and None if clouds are not kept.
         """
-        place = self.command.space.place(index)
-        numbers = [result.metrics[metric.name] for metric in self.command.numbers]
-        profiles = [result.metrics[metric.name] for metric in self.command.profiles]
+        place, command = self.command.space.place(index), self.command
         with writing(self.location):
-            self.array("metrics")[place] = np.array(numbers, float)
-            if profiles:
-                self.array("curvature")[place] = np.array(profiles, float)
-            if result.tips is not None:
+            self.array("metrics")[place] = np.array([metrics[m.name] for m in command.numbers])
+            if command.profiles:
+                self.array("curvature")[place] = [metrics[m.name] for m in command.profiles]
+            if tips is not None:
                 tip = self.array("tip")
-                tip[place] = fixed_point(result.tips, float(str(tip.attrs["scale_factor"])))
+                tip[place] = fixed_point(tips, float(str(tip.attrs["scale_factor"])))
             self.write_status(index, message, status)
 
     def write_status(self, index: int, message: str, status: int = FAILED) -> None:
-        """Store how a design ended, and why.
-
-        Raises:
-            StoreFailed: It cannot be written.
-        """
+        """Store how a design ended, and why."""
         place = self.command.space.place(index)
         with writing(self.location):
             self.array("message")[place] = np.array(message, dtype=np.dtypes.StringDType())
@@ -213,13 +190,15 @@ def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     return np.where(np.isnan(steps), MISSING, steps).astype(np.int32)
 
 
-def _command_of(opened: Opened | None, location: StoreLike, allowed: str) -> Command:
-    """Command of a store, of which what all designs share must be there from now on."""
+def _with_command(
+    opened: Opened | None, location: StoreLike, allowed: str
+) -> tuple[Opened, Command]:
+    """A store and its command; what all designs share must be there from now on."""
     text = None if opened is None else opened.group.attrs.get("command")
     if opened is None or not isinstance(text, str):
         raise InvalidInput("store", location, allowed)
     opened.watch.required = lambda chunk: chunk.array not in PER_DESIGN
-    return Command.from_json(text)
+    return opened, Command.from_json(text)
 
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
@@ -271,7 +250,7 @@ def _attributes(command: Command) -> dict[str, Any]:
     group = zarr.create_group(MemoryStore(memory), zarr_format=3)
     plans = list(array_plans(command))
     for plan in plans:
-        _described(group, plan, command)
+        group.create_array(plan.name, **plan.options)
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
     return {
         "title": "reachability cloud atlas",
@@ -296,7 +275,7 @@ def _complete(store: AtlasStore) -> None:
         if there and not noted:
             continue
         with suppress(ContainsArrayError):  # begun by another task, or only its values are lost
-            _described(store.opened.group, plan, store.command)
+            store.opened.group.create_array(plan.name, **plan.options)
         data = plan.data
         if plan.name == CUBE:
             data, drawn = drawn_cube(store.command)
@@ -310,19 +289,6 @@ def _complete(store: AtlasStore) -> None:
     for index, reason in gaps.items():
         if status[index] != GAP or store.message(index) != reason:
             store.write_status(index, reason, GAP)
-
-
-def _described(group: Group, plan: Plan, command: Command) -> None:
-    group.create_array(
-        plan.name,
-        shape=plan.shape,
-        dtype=plan.dtype,
-        chunks=plan.chunks,
-        fill_value=plan.fill,
-        compressors=plan.compressors(),
-        dimension_names=plan.dims,
-        attributes=plan.attrs | {OF: sha256(command.to_json().encode())},
-    )
 
 
 def drawn_cube(command: Command) -> tuple[Array, str]:

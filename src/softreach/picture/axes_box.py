@@ -65,7 +65,9 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
     visible = tuple(((place > high).astype(int) - (place < low)).tolist())
     toward = place - (low + high) / 2
     toward /= max(float(np.linalg.norm(toward)), 1e-12)
-    picture = _picture(toward)
+    right = np.array([-toward[1], toward[0], 0.0])
+    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
+    picture = np.stack([right, np.cross(toward, right)])  # right and up, shape (2, 3)
     edges = [_outer_edge(axis, visible, toward, picture) for axis in range(3)]
     usual = _round_step(float((high - low).max()))
     steps, names = [usual] * 3, [_NAME_AT] * 3
@@ -91,19 +93,8 @@ def _seen(ends: Array, toward: Array, picture: Array) -> Array:
 
 
 def _room(seen: Array, focal: float, apart: tuple[float, float]) -> float:
-    """The least step, in units of a length, of texts that touch neither beside nor above.
-
-    That length leads so far to the right and up in focal lengths [pixel], shape (2,); texts are so
-    many pixels apart, beside or above each other.
-    """
+    """The least step of texts some pixels apart, in units of a length seen in focal lengths."""
     return float((np.array(apart) / ((seen + 1e-9) * focal)).min())
-
-
-def _picture(toward: Array) -> Array:
-    """Right and up of a camera in a direction, shape (2, 3)."""
-    right = np.array([-toward[1], toward[0], 0.0])
-    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
-    return np.stack([right, np.cross(toward, right)])
 
 
 def _outer_edge(axis: int, visible: tuple[int, ...], toward: Array, picture: Array) -> Edge | None:
@@ -172,14 +163,12 @@ def _round_step(span: float) -> float:
 
 def _edges(low: Array, high: Array, side: Side) -> list[Array]:
     """The edges, shape (2, 3) each, but those between two faces that the camera sees."""
-    edges = []
+    corners, edges = np.stack([low, high]), []
     for axis in range(3):
         others = [k for k in range(3) if k != axis]
         for pick in np.ndindex(2, 2):
-            if all(2 * p - 1 == side.visible[k] for k, p in zip(others, pick, strict=True)):
-                continue
-            ends = np.stack([low, high])
-            for k, p in zip(others, pick, strict=True):
-                ends[:, k] = high[k] if p else low[k]
-            edges.append(ends)
+            if tuple(2 * p - 1 for p in pick) != tuple(side.visible[k] for k in others):
+                ends = corners.copy()
+                ends[:, others] = corners[pick, others]
+                edges.append(ends)
     return edges

@@ -81,8 +81,8 @@ class Figure3D:
         return f'<iframe srcdoc="{page}" style="{style}" title="softreach"></iframe>'
 
     def __repr__(self) -> str:
-        size = f"{len(self.html) / 1e6:.1f} MB"
-        return f"Figure3D: {self.note}, {size}" if self.note else f"Figure3D: {size}"
+        note = f"{self.note}, " if self.note else ""
+        return f"Figure3D: {note}{len(self.html) / 1e6:.1f} MB"
 
 
 def web_page(

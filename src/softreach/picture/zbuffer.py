@@ -74,7 +74,12 @@ class ZBuffer:
         for start in range(0, len(points), _BLOCK):
             block = slice(start, start + _BLOCK)
             seen = points[block] if view is None else project(points[block], view)
-            self._splat(layer, seen, colors[block])
+            pixels = self._to_pixels(seen)
+            inside = ((pixels >= 0) & (pixels < layer.shape[::-1])).all(axis=1)
+            inside &= np.isfinite(seen[:, 2])
+            column, row = pixels[inside].astype(np.int64).T
+            keys = _keys(seen[inside, 2], colors[block][inside])
+            np.maximum.at(layer.reshape(-1), row * layer.shape[1] + column, keys)
         np.maximum(self._keys, _grown(layer, size * self.oversample), out=self._keys)
 
     def draw_triangles(self, corners: ArrayLike, colors: ArrayLike) -> None:
@@ -94,10 +99,14 @@ class ZBuffer:
     def rgba(self) -> NDArray[np.uint8]:
         """The image from top to bottom, shape (rows, columns, 4); transparent where nothing is."""
         image = np.zeros((*self.shape, 4), np.uint8)
-        rows, columns = _extent_of_content(self._keys, self.oversample)
         by = self.oversample
-        keys = self._keys[by * rows.start : by * rows.stop, by * columns.start : by * columns.stop]
-        image[rows, columns] = _rounded(_averaged(keys, by), self.color_step)
+        rows = _filled(self._keys, 1, by)
+        keys = self._keys[by * rows.start : by * rows.stop]
+        columns = _filled(keys, 0, by)
+        keys = keys[:, by * columns.start : by * columns.stop]
+        mean, step = _averaged(keys, by), self.color_step
+        levels = np.minimum(255, np.rint(np.arange(256) / step) * step).astype(np.uint8)
+        image[rows, columns] = np.concatenate([levels[mean[..., :3]], mean[..., 3:]], axis=-1)
         return image
 
     def _to_pixels(self, points: Array) -> Array:
@@ -106,16 +115,6 @@ class ZBuffer:
         column = (points[..., 0] - self.extent.left) * (columns / width)
         row = (self.extent.top - points[..., 1]) * (rows / height)
         return np.stack([column, row], axis=-1)
-
-    def _splat(self, layer: Keys, points: Array, colors: NDArray[np.uint8]) -> None:
-        pixels = self._to_pixels(points)
-        rows, columns = self._keys.shape
-        across, down = pixels.T
-        inside = (across >= 0) & (across < columns) & (down >= 0) & (down < rows)
-        inside &= np.isfinite(points[:, 2])
-        column, row = pixels[inside].astype(np.int64).T
-        keys = _keys(points[inside, 2], colors[inside])
-        np.maximum.at(layer.reshape(-1), row * layer.shape[1] + column, keys)
 
 
 def _keys(depth: Array, colors: NDArray[np.uint8]) -> Keys:
@@ -154,19 +153,9 @@ def _raise(target: Keys, source: Keys, shift: int) -> None:
     np.maximum(target[:stop], source[shift:], out=target[:stop])
 
 
-def _rounded(rgba: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
-    levels = np.minimum(255, np.rint(np.arange(256) / step) * step).astype(np.uint8)
-    return np.concatenate([levels[rgba[..., :3]], rgba[..., 3:]], axis=-1)
-
-
-def _extent_of_content(keys: Keys, by: int) -> tuple[slice, slice]:
-    """Rows and columns, in blocks of pixels, outside of which nothing is drawn."""
-    rows = _range_of(keys.max(axis=1, initial=0) > 0, by)
-    return rows, _range_of(keys[by * rows.start : by * rows.stop].max(axis=0, initial=0) > 0, by)
-
-
-def _range_of(some: NDArray[np.bool_], by: int) -> slice:
-    indices = np.flatnonzero(some)
+def _filled(keys: Keys, axis: int, by: int) -> slice:
+    """Rows (axis 1) or columns (axis 0), in blocks of pixels, outside of which nothing is drawn."""
+    indices = np.flatnonzero(keys.max(axis=axis, initial=0))
     return slice(indices[0] // by, indices[-1] // by + 1) if len(indices) else slice(0, 0)
 
 

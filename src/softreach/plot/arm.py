@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
-from softreach.picture.projection import View
+from softreach.picture.projection import View, plane_of
 from softreach.picture.shading import draw_mesh, faces_to_eye
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.axes import Panel, bounding_box
@@ -42,6 +43,8 @@ _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
 _CHECKED = 0.35  # and those of arms at their targets
+_LEAST, _LEAST_OBLIQUE = 1.5, 2.2  # widths of a panel, and of a figure seen obliquely [inch]
+_LETTERS = 14  # of titles an inch
 _POSES = 5  # of places that are apart
 _REGIONS = {
     "stay_inside": {"color": (0.25, 0.35, 0.60), "linestyle": "-", "label": "stay inside"},
@@ -191,7 +194,9 @@ def plot_designs(
     for k, panel in enumerate(panels):
         as_instance(f"panels[{k}]", panel, DesignPanel, "a DesignPanel")
     stations = as_stations("stations_over_length", stations_over_length).tolist()
-    width = 1.5 * len(panels) if width is None else as_number("width", width, WIDTH)
+    least = _LEAST if all(plane_of(p.view) for p in panels) else _LEAST_OBLIQUE
+    usual = max(_LEAST * len(panels), least)
+    width = usual if width is None else as_number("width", width, WIDTH)
     box = bounding_box(
         *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
     )
@@ -207,7 +212,7 @@ def plot_designs(
             arm, length = panel.arm, panel.arm.length
             drawn, shown = panel.bundles, length * box
             plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown, unit=unit)
-            axes[0, k].set_title(panel.title)
+            axes[0, k].set_title(fill(panel.title, round(_LETTERS * width / len(panels))))
             for ax, station in zip(axes[1:, k], stations, strict=True):
                 z, half = station * length, reach * length
                 shared = {"bundles": drawn, "half_width": half, "legend": False, "unit": unit}

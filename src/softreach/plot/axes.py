@@ -37,7 +37,9 @@ _MARGIN = 0.04
 _OVER = 4  # the order of lines over images
 _ROOM = np.array([2.8, 3.2])  # inches for the image
 _AROUND = np.array([0.6, 0.7])  # inches for labels and key
+_LEAST = {True: 1.6, False: 2.5}  # inches for a view along an axis or a box in space, labeled
 _TICK_ROOM = 0.42  # inches between ticks at least
+_BOX_TICK_ROOM = 0.17  # and along the edges of a box in space
 _UNIT_MARK = "_counted in "  # the label of an image, which no legend shows
 
 
@@ -49,7 +51,7 @@ def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
     from matplotlib.collections import LineCollection
 
     edges = [_outer_edge(box, view, axis) for axis in range(3)]
-    ticks = _ticks(box, [project(edge, view)[:, :2] for edge in edges])
+    ticks = _ticks(ax, box, view, edges)
     camera = view_axes(view)[2]
     far, lines = np.where(camera > 0, box[0], box[1]), []
     for along, across in permutations(range(3), 2):
@@ -89,7 +91,8 @@ class Panel:
             shown = bounding_box(points) if box is None else unit.of(as_box("box", box))
             if ax is None:
                 span = view_extent(shown, view).size
-                ax = small_axes(*(span * (_ROOM / span).min() + _AROUND))
+                width, height = span * (_ROOM / span).min() + _AROUND
+                ax = small_axes(max(width, _LEAST[plane_of(view) is not None]), height)
             yield cls(ax, shown, view, unit)
 
     @property
@@ -176,12 +179,14 @@ def view_extent(box: Array, view: View) -> Extent:
     return Extent(low[0], high[0], low[1], high[1])
 
 
-def _ticks(box: Array, edges: list[Array]) -> list[Array]:
+def _ticks(ax: Axes, box: Array, view: View, edges: list[Array]) -> list[Array]:
     """Round numbers along each axis, as many as its edge has room for on paper."""
-    lengths = np.array([np.linalg.norm(edge[1] - edge[0]) for edge in edges])
-    counts = np.maximum(2, np.rint(6 * lengths / lengths.max())).astype(int)
-    ticks = []
-    for (low, high), count in zip(box.T, counts.tolist(), strict=True):
+    extent, ticks = view_extent(box, view), []
+    shown = [project(edge, view)[:, :2] for edge in edges]
+    lengths = np.array([np.linalg.norm(edge[1] - edge[0]) for edge in shown])
+    inches = lengths * (_inches(ax, extent) / extent.size).min()
+    counts = np.minimum(np.rint(6 * lengths / lengths.max()), inches // _BOX_TICK_ROOM)
+    for (low, high), count in zip(box.T, np.maximum(2, counts).astype(int).tolist(), strict=True):
         values = np.asarray(_round_numbers(count).tick_values(low, high))
         ticks.append(values[(values >= low) & (values <= high)])
     return ticks

@@ -1,26 +1,43 @@
-"""Pictures of a reachability cloud: whole, in a slab, and in four views."""
+"""Pictures of reachability clouds: whole, in a slab, in four views, from opposite sides."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.picture.projection import View, sight_axis
+from softreach.cloud.clouds import design_of
+from softreach.picture.projection import View, sight_axis, view_angles
 from softreach.picture.zbuffer import ZBuffer
-from softreach.plot.arm import arm_images, arm_points, draw_markers, shapes_of
+from softreach.plot.arm import arm_images, arm_points, draw_markers, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.coloring import color_samples, draw_figure_key, draw_key
+from softreach.plot.coloring import (
+    bundle_names,
+    color_samples,
+    draw_figure_key,
+    draw_key,
+    key_height,
+)
 from softreach.plot.lengths import Unit, common_unit, unit_for, unit_of
-from softreach.plot.style import LENGTH, PAGE, PLACE, SIZE, figure_style, place_panels, write_note
+from softreach.plot.style import (
+    LENGTH,
+    PAGE,
+    PLACE,
+    SIZE,
+    as_box,
+    figure_style,
+    place_panels,
+    write_note,
+)
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
-from softreach.support.arguments import as_flag, as_number
+from softreach.support.arguments import as_flag, as_mapping, as_number
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.units import LengthUnit
@@ -37,7 +54,9 @@ Images = tuple[ZBuffer, ZBuffer | None]
 """An image, and what shows through it."""
 
 _VIEWS = ("front", "side", "top", "oblique")
-_AROUND, _GAP = (0.55, 0.12, 0.42, 0.42), 0.60  # left, right, bottom and top of four views [inch]
+_BESIDE = {True: (0.55, 0.12), False: (0.60, 0.22)}  # left and right of four views, in L or not
+_ROOM, _GAP = 0.42, 0.60  # below them and for their key at least, and between them [inch]
+_LETTERS = 90  # of titles side by side
 _LOWER = 0.126  # of the oblique view, whose numbers stand outside of its box [inch]
 
 
@@ -77,8 +96,7 @@ def plot_cloud(
     tips, coloring = drawn_tips(cloud, counted), color_samples(cloud, color)
     with Panel.opened(tips, counted, ax, view, box) as panel:
         panel.show(cloud_image(panel, tips, coloring.rgb, size))
-        if key:
-            draw_key(panel.ax, coloring.key)
+        draw_key(panel.ax, coloring.key if key else None)
     return panel.ax
 
 
@@ -160,8 +178,7 @@ def plot_slab(
         panel.show(cloud_image(panel, tips[inside], coloring.rgb[inside], size or spacing))
         distance = f"{axis} - {middle:.3g} {counted.name}" if middle else axis
         write_note(panel.ax, f"|{distance}| ≤ {half:.3g} {counted.name}", 0.03, 0.02)
-        if key:
-            draw_key(panel.ax, coloring.key)
+        draw_key(panel.ax, coloring.key if key else None)
     return panel.ax
 
 
@@ -206,7 +223,9 @@ def plot_views(
     coloring = color_samples(cloud, color)
     with figure_style():
         x, y, z = np.ptp(box, axis=0)
-        figure, axes = place_panels(PAGE, (x, y), (z, y), _AROUND, (_GAP, _GAP))
+        room = max(_ROOM, key_height(coloring.key))
+        around = (*_BESIDE[counted.relative], _ROOM, room)
+        figure, axes = place_panels(PAGE, (x, y), (z, y), around, (_GAP, _GAP))
         low, height = axes[1, 1].get_position(), figure.get_size_inches()[1]
         axes[1, 1].set_position(low.translated(0.0, -_LOWER / height))
         pairs = zip(axes.ravel().tolist(), _VIEWS, strict=True)
@@ -223,5 +242,56 @@ def plot_views(
                 panel.show(image, within)
             if arm is not None:
                 draw_markers(panel, arm, shapes, 0.0)
-        draw_figure_key(figure, coloring.key, _AROUND[3] / height)
+        draw_figure_key(figure, coloring.key, room)
+    return figure
+
+
+def plot_opposite_sides(
+    clouds: Mapping[str, xr.Dataset],
+    *,
+    view: View = "oblique",
+    box_over_length: ArrayLike | None = None,
+    unit: Unit = None,
+) -> Figure:
+    """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
+
+    Args:
+        clouds: Clouds by the title of their column; each says which arm it belongs to.
+        view: Of the upper row, as in `plot_cloud`; the lower row is opposite.
+        box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3); None
+            for all points.
+        unit: Of the axes, as in `plot_cloud`.
+
+    Raises:
+        InvalidInput: No clouds, clouds of different bundles, an unknown view, or no finite tip.
+        MissingExtra: matplotlib is not installed.
+    """
+    clouds = as_mapping("clouds", clouds, a_cloud)
+    around = None if box_over_length is None else as_box("box_over_length", box_over_length)
+    bundles = {bundle_names(cloud) for cloud in clouds.values()}
+    if len(bundles) != 1:
+        raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
+    azimuth, elevation = view_angles(view)
+    sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
+    if around is None:
+        tips = (drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values())
+        around = bounding_box(*tips)
+    first = next(iter(clouds.values()))
+    key, relative = color_samples(first, "rgb").key, unit_of(first["tip"], unit).relative
+    room, columns = max(_ROOM, key_height(key)), [1.0] * len(clouds)
+    beside, right = (0.58, 0.26) if relative else (0.75, 0.48)
+    titles = [f"({k + 1})  {title}" for k, title in enumerate(clouds)]
+    titles = [fill(title, round(_LETTERS / len(clouds))) for title in titles]
+    top = room + 0.16 * max(1 + title.count("\n") for title in titles)
+    with figure_style():
+        edges = (beside + 0.07, right, 0.45, top)
+        figure, panels = place_panels(PAGE, columns, [1.1, 1.1], edges, (beside, 0.45))
+        for k, cloud in enumerate(clouds.values()):
+            arm = design_of(cloud)
+            box = np.asarray(around) * arm.length
+            panels[0, k].set_title(titles[k], pad=4)
+            for ax, side in zip(panels[:, k], sides, strict=True):
+                plot_cloud(cloud, ax=ax, view=side, color="rgb", key=False, box=box, unit=unit)
+                plot_arm(arm, ax=ax, view=side, box=box, unit=unit)
+        draw_figure_key(figure, key, room)
     return figure

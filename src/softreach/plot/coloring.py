@@ -24,6 +24,7 @@ _MISSING = 204  # light gray
 UNSTABLE = (255, 0, 200)
 """Magenta, RGB from 0 to 255, of unstable equilibria: no scale of colors has it."""
 _LINE, _PAGE = 44, 100  # characters above axes of a column's width, and above a figure
+_AROUND, _ROW = 0.1, 0.15  # heights around the rows of a legend, and of each [inch]
 _MIXED = 3  # bundles whose lights can be told apart in a mixture
 POWERS = str.maketrans("23", "²³")
 _WIDE = 8.0  # ratio of the largest to the smallest value from which ratios are shown
@@ -69,11 +70,14 @@ class ScalarKey(NamedTuple):
         return "both" if self.clipped else "neither"
 
 
+Key = BundleKey | ScalarKey
+
+
 class Coloring(NamedTuple):
     """RGB of every sample, shape (sample, 3), and what it means."""
 
     rgb: NDArray[np.uint8]
-    key: BundleKey | ScalarKey | None
+    key: Key | None
 
 
 def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None) -> Coloring:
@@ -170,7 +174,7 @@ def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
     return tuple(map(str, activation[bundle].values if named else range(1, count + 1)))
 
 
-def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
+def draw_key(ax: Axes, key: Key | None) -> None:
     """Explain the colors in axes, by a legend above them or a color bar beside them."""
     if isinstance(key, ScalarKey):
         bar = {"label": key.label, "fraction": 0.046, "pad": 0.03, "extend": key.extend}
@@ -178,8 +182,9 @@ def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
     _draw_legend(ax, key, _LINE, 2)
 
 
-def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: float) -> None:
-    """Explain the colors once for a figure, in the room at its upper edge of a share `top`."""
+def draw_figure_key(figure: Figure, key: Key | None, room: float) -> None:
+    """Explain the colors once for a figure, in the room [inch] at its upper edge."""
+    top = room / figure.get_size_inches()[1]
     place = (0.5, 1 - top / 2)
     if isinstance(key, ScalarKey):
         place = (0.88, 1 - 0.4 * top)
@@ -189,22 +194,33 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
     _draw_legend(figure, key, _PAGE, 4, loc="center", bbox_to_anchor=place)
 
 
+def key_height(key: Key | None) -> float:
+    """Height of the legend of a figure [inch]."""
+    entries, title, columns = _arranged(key, _PAGE, 4)
+    return _AROUND + _ROW * (bool(title) + math.ceil(len(entries) / columns))
+
+
 def _draw_legend(
-    owner: Axes | Figure, key: BundleKey | ScalarKey | None, room: int, columns: int, **place: Any
+    owner: Axes | Figure, key: Key | None, room: int, columns: int, **place: Any
 ) -> None:
-    """Title and entries in one line where there is room, else in columns below the title."""
-    entries = key_entries(key)
-    title, names = (key.title, key.names) if isinstance(key, BundleKey) else ("", ())
-    if len(title) + sum(len(name) + 6 for name in names) <= room:
-        entries = [(title, "none"), *entries] if title else entries
-        title, columns = "", len(entries)
+    entries, title, columns = _arranged(key, room, columns)
     if entries:
         above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "columnspacing": 1.2}
         look = above | {"title": title or None, "ncols": columns, "handlelength": 1.0}
         draw_entries(owner, entries, **look | place)
 
 
-def key_entries(key: BundleKey | ScalarKey | None) -> list[tuple[str, Any]]:
+def _arranged(key: Key | None, room: int, columns: int) -> tuple[list[tuple[str, Any]], str, int]:
+    """Entries, title and columns: all in one line where there is room, else below the title."""
+    entries = key_entries(key)
+    title, names = (key.title, key.names) if isinstance(key, BundleKey) else ("", ())
+    if len(title) + sum(len(name) + 6 for name in names) > room:
+        return entries, title, columns
+    entries = [(title, "none"), *entries] if title else entries
+    return entries, "", max(len(entries), 1)
+
+
+def key_entries(key: Key | None) -> list[tuple[str, Any]]:
     """Label and RGB from 0 to 1 of what has a color by itself; unstable samples are the last."""
     named = zip(key.labels, key.colors / 255, strict=True) if isinstance(key, BundleKey) else ()
     unstable = ("unstable", np.array(UNSTABLE) / 255)

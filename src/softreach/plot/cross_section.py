@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import LENGTH, PLACE, as_axes, figure_style, small_axes, some_bundles
+from softreach.plot.style import LENGTH, PLACE, some_bundles, styled_axes
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, Color, bundle_color, material_fill
@@ -19,6 +19,7 @@ from softreach.support.units import METER, readable_unit
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection
     from matplotlib.patches import Patch, Wedge
 
     from softreach.arm.material import Material
@@ -67,29 +68,28 @@ def plot_cross_section(
         InvalidInput: A station off the arm.
         MissingExtra: matplotlib is not installed.
     """
-    arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
+    arm, z = a_manipulator("arm", arm), as_number("z", z, PLACE)
     half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
     if legend is None:  # where colors alone leave open what is what
         courses = {actuator.fiber_direction for actuator in arm.actuators}
         plain = set(arm.outline(0.0).shape) == {"sector"} and courses == {"along"}
-        legend = not plain or len(_section_materials(arm.section)) > 1
+        legend = not plain or len(_materials(arm.section)) > 1
     legend = as_flag("legend", legend)
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     counted = unit_for(arm.length, unit)
     outer = float(counted.of(arm.profile.radius(z)))
-    placed = _placed_bundles(arm, z, some_bundles(arm, bundles))
-    with figure_style(ax):
-        entries = [*_materials(arm), *_bundles(arm, placed)] if legend else []
-        labels = [label for _, label in entries[:_MOST]]
-        if len(entries) > _MOST:
-            labels[-1] += f" and {len(entries) - _MOST} more"
-        room = _HANDLE + _LETTER * max(map(len, labels), default=0) if legend else 0.0
-        ax = small_axes(_SIZE + room, _SIZE) if ax is None else ax
+    placed = _placed_bundles(arm, z, outer, some_bundles(arm, bundles))
+    entries = [*_material_entries(arm.section), *_bundle_entries(arm, placed)] if legend else []
+    labels = [label for _, label in entries[:_MOST]]
+    if len(entries) > _MOST:
+        labels[-1] += f" and {len(entries) - _MOST} more"
+    room = _HANDLE + _LETTER * max(map(len, labels), default=0) if legend else 0.0
+    half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
+    half = float(counted.of(half))
+    with styled_axes(ax, _SIZE + room, _SIZE) as ax:
         _draw_layers(ax, arm.section, outer)
         _draw_bundles(ax, placed, outer)
-        half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
-        half = float(counted.of(half))
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
         ax.set(xlabel=counted.label("x"), ylabel=counted.label("y"))
         ax.locator_params(nbins=3)
@@ -107,33 +107,51 @@ def section_reach(arm: Manipulator, z: float) -> float:
     return float(arm.profile.radius(z)) * float(widest)
 
 
-def _materials(arm: Manipulator) -> Iterator[tuple[Artist, str]]:
+def _materials(section: Section) -> dict[Material, tuple[str, Material]]:
+    """The different materials of a section but for their names, rings first, with their part."""
+    parts = [
+        (ring.name or ("ring" if len(section.rings) == 1 else f"ring {k + 1}"), ring.material)
+        for k, ring in enumerate(section.rings)
+    ]
+    if section.inner_ratio > section.bore_ratio:
+        parts.append(("core", section.core_material))
+    different: dict[Material, tuple[str, Material]] = {}
+    for part, material in parts:
+        different.setdefault(_nameless(material), (part, material))
+    return different
+
+
+def _nameless(material: Material) -> Material:
+    return material.replace(name="")
+
+
+def _material_style(number: int) -> dict[str, Any]:
+    color, hatch = material_fill(number)
+    return {"facecolor": color, "hatch": hatch, "edgecolor": _HATCH, "linewidth": 0.0}
+
+
+def _material_entries(section: Section) -> Iterator[tuple[Artist, str]]:
     from matplotlib.patches import Patch
 
-    materials = _section_materials(arm.section)
+    materials = [*_materials(section).values()]
     if len(materials) == 1 and materials[0][1].young_modulus is None:
         return
-    for part, material in materials:
-        patch = Patch(**_material_style(arm.section, material))
+    for k, (part, material) in enumerate(materials):
+        patch, label = Patch(**_material_style(k)), material.name or part
         patch.set_hatch_linewidth(0.4)
-        label = material.name or part
         if (modulus := material.young_modulus) is not None:
             unit, size = readable_unit("Pa", modulus, METER)
             label += f": E = {modulus / size:.3g} {unit}"
         yield patch, label
 
 
-def _bundles(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[tuple[Artist, str]]:
+def _bundle_entries(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[tuple[Artist, str]]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     for bundle in placed:
-        k, color = bundle.index, bundle.color
-        if bundle.shape == "line":
-            handle: Artist = Line2D([], [], **_tendon_style(color))
-        else:
-            lumen = bundle.shape == "lumen"
-            handle = Patch(**_lumen_style(color)) if lumen else Patch(color=color)
+        k, is_line = bundle.index, bundle.shape == "line"
+        handle = Line2D([], [], **bundle.style) if is_line else Patch(**bundle.style)
         course = "" if bundle.course == "along" else f", {bundle.course}"
         symbol, unit = arm.bundle_actuators[k].symbol, arm.bundle_units[k].replace("1", "-")
         yield handle, f"{arm.bundle_names[k]}{course}: {symbol} [{unit}]"
@@ -146,42 +164,41 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
     """
     from matplotlib.patches import Circle
 
+    materials = [*_materials(section)]
+
+    def draw(low: float, high: float, material: Material | None, alpha: float = 1.0) -> None:
+        if material is not None and len(materials) > 1:
+            fill = _annulus(outer * low, outer * high, "none")
+            style = _material_style(materials.index(_nameless(material)))
+            fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
+            fill.set_hatch_linewidth(0.4)
+            ax.add_patch(fill)
+            color: Any = "none"
+        else:
+            color = "white" if material is None else BODY
+        ax.add_patch(_annulus(outer * low, outer * high, color))
+
     ax.add_patch(Circle((0, 0), outer, facecolor="0.97", edgecolor=_EDGE, linewidth=0.6))
-    several = len(_section_materials(section)) > 1
-    if several and section.inner_ratio > section.bore_ratio:
-        _draw_material(ax, section, section.core_material, 0.0, outer * section.inner_ratio)
-    for low, high in _voids(section):
-        ax.add_patch(_annulus(outer * low, outer * high, "white"))
+    if len(materials) > 1 and section.inner_ratio > section.bore_ratio:
+        draw(0.0, section.inner_ratio, section.core_material)
+    if section.bore_ratio > 0:
+        draw(0.0, section.bore_ratio, None)
+    reached = max(section.bore_ratio, section.inner_ratio)
+    for ring in sorted(section.rings, key=lambda ring: ring.inner_ratio):
+        if ring.inner_ratio > reached:
+            draw(reached, ring.inner_ratio, None)
+        reached = max(reached, ring.outer_ratio)
     for k, ring in enumerate(section.rings):
         low, high = ring.inner_ratio, ring.outer_ratio
-        if not several:
-            ax.add_patch(_annulus(outer * low, outer * high, BODY))
-            continue
-        below = section.rings[:k]
-        over = any(low < other.outer_ratio and other.inner_ratio < high for other in below)
-        alpha = 0.5 if over else 1.0
-        _draw_material(ax, section, ring.material, outer * low, outer * high, alpha)
+        over = any(low < r.outer_ratio and r.inner_ratio < high for r in section.rings[:k])
+        draw(low, high, ring.material, 0.5 if over else 1.0)
 
 
-def _section_materials(section: Section) -> tuple[tuple[str, Material], ...]:
-    """The different materials of a section, rings first, each with the part it is found in."""
-    parts = [
-        (ring.name or ("ring" if len(section.rings) == 1 else f"ring {k + 1}"), ring.material)
-        for k, ring in enumerate(section.rings)
-    ]
-    if section.inner_ratio > section.bore_ratio:
-        parts.append(("core", section.core_material))
-    materials: list[tuple[str, Material]] = []
-    for part, material in parts:
-        if not any(material.same_matter(other) for _, other in materials):
-            materials.append((part, material))
-    return tuple(materials)
+def _annulus(low: float, high: float, fill: Any) -> Patch:
+    from matplotlib.patches import Annulus, Circle
 
-
-def _material_style(section: Section, material: Material) -> dict[str, Any]:
-    known = [material.same_matter(other) for _, other in _section_materials(section)]
-    color, hatch = material_fill(known.index(True))
-    return {"facecolor": color, "hatch": hatch, "edgecolor": _HATCH, "linewidth": 0.0}
+    look = {"facecolor": fill, "edgecolor": _EDGE, "linewidth": 0.4}
+    return Annulus((0, 0), high, high - low, **look) if low > 0 else Circle((0, 0), high, **look)
 
 
 @dataclass(frozen=True)
@@ -193,30 +210,69 @@ class _Placed:
     course: str
     center: float  # polar angle [rad]
     extent: float  # angular [rad]
-    inner_ratio: float  # of R2
-    outer_ratio: float  # of R2
+    inner: float  # radius in the unit of the axes
+    outer: float  # radius in the unit of the axes
 
     @property
     def color(self) -> Color:
         return bundle_color(self.index)
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        radius = 0.5 * (self.inner + self.outer)
+        return radius * np.cos(self.center), radius * np.sin(self.center)
+
+    @property
+    def style(self) -> dict[str, Any]:
+        """That of a patch or of a dot."""
+        color = self.color
+        if self.shape == "line":
+            edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
+            return {"marker": "o", "markersize": 5.5, "linestyle": "none", "color": color, **edge}
+        if self.shape == "sector":
+            return {"color": color}
+        pale = tuple(0.25 * part + 0.75 for part in color)
+        return {"facecolor": pale, "edgecolor": color, "linewidth": 1.4}
+
+    def sector(self, **style: Any) -> Wedge:
+        from matplotlib.patches import Wedge
+
+        center, extent = np.degrees(self.center), np.degrees(self.extent)
+        ends, width = (center - extent / 2, center + extent / 2), self.outer - self.inner
+        return Wedge((0, 0), self.outer, *ends, width=width, **style)
+
     def overlaps(self, other: _Placed) -> Iterator[_Placed]:
         """The parts of this sector that another shares."""
-        inner = max(self.inner_ratio, other.inner_ratio)
-        outer = min(self.outer_ratio, other.outer_ratio)
+        inner, outer = max(self.inner, other.inner), min(self.outer, other.outer)
         apart = (other.center - self.center + np.pi) % (2 * np.pi) - np.pi
         for turn in (apart - 2 * np.pi, apart, apart + 2 * np.pi):
             low = max(-self.extent / 2, turn - other.extent / 2)
             high = min(self.extent / 2, turn + other.extent / 2)
-            if outer - inner > _OVERLAP and high - low > _OVERLAP:
+            if outer - inner > _OVERLAP * outer and high - low > _OVERLAP:
                 middle, extent = self.center + 0.5 * (low + high), high - low
-                ratios = {"inner_ratio": inner, "outer_ratio": outer}
-                yield replace(self, center=middle, extent=extent, **ratios)
+                yield replace(self, center=middle, extent=extent, inner=inner, outer=outer)
+
+    def strokes(self) -> LineCollection:
+        """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
+        from matplotlib.collections import LineCollection
+
+        lean = {"radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[self.course]
+        half = 0.5 * (self.extent - abs(lean))
+        if half <= 0:
+            half, lean = 0.4 * self.extent, np.sign(lean) * min(abs(lean), 0.2 * self.extent)
+        angles = self.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
+        ends = (self.inner, angles - lean / 2), (self.outer, angles + lean / 2)
+        points = [r * np.column_stack([np.cos(at), np.sin(at)]) for r, at in ends]
+        ink = "white" if np.dot(self.color, _LIGHTNESS) < 0.55 else "0.3"
+        return LineCollection(list(np.stack(points, axis=1)), colors=ink, linewidths=0.7)
 
 
-def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> list[_Placed]:
+def _placed_bundles(
+    arm: Manipulator, z: float, outer: float, bundles: Collection[int]
+) -> list[_Placed]:
     outline = arm.outline(z)
-    sizes = (outline.center[0], outline.extent, outline.inner_ratio[0], outline.outer_ratio[0])
+    ratios = outline.inner_ratio[0], outline.outer_ratio[0]
+    sizes = outline.center[0], outline.extent, *(outer * ratio for ratio in ratios)
     ways = [actuator.fiber_direction for actuator in arm.bundle_actuators]
     return [
         _Placed(k, outline.shape[k], ways[k], *(float(size[k]) for size in sizes))
@@ -228,95 +284,27 @@ def _placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> lis
 def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
     from matplotlib.patches import Circle
 
-    sectors = [bundle for bundle in placed if bundle.shape == "sector"]
+    sectors, lumens, lines = (
+        [bundle for bundle in placed if bundle.shape == shape]
+        for shape in ("sector", "lumen", "line")
+    )
     for bundle in sectors:
-        ax.add_patch(_sector(bundle, outer, color=bundle.color, linewidth=0))
+        ax.add_patch(bundle.sector(linewidth=0, **bundle.style))
     for k, bundle in enumerate(sectors):
         for above in sectors[k + 1 :]:
             for part in bundle.overlaps(above):
                 look = {"facecolor": "none", "edgecolor": part.color, "linewidth": 0.0}
-                stripes = _sector(part, outer, hatch="//////", **look)
+                stripes = part.sector(hatch="//////", **look)
                 stripes.set_hatch_linewidth(1.2)
                 ax.add_patch(stripes)
     for bundle in sectors:
-        _draw_strokes(ax, bundle, outer)
-    for bundle in (bundle for bundle in placed if bundle.shape == "lumen"):
-        radius = 0.5 * outer * (bundle.outer_ratio - bundle.inner_ratio)
-        ax.add_patch(Circle(_middle(bundle, outer), radius, **_lumen_style(bundle.color)))
-    lines = [bundle for bundle in placed if bundle.shape == "line"]
-    for ratio in sorted({round(line.outer_ratio, 9) for line in lines if line.outer_ratio > 1}):
+        if bundle.course != "along":
+            ax.add_collection(bundle.strokes())
+    for bundle in lumens:
+        ax.add_patch(Circle(bundle.middle, 0.5 * (bundle.outer - bundle.inner), **bundle.style))
+    for radius in sorted({round(line.outer / outer, 9) for line in lines if line.outer > outer}):
         disk = {"facecolor": "none", "edgecolor": "0.6", "linewidth": 0.6, "linestyle": ":"}
-        ax.add_patch(Circle((0, 0), outer * ratio, **disk))
+        ax.add_patch(Circle((0, 0), outer * radius, **disk))
     for bundle in lines:
-        x, y = _middle(bundle, outer)
-        ax.plot([x], [y], zorder=3, **_tendon_style(bundle.color))
-
-
-def _tendon_style(color: Color) -> dict[str, Any]:
-    edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
-    return {"marker": "o", "markersize": 5.5, "linestyle": "none", "color": color, **edge}
-
-
-def _lumen_style(color: Color) -> dict[str, Any]:
-    pale = tuple(0.25 * part + 0.75 for part in color)
-    return {"facecolor": pale, "edgecolor": color, "linewidth": 1.4}
-
-
-def _draw_material(
-    ax: Axes, section: Section, material: Material, low: float, high: float, alpha: float = 1.0
-) -> None:
-    fill, style = _annulus(low, high, "none"), _material_style(section, material)
-    fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
-    fill.set_hatch_linewidth(0.4)
-    ax.add_patch(fill)
-    ax.add_patch(_annulus(low, high, "none"))
-
-
-def _voids(section: Section) -> Iterator[tuple[float, float]]:
-    """Bore and gaps between rings, from one ratio to another."""
-    if section.bore_ratio > 0:
-        yield 0.0, section.bore_ratio
-    reached = max(section.bore_ratio, section.inner_ratio)
-    for ring in sorted(section.rings, key=lambda ring: ring.inner_ratio):
-        if ring.inner_ratio > reached:
-            yield reached, ring.inner_ratio
-        reached = max(reached, ring.outer_ratio)
-
-
-def _annulus(low: float, high: float, fill: Any) -> Patch:
-    from matplotlib.patches import Annulus, Circle
-
-    look = {"facecolor": fill, "edgecolor": _EDGE, "linewidth": 0.4}
-    return Annulus((0, 0), high, high - low, **look) if low > 0 else Circle((0, 0), high, **look)
-
-
-def _sector(bundle: _Placed, outer: float, **style: Any) -> Wedge:
-    from matplotlib.patches import Wedge
-
-    center, extent = np.degrees(bundle.center), np.degrees(bundle.extent)
-    ends = center - extent / 2, center + extent / 2
-    radius, width = outer * bundle.outer_ratio, outer * (bundle.outer_ratio - bundle.inner_ratio)
-    return Wedge((0, 0), radius, *ends, width=width, **style)
-
-
-def _draw_strokes(ax: Axes, bundle: _Placed, outer: float) -> None:
-    """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
-    from matplotlib.collections import LineCollection
-
-    if bundle.course == "along":
-        return
-    lean = {"radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[bundle.course]
-    half = 0.5 * (bundle.extent - abs(lean))
-    if half <= 0:
-        half, lean = 0.4 * bundle.extent, np.sign(lean) * min(abs(lean), 0.2 * bundle.extent)
-    angles = bundle.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
-    ends = ((bundle.inner_ratio, angles - lean / 2), (bundle.outer_ratio, angles + lean / 2))
-    points = [outer * r * np.column_stack([np.cos(at), np.sin(at)]) for r, at in ends]
-    ink = "white" if np.dot(bundle.color, _LIGHTNESS) < 0.55 else "0.3"
-    strokes = LineCollection(list(np.stack(points, axis=1)), colors=ink, linewidths=0.7)
-    ax.add_collection(strokes)
-
-
-def _middle(bundle: _Placed, outer: float) -> tuple[float, float]:
-    radius = 0.5 * outer * (bundle.inner_ratio + bundle.outer_ratio)
-    return radius * np.cos(bundle.center), radius * np.sin(bundle.center)
+        x, y = bundle.middle
+        ax.plot([x], [y], zorder=3, **bundle.style)

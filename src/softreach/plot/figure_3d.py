@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -109,21 +110,18 @@ class Detail(NamedTuple):
 _DETAIL = Detail()
 
 
+@dataclass
 class Scene:
     """Parts of a page, with what explains them."""
 
-    def __init__(
-        self,
-        unit: LengthUnit,
-        color: Any = None,
-        kinds: Sequence[str] = (),
-        detail: Detail = _DETAIL,
-    ) -> None:
-        self.unit, self.color, self.kinds, self.detail = unit, color, kinds, detail
-        self.parts: list[PagePart] = []
-        self.keys: list[Swatches | ColorScale] = []
-        self.captions: list[str] = []
-        self.notes: list[str] = []
+    unit: LengthUnit
+    color: Any = None
+    kinds: Sequence[str] = ()
+    detail: Detail = _DETAIL
+    parts: list[PagePart] = field(default_factory=list)
+    keys: list[Swatches | ColorScale] = field(default_factory=list)
+    captions: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def add(self, things: Sequence[Any]) -> None:
         """Things to show, one after the other."""

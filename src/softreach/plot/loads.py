@@ -13,7 +13,7 @@ from softreach.picture.projection import View, on_paper
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import a_result, figure_style, small_axes
+from softreach.plot.style import a_result, figure_style, styled_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
 from softreach.support.arguments import POSITIVE, as_number
@@ -140,10 +140,10 @@ def plot_compliance(
         allowed = f"{len(shapes)}, one for each configuration"
         raise InvalidInput("compliance", f"{len(matrices)} matrices", allowed)
     if force is None:  # that keeps the ellipsoids small
-        softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
+        softest = float(np.linalg.norm(matrices, ord=2, axis=(1, 2)).max())
+        if not 0 < softest < np.inf:
+            raise InvalidInput("compliance", f"{softest:g} m/N at most", "finite, and not zero")
         force = round_below(_LARGEST * arm.length / softest)
-    if not 0 < force < np.inf:
-        raise InvalidInput("force", force, "> 0 N")
     counted = unit_for(arm.length, unit)
     tips = counted.of([shape["position"].values[-1] for shape in shapes])
     axes = counted.of(force * matrices)
@@ -179,8 +179,7 @@ def plot_payload_curve(
     points = [(0.0, 1.0), *((point.payload, point.share) for point in largest)]
     points += zip(curve.payloads[1:], curve.shares[1:], strict=True)
     mass, share = zip(*sorted(points), strict=True)
-    with figure_style(ax):
-        ax = small_axes(3.4, 2.6) if ax is None else ax
+    with styled_axes(ax, 3.4, 2.6) as ax:
         (line,) = ax.plot(mass, share, linewidth=1.2)
         style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
         ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)

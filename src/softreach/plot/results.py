@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,6 +42,7 @@ _FINAL: dict[str, Any] = {"marker": "D", "s": 24, "color": BEST, "linewidths": 0
 _OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": MISSED, "linewidths": 0.8, "zorder": 3}
 _BARS: dict[str, Any] = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zorder": 4}
 _MOST_LINES = 200
+_LETTERS = 40  # beside or below a panel
 
 
 def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = None) -> Figure:
@@ -101,11 +103,13 @@ class _Errors:
         colors = pyplot().get_cmap("tab10")
         self.colors = [colors(k % 10) for k in range(data.sizes["marker"])]
 
-    def scatter(self, ax: Axes, x: Array, marker: int) -> None:
-        size = {"s": 9 if len(x) < 300 else 4, "linewidths": 0.6, "zorder": 3}
-        color: Any = self.colors[marker]
-        for rows, face in ((~self.held, color), (self.held, "none")):
-            ax.scatter(x[rows], self.distance[rows, marker], color=face, edgecolors=color, **size)
+    def scatter(self, ax: Axes, x: Array) -> None:
+        """Distances of all markers over x, shape (sample,) or (marker, sample)."""
+        size = {"s": 9 if x.shape[-1] < 300 else 4, "linewidths": 0.6, "zorder": 3}
+        places = np.broadcast_to(x, self.distance.T.shape)
+        for own, distance, color in zip(places, self.distance.T, self.colors, strict=True):
+            for rows, face in ((~self.held, color), (self.held, "none")):
+                ax.scatter(own[rows], distance[rows], color=face, edgecolors=color, **size)
 
     def frame(self, ax: Axes) -> None:
         ax.set_ylim(0.0, self.top)
@@ -140,16 +144,16 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
 
 
 def _draw_markers(ax: Axes, shown: _Errors) -> None:
-    rng = np.random.default_rng(0)
+    apart = 0.25 * (2.0 * np.random.default_rng(0).random(shown.distance.T.shape) - 1.0)
+    shown.scatter(ax, np.arange(len(apart))[:, None] + apart)
     for k in range(len(shown.markers)):
-        shown.scatter(ax, k + 0.25 * (2.0 * rng.random(len(shown.distance)) - 1.0), k)
         for rows, style in ((~shown.held, "-"), (shown.held, ":")):
             own = shown.distance[rows, k]
             if np.isfinite(own).any():
                 rms = float(np.sqrt(np.nanmean(own**2)))
                 ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=style, zorder=4)
     ax.set_xticks(range(len(shown.markers)), shown.markers)
-    if len(shown.markers) > 4:
+    if len(shown.markers) > 4 or len("".join(shown.markers)) > _LETTERS:
         ax.tick_params(axis="x", labelrotation=40)
     ax.set(ylabel=shown.label, xlim=(-0.6, len(shown.markers) - 0.4))
     remark(ax, "line: rms" + ("; hollow, dotted: held out" if shown.held.any() else ""))
@@ -158,8 +162,7 @@ def _draw_markers(ax: Axes, shown: _Errors) -> None:
 
 def _draw_order(ax: Axes, shown: _Errors) -> None:
     rank = shown.data["rank"].values
-    for k in range(len(shown.markers)):
-        shown.scatter(ax, rank, k)
+    shown.scatter(ax, rank)
     runs = shown.data["run"].values[np.argsort(rank)]
     for end in np.flatnonzero(np.diff(runs)):
         ax.axvline(end + 0.5, color="0.85", linewidth=0.5, zorder=1)
@@ -170,8 +173,7 @@ def _draw_order(ax: Axes, shown: _Errors) -> None:
 def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
     unit, values = str(shown.data["input_unit"].values[k]), shown.data["input_value"].values[:, k]
     name, size = readable_unit(unit, 1e3, _MILLIMETER)
-    for marker in range(len(shown.markers)):
-        shown.scatter(ax, values / size, marker)
+    shown.scatter(ax, values / size)
     label = str(shown.data["input"].values[k])
     ax.set_xlabel(f"{label} [{name}]" if name else label)
     shown.frame(ax)
@@ -266,7 +268,7 @@ def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
     ax.scatter(coarse[known], full[known], **_FINAL)
     first = float(full[known][0])
     ax.axline((first, first), slope=1.0, color="0.7", lw=0.7, zorder=1)
-    ax.set(xlabel=f"{shown.labels[0]}, coarse", ylabel="full accuracy")
+    ax.set(xlabel=fill(f"{shown.labels[0]}, coarse", 2 * _LETTERS // 3), ylabel="full accuracy")
     remark(ax, "the best, judged again")
     ax.locator_params(nbins=4)
 
@@ -283,7 +285,7 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
         ax.errorbar(*points, *errors[::-1], **_BARS)
         ax.scatter(*points, label="front, full accuracy", **_FINAL)
     words = [
-        f"{label} ({'large' if sense > 0 else 'small'} is better)"
+        fill(f"{label} ({'large' if sense > 0 else 'small'} is better)", _LETTERS)
         for label, sense in zip(shown.labels, shown.senses, strict=True)
     ]
     ax.set(xlabel=words[0], ylabel=words[1])
@@ -318,7 +320,7 @@ def _draw_objectives(ax: Axes, shown: _Designs) -> None:
     shares = (values - low) / np.where(high > low, high - low, 1.0)
     shares = np.where(shown.senses > 0, shares, 1.0 - shares)
     colors = pyplot().get_cmap(COLORMAP)(0.9 * shares[:, 0])
-    places = np.arange(values.shape[1])
+    places, wide = np.arange(values.shape[1]), max(8, 48 // values.shape[1])
     for share, color in zip(shares, colors, strict=True):
         ax.plot(places, share, "-D", color=color, lw=0.9, ms=3.5)
     for k, place in enumerate(places):
@@ -326,7 +328,7 @@ def _draw_objectives(ax: Axes, shown: _Designs) -> None:
         ax.axvline(place, color="0.8", lw=0.6, zorder=0)
         for end, up, across in ((ends[0], -0.04, "top"), (ends[1], 1.04, "bottom")):
             ax.text(place, up, f"{end:.4g}", ha="center", va=across, fontsize=7, color="0.25")
-    ax.set_xticks(places, [label.replace(" [", "\n[") for label in shown.labels])
+    ax.set_xticks(places, [fill(label, wide).replace(" [", "\n[") for label in shown.labels])
     ax.set(ylim=(-0.16, 1.16), xlim=(-0.4, places[-1] + 0.4), yticks=[0, 1])
     ax.set_yticklabels(["worse", "better"])
 

@@ -21,11 +21,9 @@ from softreach.plot.style import (
     LENGTH,
     PLACE,
     a_surface,
-    as_axes,
     figure_style,
-    label_logarithms,
     new_figure,
-    small_axes,
+    styled_axes,
 )
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number
 from softreach.support.arrays import as_floats
@@ -105,13 +103,14 @@ def plot_volume_curve(
         InvalidInput: Radii and volumes of different shapes.
         MissingExtra: matplotlib is not installed.
     """
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     curves, radii = as_mapping("curves", curves, as_floats), as_floats("alphas", alphas)
     length = None if length is None else as_number("length", length, LENGTH)
     exact = None if exact is None else as_number("exact", exact, _VOLUMES)
     convex = None if convex is None else as_number("convex", convex, _VOLUMES)
-    ax, counted = as_axes(ax), unit_for(length, unit)
-    with figure_style(ax):
-        ax = small_axes(3.4, 2.6) if ax is None else ax
+    counted = unit_for(length, unit)
+    with styled_axes(ax, 3.4, 2.6) as ax:
         for label, volumes in curves.items():
             if np.shape(volumes) != radii.shape:
                 raise InvalidInput(label, np.shape(volumes), f"volumes of {radii.shape} radii")
@@ -120,7 +119,10 @@ def plot_volume_curve(
             if value is not None:
                 ax.axhline(float(counted.of(value, 3)), color="0.3", lw=0.8, ls=style, label=name)
         ax.set(xscale="log", xlabel=counted.label("radius α"), ylim=(0, None))
-        label_logarithms(ax.xaxis, radii)
+        few = float(np.max(radii)) < 100 * float(np.min(radii))
+        ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
+        ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set_ylabel(counted.label("V", 3))
         ax.legend(loc="lower right")
     return ax
@@ -154,7 +156,7 @@ def plot_slice(
         InvalidInput: Not a view along an axis, or a plane that misses the grid.
         MissingExtra: matplotlib is not installed.
     """
-    grid, ax = as_dataset("grid", grid, "x", "y", "z"), as_axes(ax)
+    grid = as_dataset("grid", grid, "x", "y", "z")
     axis, counted, key = sight_axis(view), unit_of(grid, unit), as_flag("key", key)
     at = _middle(grid, axis) if at is None else as_number("at", at, PLACE)
     centers, half = grid[axis].values, grid.attrs["cell"] / 2
@@ -162,8 +164,7 @@ def plot_slice(
         allowed = f"between {centers[0]:.4g} and {centers[-1]:.4g} m along {axis}"
         raise InvalidInput("at", at, allowed)
     layer = grid.sel({axis: at}, method="nearest")
-    with figure_style(ax):
-        ax = small_axes(3.4, 4.2) if ax is None else ax
+    with styled_axes(ax, 3.4, 4.2) as ax:
         highest = _draw(ax, layer, view, counted)
         place = at if abs(at) > 1e-6 * half else 0.0  # no -0, nor what rounding left of 0
         ax.set_title(f"{axis} = {counted.of(place):.3g} {counted.name}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,11 +25,10 @@ from softreach.plot.lengths import Unit, common_unit, unit_of
 from softreach.plot.style import (
     LENGTH,
     PAGE,
-    as_axes,
     figure_style,
     new_figure,
     place_panels,
-    small_axes,
+    styled_axes,
     write_note,
 )
 from softreach.schema import a_cloud
@@ -52,7 +52,8 @@ if TYPE_CHECKING:
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
 _BINS = 60
-_AROUND, _GAPS = (0.75, 0.1, 0.4, 0.55), (0.12, 0.95)  # of panels [inch]
+_AROUND, _GAPS = (0.1, 0.4, 0.55), (0.12, 0.95)  # right, below, above and between panels [inch]
+_LEFT, _LINE, _LETTERS = 0.75, 0.14, 24  # inches left of them, for each more line of titles
 _a_distance = partial(as_dataset, kind="DataArray")
 SIDES = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
 _SYMBOLS = {"bending": "κ", "torsion": "u₃", "extension": "ζ"}
@@ -100,8 +101,7 @@ def plot_distance(
         pixels = max(3.0, buffer.shape[1] / np.sqrt(1.2 * max(len(tips), 1)))
         buffer.draw_points(seen, scale_colors(values, 0.0, high, _ISOLATED), pixels)
         panel.show(buffer)
-        if key:
-            draw_key(panel.ax, ScalarKey(_LABEL, 0.0, high))
+        draw_key(panel.ax, ScalarKey(_LABEL, 0.0, high) if key else None)
     return panel.ax
 
 
@@ -175,7 +175,10 @@ def plot_redundancy(
     high = largest_distance(distances.values())
     with figure_style():
         x, y, z = np.ptp(box, axis=0)
-        figure, rows = place_panels(PAGE, (x, x, y, x), [z] * len(clouds), _AROUND, _GAPS)
+        names = {title: fill(title, _LETTERS) for title in clouds}
+        left = _LEFT + _LINE * max(name.count("\n") for name in names.values())
+        around = (left, *_AROUND)
+        figure, rows = place_panels(PAGE, (x, x, y, x), [z] * len(clouds), around, _GAPS)
         for (title, cloud), row in zip(clouds.items(), rows, strict=True):
             coloring = color_samples(cloud, bundle_activations(cloud).shape[1] - 1)
             rgb, counted = coloring.rgb / 255, units[title]
@@ -191,7 +194,7 @@ def plot_redundancy(
                     figure.colorbar(color_map(key), cax=bar, **options)
             for ax in row[1:]:
                 ax.set(ylabel="", yticklabels=[])
-            row[0].set_ylabel(f"{title}\n{row[0].get_ylabel()}")
+            row[0].set_ylabel(f"{names[title]}\n{row[0].get_ylabel()}")
     return figure
 
 
@@ -232,7 +235,7 @@ def plot_curvature(
         InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
             the arm, or designs of which only one knows L.
     """
-    ax, variables = as_axes(ax), ("bending_count", "Z")
+    variables = "bending_count", "Z"
     statistics = as_mapping("statistics", statistics, lambda *x: as_dataset(*x, *variables))
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
@@ -246,8 +249,7 @@ def plot_curvature(
     symbol, per_length = _SYMBOLS[quantity], quantity != "extension"
     if per_length:
         symbol += "L" if counted.relative else f" [1/{counted.name}]"
-    with figure_style(ax):
-        ax = small_axes() if ax is None else ax
+    with styled_axes(ax) as ax:
         sides = (-1, 1) if len(statistics) == 2 else (0,)
         for (label, data), side, color in zip(statistics.items(), sides, SIDES, strict=False):
             scale = units[label].size if per_length else 1.0

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from os import PathLike
 from pathlib import Path
@@ -24,7 +24,6 @@ from softreach.support.files.formats import PAGES, PICTURES, format_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 
@@ -107,6 +106,13 @@ def new_figure(**options: Any) -> Figure:
 def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
     """Axes in a new figure of that size [inch], by default a journal's column wide."""
     return pyplot().subplots(figsize=(width, height), layout="constrained")[1]
+
+
+@contextmanager
+def styled_axes(ax: Axes | None, width: float = 3.4, height: float = 2.8) -> Iterator[Axes]:
+    """The caller's axes, or new ones of that size [inch] in our style."""
+    with figure_style(as_axes(ax)):
+        yield small_axes(width, height) if ax is None else ax
 
 
 def place_panels(
@@ -225,16 +231,6 @@ def as_axes(ax: Any) -> Any:
     if ax is None or (known and ax.name != "3d"):
         return ax
     raise InvalidInput("ax", as_given(ax), "axes of matplotlib in two dimensions, or None")
-
-
-def label_logarithms(axis: Axis, values: Array) -> None:
-    """Label a logarithmic axis, with 1, 2 and 5 on it where values span few decades."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    few = float(np.max(values)) < 100 * float(np.min(values))
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
-    axis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.set_minor_formatter(NullFormatter())
 
 
 def as_box(name: str, value: Any) -> Array:

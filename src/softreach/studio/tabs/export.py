@@ -211,7 +211,7 @@ def picture_file(
     size = width / _DPI, total / _DPI
     figure = Figure(figsize=size, dpi=_DPI * FINER, facecolor=paper)
     figure.figimage(scene, 0, below * FINER)
-    draw_figure_key(figure, key, above / total)
+    draw_figure_key(figure, key, above / _DPI)
     spacing, corner = _LINE / 8.5 * 72 / _DPI / 1.2, (_EDGE / width, _EDGE / total)
     figure.text(*corner, "\n".join(lines), fontsize=8.5, va="bottom", linespacing=spacing)
     for text in figure.findobj(Text):
