@@ -360,7 +360,7 @@ def test_a_check_passes_on_what_sets_warn_of(monkeypatch):
     needs = Requirements(measures={"exact_volume": (0.1, None)})
     with pytest.warns(SoftreachWarning, match="rough"):
         sr.check(ARM, needs, accuracy=0.1)
-    checks.quick_check(ARM, needs, 0.1)  # on the way of a search nothing is said
+    checks.checked(ARM, needs, 0.1, quick=True)  # on the way of a search nothing is said
 
 
 @pytest.fixture

@@ -31,10 +31,9 @@ _WORSE = 10.0  # times the cost of the start: a design that cannot exist
 def can_polish(problem: Problem) -> bool:
     """True of problems with numbers that can change a little, and goals with derivatives."""
     needs = problem.requirements
-    regions = any(target.region is not None for target in needs.targets)
     of_poses = needs.keeps or needs.limits.of_poses
     return (
-        not (regions and of_poses)  # what is covered depends on poses at countless places
+        not (needs.regions and of_poses)  # what is covered depends on poses at countless places
         and len(problem.parameters.real) > 0
         and len(needs.places) * max(1, len(needs.payloads)) <= _MOST_POSES
         and all(goal.objective.smooth for goal in problem.goals)

@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
@@ -18,7 +19,7 @@ from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, MetricFailed
 from softreach.atlas.metrics import known_metric
 from softreach.optimization.free_parameters import FreeParameters, Values
-from softreach.requirements.checks import Check, Sets, checked, quick_check, sets_to
+from softreach.requirements.checks import Check, Sets, checked, sets_to
 from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_given, as_names
@@ -75,10 +76,9 @@ class DesignCase:
     @lazy
     def check(self) -> Check:
         """Requirements met and missed; on the way by poses that few descents find."""
-        if self.fine:
-            return checked(self.arm, self.requirements, self.accuracy, self.set_of)
-        with no_warnings():
-            return quick_check(self.arm, self.requirements, self.accuracy, self.set_of)
+        design = self.arm, self.requirements, self.accuracy, self.set_of
+        with nullcontext() if self.fine else no_warnings():
+            return checked(*design, quick=not self.fine)
 
     @lazy
     @no_warnings()
@@ -157,11 +157,9 @@ def goals(
     names = [goal.name for goal in result]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("objective", twice[0], "given once")
-    targets = requirements.targets
-    has = {"", *["targets"] * bool(targets), *("regions" for t in targets if t.region is not None)}
-    for goal in (goal for goal in result if goal.objective.asks not in has):
-        allowed = f"left out: the requirements have no {goal.objective.asks}"
-        raise InvalidInput("objective", goal.name, allowed)
+    for goal in result:
+        if (asks := goal.objective.asks) and not getattr(requirements, asks):
+            raise InvalidInput("objective", goal.name, f"left out: the requirements have no {asks}")
     return tuple(result)
 
 
@@ -346,8 +344,7 @@ class Problem:
     def is_finer_on_finer_sets(self) -> bool:
         """True if reachable sets decide, so that what is best depends on their accuracy."""
         names = {goal.name for goal in self.goals} | {*self.requirements.measures}
-        regions = any(target.region is not None for target in self.requirements.targets)
-        return regions or not names.isdisjoint(SETS)
+        return bool(self.requirements.regions) or not names.isdisjoint(SETS)
 
     def case(self, values: Values, accuracy: float) -> DesignCase:
         """The design with these values, to be asked to a relative error of volumes.

@@ -100,12 +100,8 @@ class DesignPoint:
     @property
     def _covered(self) -> list[tuple[int, Region]]:
         """Numbers of the payloads with the regions that must be covered under them."""
-        return [
-            (number, target.region)
-            for number in range(len(self.arms))
-            for target in self.problem.requirements.targets
-            if target.region is not None
-        ]
+        regions = self.problem.requirements.regions
+        return [(number, region) for number in range(len(self.arms)) for _, region in regions]
 
     def share(self, number: int, region: Region) -> float:
         """Share of a region that the tip reaches under a payload."""
@@ -324,9 +320,7 @@ class Point:
         return slope
 
     def _shares(self) -> Iterator[Part]:
-        for target in self.design.problem.requirements.targets:
-            if (region := target.region) is None:
-                continue
+        for target, region in self.design.problem.requirements.regions:
             for number in range(len(self.design.rods)):
                 share = self.design.share(number, region)
                 slope = partial(self.design.share_slope, number, region)

@@ -135,10 +135,9 @@ def limit_finding(name: str, value: float, most: float, arm: Manipulator, where:
 
 def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     """Limits that follow from the design alone."""
-    low, high = arm.input_bounds.T
     heaviest = max(needs.payloads, default=None)
     numbers: dict[str, Callable[[], float]] = {
-        "actuators": lambda: int((low < high).sum()),
+        "actuators": lambda: int(np.less(*arm.input_bounds.T).sum()),
         "mass": lambda: mass(arm),
         "load_number": lambda: load_number(with_payload(arm, heaviest)),
     }

@@ -108,6 +108,11 @@ class Requirements:
         each = (np.full(len(target.points), target.within) for target in self.targets)
         return np.concatenate([np.empty(0), *each])
 
+    @property
+    def regions(self) -> tuple[tuple[Target, Region], ...]:
+        """Targets that are regions to cover, with these."""
+        return tuple((each, each.region) for each in self.targets if each.region is not None)
+
     def under_payloads(self, arm: Manipulator) -> list[Manipulator]:
         """An arm under each payload, or as it is where there are none."""
         return [with_payload(arm, payload) for payload in self.payloads or (None,)]
