@@ -260,3 +260,12 @@ def test_a_problem_needs_a_design_and_rows_a_power_of_two():
         sensitivity(asked)
     with pytest.raises(InvalidInput, match="power of two"):
         sensitivity(asked, Candidate(values={"taper": 0.01}), n=12)
+
+
+def test_the_same_seed_gives_the_same_error_bars():
+    asked = within({"taper": (0.0, 0.02), "length": (0.9, 1.1)}, maximize="mass")
+    best = Candidate(values={"taper": 0.01, "length": 1.0})
+    (one,), (other,), (third,) = (sensitivity(asked, best, n=4, seed=s).variance for s in (5, 5, 6))
+    for name in one._fields:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert (one.total_error != third.total_error).any()

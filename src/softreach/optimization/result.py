@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import unit_suffix
 from softreach.arm.written import with_suffix
 from softreach.optimization.free_parameters import FreeParameter
-from softreach.optimization.problem import NEAR, Candidate, Goal, Problem
+from softreach.optimization.problem import NEAR, Candidate, Fidelity, Goal, Problem
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
@@ -88,8 +88,7 @@ class Search(Reported):
             return 0, 0
         ends = [each for each in self.candidates if each.designs > 1 and each.is_feasible]
         best, *costs = (np.array(self.problem.costs(each)) for each in (self.best, *ends))
-        near = [bool((np.abs(each - best) <= NEAR * np.abs(best)).all()) for each in costs]
-        return len(ends), sum(near)
+        return len(ends), sum(np.allclose(each, best, rtol=NEAR, atol=0.0) for each in costs)
 
     @property
     def arm(self) -> Manipulator:
@@ -121,9 +120,8 @@ class Search(Reported):
     @property
     def judged(self) -> dict[str, int]:
         """Number of candidates by what they were judged by: "bounds", "coarse", "full"."""
-        ways = [each.fidelity for each in self.candidates]
-        ways += [each.fidelity for each in self.finalists if each.fidelity == "full"]
-        return {word: ways.count(word) for word in ("bounds", "coarse", "full")}
+        ways = [each.fidelity for each in self.every]
+        return {word: ways.count(word) for word in get_args(Fidelity)}
 
     @property
     def at_ends(self) -> dict[str, str]:
@@ -463,9 +461,7 @@ def _figures(search: Search, unit: LengthUnit) -> Iterator[tuple[Any, str]]:
 
 def _written_unit(unit: str, length: LengthUnit) -> tuple[str, float]:
     """Suffix of a column, and the size of its unit; pressures stay in Pa."""
-    if unit == "Pa":
-        return "_pa", 1.0
-    name, size = readable_unit(unit, 0.0, length)
-    if unit not in ("m", "m2", "m3"):
-        return unit_suffix(unit).replace("/", "_per_"), size
-    return f"_{name.replace('²', '2').replace('³', '3')}", size
+    if unit in ("m", "m2", "m3"):
+        name, size = readable_unit(unit, 0.0, length)
+        return f"_{name.replace('²', '2').replace('³', '3')}", size
+    return unit_suffix(unit).replace("/", "_per_"), math.radians(1.0) if unit == "rad" else 1.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 _ACTIVE = 1e-3  # room below which a requirement may decide
 _AT_END = 1e-6  # of a range
-_CONFIDENCE = 0.95
+_CONFIDENCE = (0.025, 0.975)
 _RESAMPLES = 400
 _MOST = 1 << 16
 
@@ -50,7 +49,7 @@ class VarianceShares(NamedTuple):
     first: Array
     """By itself: Sobol's index of first order, shape (parameters,)."""
     first_error: Array
-    """Half the confidence interval of 95 % by bootstrap."""
+    """Half the confidence interval of 95 %, by bootstrap over the rows of designs."""
     total: Array
     """With all that it does together with others: the total index."""
     total_error: Array
@@ -155,7 +154,7 @@ def sensitivity(
         candidate: The design; by default the best of the search.
         n: Rows of designs for the shares of variance, a power of two; parameters + 2 designs each.
             0 for none.
-        seed: Of these designs.
+        seed: Of these designs, and of the bootstrap.
         progress: Called with the number of designs looked at since its last call.
 
     Raises:
@@ -288,36 +287,38 @@ def _ends(problem: Problem, point: Point) -> list[_Condition]:
 def _variances(
     problem: Problem, n: int, seed: int, progress: Progress
 ) -> tuple[VarianceShares | None, ...]:
-    """Shares of variance of each goal, of designs on coarse sets."""
-    from scipy.stats import sobol_indices, uniform
+    """Shares of variance of each goal, of designs on coarse sets [Saltelli2010]."""
+    from scipy.stats import qmc
 
-    free, known = problem.parameters.free, []
-
-    def at(cube: Array) -> Array:
-        tasks = (
-            partial(_values, problem, {p.name: p.at(x) for p, x in zip(free, place, strict=True)})
-            for place in cube.T.tolist()
-        )
-        for row in parallel.in_order(tasks):
-            known.append([*row, 0.0])  # SciPy fails at one goal of one parameter
-            progress(1)
-        return np.array(known[-cube.shape[1] :]).T
-
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what does not depend on a parameter
-        indices = sobol_indices(
-            func=at, n=n, dists=[uniform()] * len(free), rng=np.random.default_rng(seed)
-        )
-        again = indices.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
-    ends = (each.confidence_interval for each in (again.first_order, again.total_order))
-    first, total = (0.5 * np.nan_to_num(np.subtract(each.high, each.low)) for each in ends)
-    parts = np.array([indices.first_order, first, indices.total_order, total])
-    shares = parts.reshape(4, -1, len(free))  # SciPy drops axes of one
-    values = np.array(known)
-    return tuple(
-        VarianceShares(*shares[:, k]) if np.isfinite(values[:, k]).all() else None
-        for k in range(len(problem.goals))
+    free, rng = problem.parameters.free, np.random.default_rng(seed)
+    known: list[list[float]] = []
+    cube = qmc.Sobol(2 * len(free), rng=rng, bits=64).random(n)
+    first, second = np.split(cube, 2, axis=1)
+    mixed = np.where(np.eye(len(free), dtype=bool)[:, None], second, first)
+    tasks = (
+        partial(_values, problem, {p.name: p.at(x) for p, x in zip(free, place, strict=True)})
+        for place in np.concatenate([first, second, *mixed]).tolist()
     )
+    for row in parallel.in_order(tasks):
+        known.append(row)
+        progress(1)
+    values = np.array(known).reshape(-1, n, len(problem.goals))
+    values -= values[:2].mean(axis=(0, 1))
+
+    def indices(rows: Any) -> Array:
+        """Of first order, and total ones, shape (2, parameter, goal); 0 of what never changes."""
+        here, there, *between = values[:, rows]
+        moved = np.array(between) - here
+        parts = (there * moved).mean(axis=1), 0.5 * (moved**2).mean(axis=1)
+        with np.errstate(all="ignore"):
+            shares = np.array(parts) / np.var([here, there], axis=(0, 1))
+        return np.where(np.isfinite(shares), shares, 0.0)
+
+    again = [indices(rng.integers(n, size=n)) for _ in range(_RESAMPLES)]
+    errors = 0.5 * np.ptp(np.quantile(again, _CONFIDENCE, axis=0), axis=0)
+    shares = np.stack([indices(slice(None)), errors], axis=1).reshape(4, len(free), -1)
+    is_known = np.isfinite(values).all(axis=(0, 1)).tolist()
+    return tuple(VarianceShares(*shares[..., k]) if x else None for k, x in enumerate(is_known))
 
 
 def _values(problem: Problem, values: Mapping[str, Any]) -> list[float]:

@@ -218,28 +218,32 @@ def _target_text(target: TargetTolerance) -> str:
 
 def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
     """Numbers to first order, and of arms that are made with the first of the changes."""
-    deviations, followed = first.deviations, _Followed.of(first, seed) if checked else None
-    numbers: list[tuple[Spread, _Asked]] = [
-        (first.kept(), lambda arm, solid: followed.kept(solid) if followed else math.nan),
-        (first.of_set("volume", "m3", 1.0), lambda arm, solid: solid.volume),
-        (first.of_set("unreachability", "1", -1.0), lambda arm, solid: solid.unreachability),
-        *((first.covered(*region), partial(_share, first, *region)) for region in first.regions),
+    deviations = first.deviations
+    spreads = [
+        first.kept(),
+        first.of_set("volume", "m3", 1.0),
+        first.of_set("unreachability", "1", -1.0),
+        *(first.covered(*region) for region in first.regions),
     ]
-    starts = [_starts(first, target) for target in first.targets] if checked else []
-    asked = [ask for _, ask in numbers]
-    tasks = (partial(_made, first, asked, starts, change) for change in first.changes[:checked])
     made: list[tuple[list[float], list[Mask]]] = []
-    for each in parallel.in_order(tasks):
-        progress(1)
-        made += [] if each is None else [each]
-    values = np.array([row for row, _ in made]).reshape(len(made), len(numbers)).T.copy()
-    errors = np.zeros(len(numbers))
-    if made and followed:
-        errors[0] = followed.error(float(values[0].mean()))
-    spreads = zip(numbers, values, errors.tolist(), strict=True)
-    kept, volume, unreachability, *regions = (
-        spread.with_made(own, error) for (spread, _), own, error in spreads
-    )
+    errors = np.zeros(len(spreads))
+    if checked:
+        followed = _Followed.of(first, seed)
+        asked: list[_Asked] = [
+            followed.kept,
+            lambda arm, solid: solid.volume,
+            lambda arm, solid: solid.unreachability,
+            *(partial(_share, first, *region) for region in first.regions),
+        ]
+        starts = [_starts(first, target) for target in first.targets]
+        tasks = (partial(_made, first, asked, starts, change) for change in first.changes[:checked])
+        for each in parallel.in_order(tasks):
+            progress(1)
+            made += [] if each is None else [each]
+        errors[0] = followed.error(float(np.mean([row[0] for row, _ in made]))) if made else 0.0
+    values = np.array([row for row, _ in made]).reshape(len(made), len(spreads)).T
+    each = zip(spreads, values, errors.tolist(), strict=True)
+    kept, volume, unreachability, *regions = (x.with_made(own, error) for x, own, error in each)
     return Tolerance(
         arm=deviations.arm,
         parameters=deviations.names,
@@ -269,10 +273,10 @@ def _target(first: FirstOrder, target: Target, reached: list[Mask]) -> TargetTol
 class _Followed(NamedTuple):
     """Places within the reach of the design, more of them near its boundary."""
 
-    places: tuple[Array, Array]
-    """Near the boundary, and away from it."""
-    shares: tuple[float, float]
-    """Share of the volume that each stands for."""
+    near: Array
+    away: Array
+    share: float
+    """Share of the volume near the boundary."""
 
     @classmethod
     def of(cls, first: FirstOrder, seed: int) -> _Followed:
@@ -283,22 +287,17 @@ class _Followed(NamedTuple):
         moves = np.linalg.norm(boundary.speed_at(pool) * first.deviations.sigmas, axis=1)
         width = math.sqrt(float(boundary.area.mean()))
         near = boundary.distance(pool) < _NEAR * moves + width
-        parts = pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED]
-        return cls(parts, (float(near.mean()), float((~near).mean())))
+        return cls(pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED], float(near.mean()))
 
-    def kept(self, solid: ReachableSet) -> float:
-        """Share of the volume that another set contains."""
-        return sum(
-            share * float(solid.contains(part).mean())
-            for part, share in zip(self.places, self.shares, strict=True)
-            if len(part)
-        )
+    def kept(self, arm: Manipulator, solid: ReachableSet) -> float:
+        """Share of the volume that the set of another arm contains."""
+        parts = ((self.near, self.share), (self.away, 1.0 - self.share))
+        return sum(x * float(solid.contains(part).mean()) for part, x in parts if len(part))
 
     def error(self, kept: float) -> float:
         """Standard error of such a share, as if the places were random."""
-        share, count = self.shares[0], max(1, len(self.places[0]))
-        lost = min(1.0, (1.0 - kept) / max(share, 1e-9))
-        return share * math.sqrt(lost * (1.0 - lost) / count)
+        lost = min(1.0, (1.0 - kept) / max(self.share, 1e-9))
+        return self.share * math.sqrt(lost * (1.0 - lost) / max(1, len(self.near)))
 
 
 _Asked = Callable[[Manipulator, ReachableSet], float]
@@ -313,16 +312,15 @@ def _made(
         try:
             arm = first.deviations.made(change)
             solid = reachable_set(arm, accuracy=first.accuracy)
-            if solid.dimension < 3:
-                return None
-            pairs = zip(first.targets, starts, strict=True)
-            return [ask(arm, solid) for ask in asked], [_reached(arm, first, *x) for x in pairs]
-        except InvalidDesign:
-            return None
-        except InvalidInput as error:
-            if error.name != "loads":
+            if solid.dimension == 3:
+                reached = [
+                    _reached(arm, first, *x) for x in zip(first.targets, starts, strict=True)
+                ]
+                return [ask(arm, solid) for ask in asked], reached
+        except (InvalidDesign, InvalidInput) as error:
+            if isinstance(error, InvalidInput) and error.name != "loads":
                 raise
-            return None
+    return None
 
 
 def _tried(target: Target) -> Index:
