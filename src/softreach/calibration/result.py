@@ -61,15 +61,6 @@ class Rival(NamedTuple):
     held_out: PlacementErrors
 
 
-class ErrorRow(NamedTuple):
-    """Errors of one law on some samples."""
-
-    law: str
-    samples: str
-    """Those of which the errors are."""
-    errors: PlacementErrors
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Reported):
     """A calibrated arm, the numbers that were fitted, and all that the data says of them."""
@@ -297,18 +288,17 @@ class Calibration(Reported):
         write_text(path, "\n".join(lines) + f"\n\n{self.arm.file_text}", overwrite=overwrite)
 
     @property
-    def errors(self) -> tuple[ErrorRow, ...]:
-        """Errors of the calibrated arm, of the design, and of rivals on the same samples."""
+    def errors(self) -> list[tuple[str, str, PlacementErrors]]:
+        """Law, samples and its errors there: the calibrated arm, the design, rivals."""
         held = int(self.held.sum())
         fitted = f"{len(self.data) - held} fitted"
         on = f"{held} held out" if held else fitted
-        rows = [ErrorRow("calibrated", fitted, self.train)]
-        rows += [ErrorRow("calibrated", on, self.held_out)] if held else []
-        rows.append(ErrorRow("design, base fitted", on, self.before))
-        for rival in self.rivals:
-            law = f"{rival.name}, {counted(rival.numbers, 'number')}"
-            rows.append(ErrorRow(law, on, rival.held_out if held else rival.train))
-        return tuple(rows)
+        rows = [("calibrated", fitted, self.train)]
+        rows += [("calibrated", on, self.held_out)] if held else []
+        rows.append(("design, base fitted", on, self.before))
+        for name, numbers, *errors in self.rivals:
+            rows.append((f"{name}, {counted(numbers, 'number')}", on, errors[held > 0]))
+        return rows
 
     def table(self, unit: str = "m") -> pd.DataFrame:
         """Inputs, measured and predicted places and their distances, a row for each sample.
