@@ -319,44 +319,42 @@ def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]
     offsets = [float(np.linalg.norm(marker.offset)) for marker in arm.markers]
     reach = _WIDEST * (arm.length + max(offsets, default=0.0))
     away = np.nan_to_num(np.abs(places - np.nanmedian(places, axis=0)))
-    if (far := int((away > reach).sum())) == 0:
-        return
-    row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
-    name, others = columns[marker][axis], f", as {far - 1} others" if far > 1 else ""
-    allowed = (
-        f"within {1e3 * reach:.4g} mm of the middle, for an arm of {1e3 * arm.length:.4g} mm: look "
-        "at the unit of the column, and leave a cell empty where the marker was not seen"
-    )
-    given = f"{1e3 * places[row, marker, axis]:.4g} mm{others}"
-    raise InvalidInput(f"{name} in row {row}", given, allowed)
+    if far := int((away > reach).sum()):
+        row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
+        given = f"{1e3 * places[row, marker, axis]:.4g} mm"
+        given += f", as {far - 1} others" if far > 1 else ""
+        allowed = f"within {1e3 * reach:.4g} mm of the middle, for an arm of "
+        allowed += f"{1e3 * arm.length:.4g} mm: look at the unit of the column, and leave a cell "
+        allowed += "empty where the marker was not seen"
+        raise InvalidInput(f"{columns[marker][axis]} in row {row}", given, allowed)
 
 
 def _refuse_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
-    bundles = [*[None] * len(arm.drives), *(arm.undriven if arm.drives else range(arm.bundles))]
+    actuators = [*[None] * len(arm.drives), *(arm.bundle_actuators[k] for k in arm.undriven)]
     most = np.abs(arm.input_bounds).max(axis=1)
+
+    def refuse(row: int, k: int, allowed: str) -> None:
+        given = f"{values[row, k]:.4g} {arm.input_units[k]}"
+        raise InvalidInput(f"{columns[k]} in row {row}", given, allowed)
+
     for unit in dict.fromkeys(arm.input_units):
         own = [k for k, each in enumerate(arm.input_units) if each == unit and columns[k]]
         bound = max((most[k] for k in own), default=0.0)
         size = np.abs(values[:, own])
         if not own or not size.any() or not 0 < bound < np.inf:
             continue
-        row, k = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
-        name, reached = columns[own[k]], f"{values[row, own[k]]:.4g} {unit}"
         if size.max() > _HARD * bound:
-            allowed = f"near the bounds of the design, {bound:.4g} {unit}"
-            allowed += ": look at the column's unit"
-            raise InvalidInput(f"{name} in row {row}", reached, allowed)
-        for j in own:
-            actuator = None if bundles[j] is None else arm.bundle_actuators[bundles[j]]
-            row = int(values[:, j].argmin())
-            if values[row, j] < getattr(actuator, "least", -np.inf) - _SLACK * size.max():
-                given = f"{values[row, j]:.4g} {unit}"
-                allowed = f"at least 0 {unit}: a tendon pulls and cannot push"
-                raise InvalidInput(f"{columns[j]} in row {row}", given, allowed)
+            row, k = divmod(int(size.argmax()), len(own))
+            near = f"near the bounds of the design, {bound:.4g} {unit}: look at the column's unit"
+            refuse(row, own[k], near)
+        for k in own:
+            row = int(values[:, k].argmin())
+            if values[row, k] < getattr(actuators[k], "least", -np.inf) - _SLACK * size.max():
+                refuse(row, k, f"at least 0 {unit}: a tendon pulls and cannot push")
 
 
-def _missing(what: str, name: str, columns: list[str]) -> InvalidInput:
-    listed = ", ".join(columns[:12]) + (", ..." if len(columns) > 12 else "")
+def _missing(what: str, name: str, columns: Sequence[str]) -> InvalidInput:
+    listed = ", ".join(columns[:12]) + ", ..." * (len(columns) > 12)
     return InvalidInput(what, name, f"a column: {listed}", did_you_mean(name, columns))
 
 
@@ -374,8 +372,7 @@ def _triples(columns: list[str]) -> dict[str, list[str]]:
     for column in columns:
         name, unit, _ = _unit(column)
         if unit == "m" and (match := _PLACE.fullmatch(name)):
-            start = match["head"].rstrip("_ ") or match["number"]
-            start += match["number"] if match["head"].rstrip("_ ") else ""
+            start = match["head"].rstrip("_ ") + match["number"]
             found.setdefault(start, {})[match["axis"].lower()] = column
     for axes in found.values():
         if lacking := [axis for axis in "xyz" if axis not in axes]:

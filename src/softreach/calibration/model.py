@@ -17,7 +17,7 @@ from softreach.arm.base import Base
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
-from softreach.calibration.free_numbers import FreeNumbers
+from softreach.calibration.free_numbers import FreeNumbers, Neighbors
 from softreach.calibration.measurements import Measurements, marker_names
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.free import FreeRod
@@ -36,7 +36,7 @@ from softreach.rod.response import (
 )
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, joined
 
 _BLOCK = 1024  # samples at once: their shapes at all nodes are kept
 _TOL = 1e-6
@@ -50,7 +50,7 @@ class Prediction(NamedTuple):
     """Predicted places of the markers of all samples."""
 
     places: Array  # In the world [m], NaN without an equilibrium, shape (n, marker, 3)
-    slopes: Array | None  # Derivatives by the free numbers, shape (n, marker, 3, number)
+    slopes: Array  # Derivatives by the free numbers, (n, marker, 3, number); of none unless asked
     status: NDArray[np.int8]  # `TipStatus`, shape (n,)
 
 
@@ -116,19 +116,9 @@ class MarkerModel:
         free, stations = self.free, marker_stations(arm)[0][self.markers]
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
-        neighbors: list[list[tuple[float, Manipulator | Base]]] = []
-        if values is not None:
-            neighbors = [free.neighbors(values, k) for k in range(len(free))]
-        blocks = [
-            self._block(arm, neighbors, grid, rows, values is not None)
-            for rows in parallel.blocks(len(self.inputs), _BLOCK)
-        ]
-        places, slopes, status = zip(*blocks, strict=True)
-        return Prediction(
-            np.concatenate(places),
-            None if values is None else np.concatenate([s for s in slopes if s is not None]),
-            np.concatenate(status),
-        )
+        neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
+        blocks = parallel.blocks(len(self.inputs), _BLOCK)
+        return joined([self._block(arm, neighbors, grid, self.inputs[rows]) for rows in blocks])
 
     def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm)
@@ -157,14 +147,8 @@ class MarkerModel:
         )
 
     def _block(
-        self,
-        arm: Manipulator,
-        neighbors: list[list[tuple[float, Manipulator | Base]]],
-        grid: StepGrid,
-        rows: slice,
-        slopes: bool,
-    ) -> tuple[Array, Array | None, NDArray[np.int8]]:
-        inputs = self.inputs[rows]
+        self, arm: Manipulator, neighbors: list[Neighbors], grid: StepGrid, inputs: Array
+    ) -> Prediction:
         at = self._explicit(arm, grid, inputs)
         body = body_of(arm)
         bounds = body.bounds * 0.0  # which decide nothing
@@ -181,22 +165,16 @@ class MarkerModel:
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
         places = at.position + _beyond(at, state)[1] @ at.rotation.T
         places[lost] = np.nan
-        if not slopes:
-            return places, None, state.status
-        known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
-        changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
-        result = np.full((*places.shape, len(changes)), np.nan)
-        some = RodState(*(getattr(state, name)[known] for name in RodState.__dataclass_fields__))
-        result[known] = _slopes(rod.arm, at, some, changes, known)
-        return places, result, state.status
+        slopes = np.full((*places.shape, len(neighbors)), np.nan)
+        if neighbors:
+            known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
+            some = RodState(*(getattr(state, x)[known] for x in RodState.__dataclass_fields__))
+            changes = [self._change(arm, at, each, grid, inputs) for each in neighbors]
+            slopes[known] = _slopes(rod.arm, at, some, changes, known)
+        return Prediction(places, slopes, state.status)
 
     def _change(
-        self,
-        arm: Manipulator,
-        at: _Explicit,
-        neighbors: list[tuple[float, Manipulator | Base]],
-        grid: StepGrid,
-        inputs: Array,
+        self, arm: Manipulator, at: _Explicit, neighbors: Neighbors, grid: StepGrid, inputs: Array
     ) -> _Explicit:
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
@@ -224,11 +202,7 @@ def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:
 
 
 def _slopes(
-    arm: Manipulator,
-    at: _Explicit,
-    state: RodState,
-    changes: list[_Explicit],
-    rows: Mask,
+    arm: Manipulator, at: _Explicit, state: RodState, changes: list[_Explicit], rows: Mask
 ) -> Array:
     """Derivatives of the places by all numbers, (n, marker, 3, number)."""
     bundles = state.gamma.shape[1]
@@ -267,13 +241,10 @@ def _with_tensions(
     """
     law = LengthLaw(arm)
     columns, bundles = law.columns, state.gamma.shape[1]
-    tension = state.gamma[:, columns]
-    bend, rise = _strains(at, state)
+    tension, strains = state.gamma[:, columns], _strains(at, state)
     own = [
-        _explicit_shortening(at, change, bend, rise)
-        + tension * change.compliance
-        + change.taut_from
-        for change in changes
+        _explicit_shortening(at, each, *strains) + tension * each.compliance + each.taut_from
+        for each in changes
     ]
     # The other changes act as if so much less were pulled in.
     pulled = driven.copy()

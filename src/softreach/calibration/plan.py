@@ -160,11 +160,13 @@ def plan_poses(
     numbers = free_numbers(arm, free)
     candidates = as_integer("candidates", candidates, 2, 200_000)
     n, seed = as_integer("n", n, 1, candidates), as_integer("seed", seed)
-    names = _markers(arm, markers)
-    inputs = _candidates(arm, candidates, seed)
+    names, (low, high) = _markers(arm, markers), arm.input_bounds.T
+    moving = low < high
+    cube = _candidates(int(moving.sum()), candidates, seed)
+    inputs = np.tile(low, (len(cube), 1))
+    inputs[:, moving] += cube * (high - low)[moving]
     model = MarkerModel(numbers, inputs, marker_places(arm, names))
     prediction = model.predict(numbers.start, slopes=True)
-    assert prediction.slopes is not None
     usable = np.isfinite(prediction.slopes).all(axis=(1, 2, 3))
     usable &= prediction.status == TipStatus.STABLE
     if not usable.any():
@@ -176,14 +178,11 @@ def plan_poses(
     if not least <= n <= len(inputs):
         allowed = f"from {least} for these {len(numbers)} numbers to {len(inputs):,} candidates"
         raise InvalidInput("n", n, allowed)
-    low, high = arm.input_bounds.T
-    moving = low < high
-    at = (inputs[:, moving] - low[moving]) / (high - low)[moving]
     # An arm about to snap reacts to everything, and that at activations which are not known yet.
     trusted = slopes * numbers.scale
     size = np.linalg.norm(trusted, axis=(1, 2))
     trusted /= np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
-    chosen = _chosen(trusted, at, n)
+    chosen = _chosen(trusted, cube[usable], n)
     np.random.default_rng(seed).shuffle(chosen)
     identifiable(numbers, own := slopes[chosen].reshape(-1, len(numbers)))
     return PosePlan(numbers, names, inputs[chosen], own.T @ own)
@@ -201,22 +200,13 @@ def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
     return names
 
 
-def _candidates(arm: Manipulator, count: int, seed: int) -> Array:
-    """Activations all over the box, then corners of it, shape (n, input)."""
-    low, high = arm.input_bounds.T
-    free = np.flatnonzero(low < high)
-    whole = 1 << (count - 1).bit_length()
-    inside = sample_cube("sobol", whole, len(free), seed)[:count]
-    if len(free) <= _CORNERS:
-        corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * len(free), indexing="ij"), axis=-1)
-        corners = corners.reshape(-1, len(free))
-    else:
-        draw = np.random.default_rng(seed).integers(0, 2, (1 << _CORNERS, len(free)))
-        corners = np.unique(draw, axis=0).astype(float)
-    cube = np.concatenate([inside, corners])
-    inputs = np.tile(low, (len(cube), 1))
-    inputs[:, free] = low[free] + cube * (high - low)[free]
-    return inputs
+def _candidates(dim: int, count: int, seed: int) -> Array:
+    """Places all over the unit cube, then corners of it, shape (n, dim)."""
+    inside = sample_cube("sobol", 1 << (count - 1).bit_length(), dim, seed)[:count]
+    if dim <= _CORNERS:
+        return np.concatenate([inside, [*np.ndindex(*[2] * dim)]])
+    draw = np.random.default_rng(seed).integers(0, 2, (1 << _CORNERS, dim))
+    return np.concatenate([inside, np.unique(draw, axis=0)])
 
 
 def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:

@@ -191,7 +191,6 @@ class Calibration(Reported):
         allowed = f"shape (n, {self.arm.inputs})"
         x = as_rows("inputs", inputs, self.arm.inputs, allowed)
         prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
-        assert prediction.slopes is not None
         covariance = self.uncertainty.covariance
         square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
         return prediction.places, np.sqrt(np.maximum(square, 0.0))
