@@ -150,20 +150,17 @@ class FreeParameters:
 
     def start(self) -> dict[str, float | str] | None:
         """Values of the first base, within the ranges; None where it does not tell them."""
-        arm, values = self.base, {}
-        known = parameters_by_every_name(arm)
-        for parameter in self.free:
-            if parameter.name in _WORDS:
-                values[parameter.name] = parameter.choices[0]
+        known, values = parameters_by_every_name(self.base), {}
+        for name, each in ((each.name, each) for each in self.free):
+            if name in _WORDS:
+                values[name] = each.choices[0]
                 continue
-            value = known[parameter.name].value(arm) if parameter.name in known else np.nan
+            value = known[name].value(self.base) if name in known else np.nan
             if not np.isfinite(value):
                 return None
-            if parameter.choices:
-                near = np.argmin([abs(float(choice) - value) for choice in parameter.choices])
-                values[parameter.name] = parameter.choices[int(near)]
-            else:
-                values[parameter.name] = float(np.clip(value, parameter.low, parameter.high))
+            values[name] = float(np.clip(value, each.low, each.high))
+            if each.choices:
+                values[name] = min(each.choices, key=lambda x, value=value: abs(float(x) - value))
         return values
 
 
@@ -172,14 +169,7 @@ def free_parameters(
     free: Mapping[str, Any],
     choices: Mapping[str, Sequence[Any]] | None = None,
 ) -> FreeParameters:
-    """Free parameters from what a user gives.
-
-    Args:
-        base: A design, or several by name, one of which is chosen.
-        free: Parameter -> (low, high) [SI unit], or the parameter that it is tied to:
-            `"-left.revolution"`, `"0.5*left.offset + 90deg"`.
-        choices: Parameter -> values; `bundles` -> numbers of copies of the first actuator, evenly
-            spread; `material` of everything -> names of materials.
+    """Free parameters from what a user gives to `search`.
 
     Raises:
         InvalidInput: An unknown parameter, a range that is reversed, empty or beyond what the
@@ -206,15 +196,10 @@ def free_parameters(
 
 
 def known_parameters(arms: Iterable[Manipulator], counts: Any) -> dict[str, Parameter]:
-    """Parameters that any of the designs has, also with other numbers of bundles.
-
-    Args:
-        arms: The designs.
-        counts: Numbers of bundles to choose from.
-    """
+    """Parameters that any of the designs has, also with numbers of bundles to choose from."""
+    counted = counts if isinstance(counts, list | tuple) else ()
     known: dict[str, Parameter] = {}
     for arm in arms:
-        counted = counts if isinstance(counts, list | tuple) else ()
         for variant in (arm, *(_with_bundles(arm, count) for count in counted)):
             known = {**parameters_by_every_name(variant), **known}
     return known
@@ -291,11 +276,8 @@ def _with_bundles(arm: Manipulator, count: Any) -> Manipulator:
         what = "arms with drives" if arm.drives else f"{first.name}, which has no offset"
         raise NotPossible(f"the number of bundles cannot be chosen for {what}")
     offset = float(first.value_on("offset", arm.profile, arm.section))
-    turns = (offset + 2.0 * np.pi * np.arange(count) / count) % (2.0 * np.pi)
-    copies = (
-        first.replace(name=f"{first.name} {k}", offset=turn)
-        for k, turn in enumerate(turns.tolist(), 1)
-    )
+    turns = enumerate(((offset + 2.0 * np.pi * np.arange(count) / count) % (2.0 * np.pi)).tolist())
+    copies = (first.replace(name=f"{first.name} {k + 1}", offset=turn) for k, turn in turns)
     return arm.replace(actuators=tuple(copies))
 
 

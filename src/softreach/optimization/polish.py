@@ -14,6 +14,7 @@ from softreach.optimization.problem import Candidate, Problem
 from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
+from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
@@ -40,29 +41,21 @@ def can_polish(problem: Problem) -> bool:
     )
 
 
+@parallel.undivided()
 @no_warnings()
 def polished(
     problem: Problem,
     start: Candidate,
-    *,
+    designs: int,
+    goal: int,
+    floors: Sequence[float],
     accuracy: float | None = None,
-    goal: int = 0,
-    floors: Sequence[float] = (),
-    designs: int = MOST_DESIGNS,
 ) -> Candidate:
     """The local optimum of one goal next to a design; poses at the targets move along with it.
 
-    Args:
-        problem: The problem.
-        start: The design to begin with.
-        accuracy: Relative error of volumes, instead of that of coarse sets.
-        goal: Number of the goal that is optimized.
-        floors: Costs of all goals that are not to be exceeded, but for that one.
-        designs: Most designs that are made.
-
-    Returns:
-        The better of both ends, with the number of designs that were looked at: none for a start
-        that is too far from what is required.
+    The costs of the other goals do not exceed the `floors`; the relative error of volumes is that
+    of coarse sets unless another `accuracy` is given. Returned is the better of both ends, with the
+    number of designs that were made: none for a start that is too far from what is required.
     """
     if start.excess > _HOPELESS:
         return replace(start, designs=0)

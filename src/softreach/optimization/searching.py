@@ -205,9 +205,9 @@ class _Run:
         most = min(MOST_DESIGNS, self._left // max(1, len(starts)))
         tasks = []
         for k, start in enumerate(starts):
-            turn = self._turn(start, k)
-            what = ["polish", dict(start.values), most, *turn]
-            make = partial(self._polished, start, most, turn)
+            goal, floors = self._turn(start, k)
+            what = ["polish", dict(start.values), most, goal, floors]
+            make = partial(polished, self.problem, start, most, goal, floors)
             tasks.append(partial(self._study.judged, what, make))
         for candidate, is_new in parallel.in_order(tasks):
             if candidate.designs:
@@ -222,14 +222,6 @@ class _Run:
         moving = [k for k, goal in enumerate(goals) if goal.name != "actuators"]
         goal = (moving or [0])[(len(self._starts) + k) % max(1, len(moving))]
         return goal, self.problem.costs(start) if start.is_feasible else ()
-
-    def _polished(
-        self, start: Candidate, most: int, turn: tuple[int, Any], accuracy: float | None = None
-    ) -> Candidate:
-        goal, floors = turn
-        at = {"accuracy": accuracy, "goal": goal, "floors": floors}
-        with parallel.undivided():
-            return polished(self.problem, start, designs=most, **at)
 
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best designs that lie apart from each other and from ends of polishes."""
@@ -271,8 +263,8 @@ class _Run:
             best = sorted(finite, key=problem.score)[:_LAST] or list(candidates[:1])
         left = min(MOST_DESIGNS, self._designs - self._spent)
         if self._polishes and left >= _LEAST_OF_POLISH:
-            end = self._polished(best[0], left, self._turn(best[0]), problem.accuracy)
-            best.append(end)
+            turn = self._turn(best[0])
+            best.append(end := polished(problem, best[0], left, *turn, problem.accuracy))
             self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]
 
