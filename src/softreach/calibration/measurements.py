@@ -95,8 +95,7 @@ class Measurements:
     def of(self, rows: NDArray[np.intp] | Mask) -> Measurements:
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
-        rank = np.empty(len(self), np.intp)
-        rank[self.order] = np.arange(len(self))
+        rank = np.argsort(self.order)
         return replace(
             self,
             inputs=self.inputs[rows],

@@ -84,11 +84,7 @@ def polished(
 
 @no_warnings()
 def point_of(problem: Problem, candidate: Candidate, accuracy: float, goal: int = 0) -> Point:
-    """The program of one goal at a design, with the poses that it has at the targets.
-
-    Raises:
-        InvalidDesign: It is no design.
-    """
+    """The program of one goal at a design, with the poses that it has at the targets."""
     program = _Program(problem, candidate, accuracy, goal)
     return program.point(program.begin())
 
@@ -117,11 +113,7 @@ class _Program:
     _like: Sequence[TipMap] = ()
 
     def begin(self) -> Array:
-        """Unknowns of the start.
-
-        Raises:
-            InvalidDesign: It is no design.
-        """
+        """Unknowns of the start."""
         parameters = self.problem.parameters
         low, high = parameters.bounds.T
         reals = (parameters.reals(self.start.values) - low) / (high - low)
@@ -139,11 +131,7 @@ class _Program:
         return first
 
     def optimum(self) -> Array:
-        """Unknowns at which the program ends, or at which it was cut.
-
-        Raises:
-            InvalidDesign: The start is no design.
-        """
+        """Unknowns at which the program ends, or at which it was cut."""
         from scipy.optimize import minimize
 
         first, constraints = self.begin(), []

@@ -144,9 +144,7 @@ def goals(
 ) -> tuple[Goal, ...]:
     """Objectives with their senses, in the order in which names or metrics are given.
 
-    Raises:
-        InvalidInput: An unknown one, one that is given twice, or one about targets or regions that
-            the requirements do not have.
+    Those about targets or regions are refused where the requirements have none.
     """
     result = []
     for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
@@ -164,11 +162,7 @@ def goals(
 
 
 def known_objective(word: str, given: str | Metric) -> Objective:
-    """The objective of a name, or of a metric, which errors call by a word.
-
-    Raises:
-        InvalidInput: There is none.
-    """
+    """The objective of a name, or of a metric, which errors call by a word."""
     if isinstance(given, str) and given in OBJECTIVES:
         return OBJECTIVES[given]
     metric = given if isinstance(given, Metric) else known_metric(given)
@@ -347,11 +341,7 @@ class Problem:
         return bool(self.requirements.regions) or not names.isdisjoint(SETS)
 
     def case(self, values: Values, accuracy: float) -> DesignCase:
-        """The design with these values, to be asked to a relative error of volumes.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """The design with these values, to be asked to a relative error of volumes."""
         fine = accuracy <= self.accuracy
         return DesignCase(self.parameters.arm(values), self.requirements, accuracy, fine)
 

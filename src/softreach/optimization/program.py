@@ -64,11 +64,11 @@ class DesignPoint:
     @lazy
     def derivatives(self) -> tuple[TipDerivatives, ...]:
         """∂r/∂p of each of these, by parameters of the arm."""
-        known = [find_parameters(rod.arm, self._paths[0]) for rod in self.rods]
-        return tuple(
-            TipDerivatives(rod, [each[name] for name in self._paths[0]])
-            for rod, each in zip(self.rods, known, strict=True)
-        )
+        return tuple(map(self._derivatives_of, self.rods))
+
+    def _derivatives_of(self, rod: TipMap) -> TipDerivatives:
+        known = find_parameters(rod.arm, self._paths[0])
+        return TipDerivatives(rod, [known[name] for name in self._paths[0]])
 
     @lazy
     def chain(self) -> Array:
@@ -117,10 +117,8 @@ class DesignPoint:
             return np.zeros(self.chain.shape[1])
         nodes = boundary_samples(solid.image)
         inside = (region.distance(nodes.places) <= 0.0).astype(float)
-        derivatives, rod = self.derivatives[number], effective(self.rods[number])
-        if rod is not self.rods[number]:
-            known = find_parameters(rod.arm, self._paths[0])
-            derivatives = TipDerivatives(rod, [known[name] for name in self._paths[0]])
+        own, rod = self.rods[number], effective(self.rods[number])
+        derivatives = self.derivatives[number] if rod is own else self._derivatives_of(rod)
         swept = nodes.derivative(derivatives.at(nodes.cube), inside)
         return swept @ self.chain / region.volume
 
@@ -128,15 +126,11 @@ class DesignPoint:
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:
         """Designs on both sides along each real parameter, and how far they are apart."""
         parameters, pairs = self.problem.parameters, []
-        reals, (low, high) = parameters.reals(self.values), parameters.bounds.T
-        for k in range(len(reals)):
-            ends = np.clip(reals[k] + np.array([1, -1]) * STEP * (high - low)[k], low[k], high[k])
-            arms = []
-            for end in ends:
-                moved = reals.copy()
-                moved[k] = end
-                arms.append(parameters.arm(parameters.moved(self.values, moved)))
-            pairs.append((float((ends[0] - ends[1]) / (high - low)[k]), *arms))
+        for p in parameters.real:
+            steps = np.array([1, -1]) * STEP * (p.high - p.low)
+            ends = np.clip(float(self.values[p.name]) + steps, p.low, p.high).tolist()
+            arms = (parameters.arm({**self.values, p.name: end}) for end in ends)
+            pairs.append(((ends[0] - ends[1]) / (p.high - p.low), *arms))
         return pairs
 
     @lazy
@@ -144,15 +138,12 @@ class DesignPoint:
         """Parameters of the arm that move, and the chain."""
         parameters = self.problem.parameters
         known = parameters_by_every_name(self.case.arm)
-        widths = np.ptp(parameters.bounds, axis=1)
         names = [each.name for each in parameters.real]
-        rows = {
-            name: widths[k] * np.eye(len(names))[k] for k, name in enumerate(names) if name in known
-        }
+        widths = dict(zip(names, np.diag(np.ptp(parameters.bounds, axis=1)), strict=True))
+        rows = {name: row for name, row in widths.items() if name in known}
         for tie in parameters.ties:
-            if tie.of in names and tie.name in known:
-                k = names.index(tie.of)
-                rows[tie.name] = tie.factor * widths[k] * np.eye(len(names))[k]
+            if tie.of in widths and tie.name in known:
+                rows[tie.name] = tie.factor * widths[tie.of]
         return tuple(rows), np.array(list(rows.values())).reshape(-1, len(names))
 
 

@@ -349,13 +349,7 @@ class Search(Reported):
 
 
 def check_folder(folder: Path, *, overwrite: bool) -> None:
-    """Refuse a folder that the files of a search could not be written to.
-
-    Raises:
-        InvalidInput: Something else is there.
-        NotWritten: Nothing can be written there.
-        MissingExtra: matplotlib or Jinja2 is not installed.
-    """
+    """Refuse a folder that the files of a search could not be written to."""
     check_libraries()
     for name in _FILES:
         check_place(folder / name, overwrite=overwrite, name="out")

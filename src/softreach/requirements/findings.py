@@ -32,7 +32,7 @@ _SAMPLES, _FEWER = 2**15, 8
 as this one is: errors of extents and hulls fall with the cube root of their number or faster."""
 _PIECES = 8
 _ROUNDING = 1e-9
-_WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": "actuators"}
+_WORDS = {"load_number": "load number", "bending": "bending κR2"}
 
 
 @dataclass(frozen=True)
@@ -90,18 +90,13 @@ def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding,
     return (*_too_far(arm, needs), *(f for f in design_limits(arm, needs) if not f.met))
 
 
-def longest_reach(arm: Manipulator) -> float:
-    """No tip of the arm without loads is farther from its base than this [m]."""
-    inner = inner_arm(arm)
-    z, weights, _ = quadrature(inner, _PIECES)
-    most = ends_over(tables(inner, z).extension, inner.bounds)[:, 1]
-    return float(weights @ (1.0 + most)) * (1.0 + 1e-6)  # more than the error of the quadrature
-
-
 def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     if arm.loads is not None or any(needs.payloads) or not needs.targets:
         return
-    longest = longest_reach(arm)
+    inner = inner_arm(arm)
+    z, weights, _ = quadrature(inner, _PIECES)
+    most = ends_over(tables(inner, z).extension, inner.bounds)[:, 1]
+    longest = float(weights @ (1.0 + most)) * (1.0 + 1e-6)  # more than the error of the quadrature
     for target in needs.targets:
         room, text = longest + target.within, "farther from the base than the arm is ever long"
         if target.region is None:

@@ -161,15 +161,15 @@ class Requirements:
         size = None if length is None else as_number("length", length, POSITIVE)
         reader = _Reader(Path(folder), size)
         parts = reader.parts(document_of(text, LONGEST, as_text("source", source)))
-        faults: Sequence[Fault] = reader.faults
-        if not faults:
-            try:
-                return cls(**parts)
-            except InvalidInput as error:
-                faults = [Fault(error.name, error.value, f"must be {error.allowed}")]
-            except InvalidDesign as error:
-                faults = error.faults
-        raise InvalidDesign(faults, source)
+        if reader.faults:
+            raise InvalidDesign(reader.faults, source)
+        try:
+            return cls(**parts)
+        except InvalidInput as error:
+            fault = Fault(error.name, error.value, f"must be {error.allowed}")
+            raise InvalidDesign([fault], source) from None
+        except InvalidDesign as error:
+            raise InvalidDesign(error.faults, source) from None
 
     def to_toml(self) -> str:
         """The text of a file in m and kg, from which `from_toml` makes the same."""
@@ -232,15 +232,10 @@ def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
 
 
 def _named(parts: Sequence[Any]) -> Iterator[Any]:
-    """The parts, those without a name called "target 1" or "avoid 2" by their places.
-
-    Raises:
-        InvalidInput: Two of one name.
-    """
+    """The parts, those without a name called "target 1" or "avoid 2" by their places."""
     names = [part.name for part in parts if part.name]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidInput("name", repr(name), "of one target, or of one region, only")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InvalidInput("name", repr(twice[0]), "of one target, or of one region, only")
     for number, part in enumerate(parts, 1):
         kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
         yield part if part.name else dataclasses.replace(part, name=f"{kind} {number}")
@@ -435,37 +430,33 @@ class _Reader(FaultReader):
         return values
 
     def _read(self, value: Any, unit: str, symbol: str, plain: bool) -> Any:
-        """Numbers in SI units, however nested.
-
-        Raises:
-            ValueError: Anything else.
-        """
+        """Numbers in SI units, however nested; `ValueError` of anything else."""
         if isinstance(value, str) and "," in value:
             value = value.split(",")
         if isinstance(value, list):
             return [self._read(item, unit, symbol, plain) for item in value]
-        if isinstance(value, str) and unit and not symbol:
-            return self._quantity(value, unit)
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if is_number and symbol in ("", unit) and (symbol or plain or value == 0):
+            return value
+        if is_number and symbol:
+            value = f"{value!r}{symbol}"
+        elif not isinstance(value, str) or not unit or symbol:
             raise ValueError(value)
-        if not (symbol or plain) and value != 0:
-            raise ValueError(value)
-        return value if symbol in ("", unit) else self._quantity(f"{value!r}{symbol}", unit)
-
-    def _quantity(self, text: str, unit: str) -> float:
-        is_relative = unit == "m" and text.strip().endswith("L")
-        return read_length(text, self.length) if is_relative else read_quantity(text, unit)
+        is_relative = unit == "m" and value.strip().endswith("L")
+        return read_length(value, self.length) if is_relative else read_quantity(value, unit)
 
     def _allowed(self, unit: str, symbol: str, name: str) -> str:
         if symbol == "L" and self.length is None:
             return "the length L of the arm is not known here: give m, cm or mm"
         if symbol or not unit:
             return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
-        units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
-        hint = "" if unit != "m" or self.length is not None else "; L is not known here"
+        units, hint = ", ".join(unit_names(unit)), ""
+        if unit == "m":
+            more, hint = (", L", "") if self.length is not None else ("", "; L is not known here")
+            units += more
+        example = f'such as "{_EXAMPLES[unit]}"'
         return (
-            f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under '
-            f"{name}_{unit.lower()}{hint}"
+            f"must have its unit ({units}), {example}, or stand under {name}_{unit.lower()}{hint}"
         )
 
 
