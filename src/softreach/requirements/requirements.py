@@ -450,13 +450,11 @@ class _Reader(FaultReader):
             return "the length L of the arm is not known here: give m, cm or mm"
         if symbol or not unit:
             return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
-        units, hint = ", ".join(unit_names(unit)), ""
-        if unit == "m":
-            more, hint = (", L", "") if self.length is not None else ("", "; L is not known here")
-            units += more
-        example = f'such as "{_EXAMPLES[unit]}"'
+        units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
+        hint = "" if unit != "m" or self.length is not None else "; L is not known here"
         return (
-            f"must have its unit ({units}), {example}, or stand under {name}_{unit.lower()}{hint}"
+            f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under '
+            f"{name}_{unit.lower()}{hint}"
         )
 
 
