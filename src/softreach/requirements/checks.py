@@ -23,7 +23,6 @@ from softreach.requirements.parts import Keep, Target
 from softreach.requirements.poses import TOL, Posed, PoseRules, solved
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
-from softreach.rod.bending import bending_over_bounds
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map, in_steps
 from softreach.schema import AXES, provenance
@@ -426,11 +425,7 @@ def _limit_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> It
             where = f", at place {place + 1}{_under(made.payloads[load])}"
         elif made.requirements.targets:
             value, where = 0.0, ", counted in what is covered"
-        elif name == "bending":
-            bending = [bending_over_bounds(each.arm) for each in rules]
-            value = max(each.sharpest.value for each in bending)
-            where = ", over all bounds" + ", by search" * (not bending[0].exact)
         else:
-            value = max(each.of_bounds(name) for each in rules)
-            where = ", over all bounds, by search"
+            value, exact = max(each.of_bounds(name) for each in rules)
+            where = ", over all bounds" + ", by search" * (not exact)
         yield limit_finding(name, value if np.isfinite(value) else 0.0, most, made.arm, where)

@@ -18,7 +18,7 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.parts import LIMIT_UNITS, Keep
 from softreach.requirements.regions import HalfSpace
-from softreach.rod.bending import some_corners, worst_inputs
+from softreach.rod.bending import bending_over_bounds, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
@@ -157,10 +157,13 @@ class PoseRules:
         worst, _ = worst_inputs(self.rod, missed)
         return worst[0], self.judged(worst)
 
-    def of_bounds(self, name: str) -> float:
-        """Value of a limit of poses other than bending over all of the bounds, by search."""
+    def of_bounds(self, name: str) -> tuple[float, bool]:
+        """Value of a limit of poses over all of the bounds, and whether it is exact."""
+        if name == "bending":
+            bending = bending_over_bounds(self.arm)
+            return bending.sharpest.value, bending.exact
         _, worst = worst_inputs(self.rod, lambda gamma: self._limited(name, gamma)[:, None])
-        return float(worst[0])
+        return float(worst[0]), False
 
 
 class Body(NamedTuple):
