@@ -193,8 +193,8 @@ def _warn_of_numbers(result: Calibration) -> None:
             warn(f"the calibrated arm: {text}")
 
 
-def _ridge(features: Array, target: Array, asked: Array) -> Array:
-    """Targets at the features that are asked, (n, number), by a linear law of the known ones.
+def _ridge(features: Array, target: Array, wanted: Array) -> Array:
+    """Targets at the features that are wanted, (n, number), by a linear law of the known ones.
 
     Its penalty is that of the least generalized cross-validation.
     """
@@ -212,7 +212,7 @@ def _ridge(features: Array, target: Array, asked: Array) -> Array:
 
     best = min(_PENALTIES, key=cross_validation)
     weights = axes.T @ ((values / (values**2 + n * best))[:, None] * along)
-    return mean + ((asked - middle) / size) @ weights
+    return mean + ((wanted - middle) / size) @ weights
 
 
 def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
@@ -224,12 +224,12 @@ def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
     """
     middle, span = train.inputs.mean(axis=0), np.ptp(train.inputs, axis=0)
     size = np.where(span > 0, span, 1.0)
-    seen, asked = (with_products((each.inputs - middle) / size) for each in (train, test))
+    seen, wanted = (with_products((each.inputs - middle) / size) for each in (train, test))
     places = np.full((len(test), test.markers, 3), np.nan)
     for marker in range(test.markers):
         known = np.isfinite(train.places[:, marker]).all(axis=1)
         if known.sum() > 1:
-            places[:, marker] = _ridge(seen[known], train.places[known, marker], asked)
+            places[:, marker] = _ridge(seen[known], train.places[known, marker], wanted)
     return places, 3 * train.markers * (1 + seen.shape[1])
 
 

@@ -114,14 +114,14 @@ class _Order(NamedTuple):
 
 def _orders(model: MarkerModel, values: Array, own: Array, places: Array) -> list[_Order]:
     """All exchanges, the one that leaves least first; `own` are the places as predicted."""
-    found, plain = [], np.arange(model.inputs.shape[1])
+    orders, plain = [], np.arange(model.inputs.shape[1])
     for order in _exchanges(model):
         other = own
         if (order.inputs != plain).any():
             other = replace(model, inputs=model.inputs[:, order.inputs]).predict(values).places
         miss = _miss(model.free, other, _ordered(places, order.columns))
-        found.append(order._replace(miss=miss))
-    return sorted(found, key=lambda order: order.miss)
+        orders.append(order._replace(miss=miss))
+    return sorted(orders, key=lambda order: order.miss)
 
 
 def _exchanges(model: MarkerModel) -> Iterator[_Order]:
@@ -161,8 +161,8 @@ def _ordered(places: Array, order: NDArray[np.intp]) -> Array:
     return places.reshape(len(places), -1)[:, order].reshape(places.shape)
 
 
-def _said(found: list[_Order]) -> str:
-    alike = [order.text for order in found if order.miss <= _ALIKE * found[0].miss]
+def _said(orders: list[_Order]) -> str:
+    alike = [order.text for order in orders if order.miss <= _ALIKE * orders[0].miss]
     return f"{' or '.join(alike[:4])} seem to be exchanged, or counted the other way round"
 
 
@@ -170,11 +170,11 @@ def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> No
     own = _miss(model.free, predicted, places)
     middle = np.nanmean(places, axis=(0, 1))
     if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):
-        found = _orders(model, model.free.start, predicted, places)
-        if found[0].miss < _FAR_BETTER * own:
+        orders = _orders(model, model.free.start, predicted, places)
+        if orders[0].miss < _FAR_BETTER * own:
             raise NotPossible(
-                f"the columns of the data fit no arm with right-handed axes: {_said(found)}; "
-                f"the middle then misses by {1e3 * found[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
+                f"the columns of the data fit no arm with right-handed axes: {_said(orders)}; "
+                f"the middle then misses by {1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
             )
 
 
@@ -347,14 +347,14 @@ def exchanged_columns(
     least, best = _BETTER * misses(fit.residuals).rms, None
     for values in (model.free.start, fit.values):
         own = few.predict(values).places
-        found = _orders(few, values, own, seen)
-        if found[0].miss > _PROMISING * _miss(model.free, own, seen):
+        orders = _orders(few, values, own, seen)
+        if orders[0].miss > _PROMISING * _miss(model.free, own, seen):
             continue
-        other = replace(model, inputs=model.inputs[:, found[0].inputs])
+        other = replace(model, inputs=model.inputs[:, orders[0].inputs])
         try:
-            error = misses(refitted(other, _ordered(places, found[0].columns)).residuals).rms
+            error = misses(refitted(other, _ordered(places, orders[0].columns)).residuals).rms
         except (InvalidInput, NotPossible):
             continue
         if error < least:
-            least, best = error, (_said(found), error)
+            least, best = error, (_said(orders), error)
     return best

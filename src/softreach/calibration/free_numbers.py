@@ -208,13 +208,13 @@ def _of_parameters(arm: Manipulator, name: str) -> FreeNumber:
     if base := [path for path in paths if path.startswith("base.")]:
         allowed = "a number of the body: the base is free by pose, pose.position or pose.rotation"
         raise InvalidInput("free", base[0], allowed)
-    found = find_parameters(arm, paths)
-    first = found[paths[0]]
+    known = find_parameters(arm, paths)
+    first = known[paths[0]]
     if first.whole:
         raise InvalidInput("free", name, "a number that can change a little: this one counts")
-    if len({parameter.unit for parameter in found.values()}) > 1:
+    if len({parameter.unit for parameter in known.values()}) > 1:
         raise InvalidInput("free", name, "tied to numbers of the same unit")
-    values = [value for p in found.values() for value in p.values(arm) if math.isfinite(value)]
+    values = [value for p in known.values() for value in p.values(arm) if math.isfinite(value)]
     typical, allowed = _typical(arm, first.unit), first.range
     start = float(np.mean(values)) if values else typical
     if paths[0].rpartition(".")[2] in _PLACES:

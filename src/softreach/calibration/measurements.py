@@ -367,20 +367,20 @@ def _unit(column: str) -> tuple[str, str, float]:
 
 def _triples(columns: list[str]) -> dict[str, list[str]]:
     """Columns x, y, z of places by the start, or the number, that they share."""
-    found: dict[str, dict[str, str]] = {}
+    places: dict[str, dict[str, str]] = {}
     for column in columns:
         name, unit, _ = _unit(column)
         if unit == "m" and (match := _PLACE.fullmatch(name)):
             start = match["head"].rstrip("_ ") + match["number"]
-            found.setdefault(start, {})[match["axis"].lower()] = column
-    for axes in found.values():
+            places.setdefault(start, {})[match["axis"].lower()] = column
+    for axes in places.values():
         if lacking := [axis for axis in "xyz" if axis not in axes]:
             given = ", ".join(axes.values())
             raise NotPossible(f"a place needs x, y and z: {lacking[0]} is missing beside {given}")
-    if not found:
+    if not places:
         usual = "x_mm, y_mm, z_mm or marker1_x_mm"
         raise NotPossible(f"the data has no places: no columns such as {usual}")
-    return {start: [axes[axis] for axis in "xyz"] for start, axes in found.items()}
+    return {start: [axes[axis] for axis in "xyz"] for start, axes in places.items()}
 
 
 def _chosen_markers(
@@ -413,8 +413,8 @@ def _matched(
         if column not in columns and (column or what == "marker"):
             raise _missing(f"columns of {what} {name}", column, list(columns))
     known = {simple(name): column for column, name in columns.items()}
-    found = {name: given.get(name, known.get(simple(name))) for name in names}
-    return {name: column for name, column in found.items() if column is not None}
+    pairs = ((name, given.get(name, known.get(simple(name)))) for name in names)
+    return {name: column for name, column in pairs if column is not None}
 
 
 def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:

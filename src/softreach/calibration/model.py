@@ -187,10 +187,10 @@ class MarkerModel:
                 each.append(self._explicit(other, grid, inputs))
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
-        table = each[0].table.combined([one.table for one in each], factors)
+        table = each[0].table.combined([other.table for other in each], factors)
         others = (
             np.tensordot(factors, np.stack(columns), axes=1)
-            for columns in zip(*(one[1:] for one in each), strict=True)
+            for columns in zip(*(other[1:] for other in each), strict=True)
         )
         return _Explicit(table, *others)
 

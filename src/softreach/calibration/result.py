@@ -393,8 +393,8 @@ def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
         each = ((name, errors.rms / unit.size) for name, errors in result.by_marker.items())
         listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)
         yield f"{unit.label('rms')} of each marker: {listed}"
-    for one, other, share in result.correlated[:3]:
-        yield f"hardly told apart: {one} and {other} (correlation {share:+.3f})"
+    for first, second, share in result.correlated[:3]:
+        yield f"hardly told apart: {first} and {second} (correlation {share:+.3f})"
     if len(far := result.outliers):
         rows = ", ".join(map(str, far[:_MOST_ROWS])) + ", ..." * (len(far) > _MOST_ROWS)
         yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"

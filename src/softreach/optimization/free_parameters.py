@@ -182,17 +182,17 @@ def free_parameters(
     picks = {} if choices is None else as_mapping("choices", choices, lambda _, value: value)
     known = known_parameters(bases.values(), picks.get(BUNDLES, ()))
     texts = {name: text for name, text in given.items() if isinstance(text, str)}
-    found = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]
+    parts = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]
     if len(bases) > 1:
-        found.append(FreeParameter(name=DESIGN, unit="1", choices=tuple(bases)))
-    found += [_choice(known, bases, name, values) for name, values in picks.items()]
-    names = [parameter.name for parameter in found]
+        parts.append(FreeParameter(name=DESIGN, unit="1", choices=tuple(bases)))
+    parts += [_choice(known, bases, name, values) for name, values in picks.items()]
+    names = [parameter.name for parameter in parts]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("free", twice[0], "given once")
-    if not found:
+    if not parts:
         raise InvalidInput("free", "none", "one parameter or more with a range or choices")
     ties = tuple(_tie(known, names, name, text) for name, text in texts.items())
-    return FreeParameters(bases=bases, free=tuple(found), ties=ties)
+    return FreeParameters(bases=bases, free=tuple(parts), ties=ties)
 
 
 def known_parameters(arms: Iterable[Manipulator], counts: Any) -> dict[str, Parameter]:

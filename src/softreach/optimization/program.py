@@ -319,14 +319,14 @@ class Point:
 
     def _of_design(self) -> Iterator[Part]:
         needs = self.design.problem.requirements
-        asked = [
+        limits = [
             (name, sense, limit)
             for name, ends in needs.measures.items()
             for sense, limit in zip((-1.0, 1.0), ends, strict=True)
             if name in SETS and limit is not None
         ]
         given = needs.limits.given
-        for name, sense, limit in asked + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
+        for name, sense, limit in limits + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
             slope = partial(self.design.slope, name)
             yield self._limit(name, sense, self.design.value(name), limit, slope)
 

@@ -330,7 +330,7 @@ class Search(Reported):
         return (*self.candidates, *self.finalists)
 
     def _is_in_front(self, candidate: Candidate) -> bool:
-        return any(candidate is one for one in self.front)
+        return any(candidate is each for each in self.front)
 
     def _numbers(self, designs: Sequence[Candidate]) -> Array:
         """Objectives with their errors, NaN where there are none, shape (design, goal, 2)."""

@@ -179,18 +179,18 @@ class _Run:
 
     @property
     def _is_over(self) -> bool:
-        found = not self.problem.goals and any(each.is_feasible for each in self._study.candidates)
-        return found or self._left <= 0
+        is_met = any(each.is_feasible for each in self._study.candidates)
+        return self._left <= 0 or (is_met and not self.problem.goals)
 
     def _sample(self, count: int) -> None:
         while count > 0:
-            asked = self._study.ask(min(_BATCH, count))
-            count -= len(asked)
+            trials = self._study.ask(min(_BATCH, count))
+            count -= len(trials)
             tasks = (
                 partial(self._study.judged, ["design", values], partial(self._judged, values))
-                for _, values in asked
+                for _, values in trials
             )
-            for (trial, _), judged in zip(asked, parallel.in_order(tasks), strict=True):
+            for (trial, _), judged in zip(trials, parallel.in_order(tasks), strict=True):
                 self._note(*judged, trial)
 
     def _judged(self, values: Any, *, bounds: bool = True) -> Candidate:
@@ -231,7 +231,7 @@ class _Run:
             ordered = []
             for _ in range(_FRONTS):
                 ordered += (front := self.problem.front(judged))
-                judged = [each for each in judged if all(each is not one for one in front)]
+                judged = [each for each in judged if all(each is not best for best in front)]
         chosen: list[Candidate] = []
         for candidate in ordered:
             place = self._place(candidate)
@@ -281,6 +281,6 @@ class _Run:
         while waiting and waiting[0].excess < least:
             values, waiting = [each.values for each in waiting[:_BATCH]], waiting[_BATCH:]
             tasks = (partial(self._judged, each, bounds=False) for each in values)
-            known += (found := list(parallel.in_order(tasks)))
-            least = min([least, *(each.excess for each in found if not each.fault)])
+            known += (judged := list(parallel.in_order(tasks)))
+            least = min([least, *(each.excess for each in judged if not each.fault)])
         return known

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -108,8 +108,8 @@ def tolerance(
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     seed, progress = as_integer("seed", seed, 0), as_progress(progress)
     if (count := as_tip_map(deviations.arm).box.dimension) < 3:
-        found = counted(count, "free bundle")
-        raise NotPossible(f"a tolerance needs three free bundles or more, and this arm has {found}")
+        bundles = f"three free bundles or more, and this arm has {counted(count, 'free bundle')}"
+        raise NotPossible(f"a tolerance needs {bundles}")
     with no_warnings():
         shape = samples, len(deviations.sigmas)
         changes = np.random.default_rng(seed).standard_normal(shape) * deviations.sigmas
@@ -228,16 +228,9 @@ def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -
     made: list[tuple[list[float], list[Mask]]] = []
     errors = np.zeros(len(spreads))
     if checked:
-        followed = _Followed.of(first, seed)
-        asked: list[_Asked] = [
-            followed.kept,
-            lambda arm, solid: solid.volume,
-            lambda arm, solid: solid.unreachability,
-            *(partial(_share, first, *region) for region in first.regions),
-        ]
-        starts = [_starts(first, target) for target in first.targets]
-        tasks = (partial(_made, first, asked, starts, change) for change in first.changes[:checked])
-        for each in parallel.in_order(tasks):
+        followed, starts = _Followed.of(first, seed), [_starts(first, x) for x in first.targets]
+        make = partial(_made, first, followed, starts)
+        for each in parallel.in_order(partial(make, change) for change in first.changes[:checked]):
             progress(1)
             made += [] if each is None else [each]
         errors[0] = followed.error(float(np.mean([row[0] for row, _ in made]))) if made else 0.0
@@ -289,8 +282,8 @@ class _Followed(NamedTuple):
         near = boundary.distance(pool) < _NEAR * moves + width
         return cls(pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED], float(near.mean()))
 
-    def kept(self, arm: Manipulator, solid: ReachableSet) -> float:
-        """Share of the volume that the set of another arm contains."""
+    def kept(self, solid: ReachableSet) -> float:
+        """Share of the volume that another set contains."""
         parts = ((self.near, self.share), (self.away, 1.0 - self.share))
         return sum(x * float(solid.contains(part).mean()) for part, x in parts if len(part))
 
@@ -300,12 +293,8 @@ class _Followed(NamedTuple):
         return self.share * math.sqrt(lost * (1.0 - lost) / max(1, len(self.near)))
 
 
-_Asked = Callable[[Manipulator, ReachableSet], float]
-"""A number of an arm that is made, and of its reachable set."""
-
-
 def _made(
-    first: FirstOrder, asked: list[_Asked], starts: list[list[Array]], change: Array
+    first: FirstOrder, followed: _Followed, starts: list[list[Array]], change: Array
 ) -> tuple[list[float], list[Mask]] | None:
     """Numbers of an arm with deviations, and the places that it reaches; None without one."""
     with parallel.undivided(), no_warnings():
@@ -313,10 +302,10 @@ def _made(
             arm = first.deviations.made(change)
             solid = reachable_set(arm, accuracy=first.accuracy)
             if solid.dimension == 3:
-                reached = [
-                    _reached(arm, first, *x) for x in zip(first.targets, starts, strict=True)
-                ]
-                return [ask(arm, solid) for ask in asked], reached
+                covered = (_share(first, *region, arm, solid) for region in first.regions)
+                numbers = [followed.kept(solid), solid.volume, solid.unreachability, *covered]
+                pairs = zip(first.targets, starts, strict=True)
+                return numbers, [_reached(arm, first, *x) for x in pairs]
         except (InvalidDesign, InvalidInput) as error:
             if isinstance(error, InvalidInput) and error.name != "loads":
                 raise
