@@ -218,13 +218,13 @@ def _ranged(known: Mapping[str, Parameter], name: str, ends: Any) -> FreeParamet
     except (TypeError, ValueError):
         allowed = "a range (low, high), or text that ties it to a free parameter"
         raise InvalidInput(f"free {name}", as_given(ends), allowed) from None
+    whole = parameter.whole
+    low, high = (float(np.ceil(low)), float(np.floor(high))) if whole else (low, high)
     if not low < high:  # NaN too
         raise InvalidInput(f"free {name}", (low, high), "a range (low, high) with low < high")
     for end in (low, high):
         if not parameter.range._replace(whole=False).admits(end):
             raise InvalidInput(f"free {name}", end, f"in its range: {parameter.range.text}")
-    whole = parameter.whole
-    low, high = (float(np.ceil(low)), float(np.floor(high))) if whole else (low, high)
     return FreeParameter(name=name, unit=parameter.unit, low=low, high=high, whole=whole)
 
 

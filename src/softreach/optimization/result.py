@@ -132,8 +132,10 @@ class Search(Reported):
         ends = {}
         for p in (p for p in self.problem.parameters.free if not p.choices):
             value, near = float(self.best.values[p.name]), _AT_END * (p.high - p.low)
-            if value <= p.low + near or value >= p.high - near:
-                ends[p.name] = "lower" if value <= p.low + near else "upper"
+            if value <= p.low + near:
+                ends[p.name] = "lower"
+            elif value >= p.high - near:
+                ends[p.name] = "upper"
         return ends
 
     @property
@@ -227,9 +229,9 @@ class Search(Reported):
         """
         place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)
         check_folder(place, overwrite=overwrite)
-        width = max(2, len(str(len(self.front))))
-        several = [f"front_{number:0{width}}.toml" for number in range(1, len(self.front) + 1)]
-        names = several if len(self.goals) > 1 else ["best.toml"]
+        width, names = max(2, len(str(len(self.front)))), ["best.toml"]
+        if len(self.goals) > 1:
+            names = [f"front_{number:0{width}}.toml" for number, _ in enumerate(self.front, 1)]
         for name, each in zip(names, self.front, strict=True):
             with suppress(SoftreachError):  # no such arm can exist
                 write_text(place / name, self._design_text(each), overwrite=overwrite)
@@ -238,9 +240,10 @@ class Search(Reported):
             with suppress(OSError):
                 if path.name not in names and path.read_text("utf-8").startswith(_FOUND):
                     path.unlink()
-        for name, every in (("front", False), ("candidates", True)):
-            table = self.table(every=every, unit=unit or "m")
-            write_table(place / f"{name}.csv", table, overwrite=overwrite)
+        for name, every in (("front.csv", False), ("candidates.csv", True)):
+            write_table(
+                place / name, self.table(every=every, unit=unit or "m"), overwrite=overwrite
+            )
         self.report(unit).save(place / "report.html", overwrite=overwrite)
 
     def _design_text(self, each: Candidate) -> str:
@@ -279,9 +282,8 @@ class Search(Reported):
         for p in self.problem.parameters.free:
             suffix, size = _written_unit(p.unit, length)
             values = (each.values[p.name] for each in designs)
-            columns[with_suffix(p.name, suffix)] = [
-                value if isinstance(value, str) else value / size for value in values
-            ]
+            values = (x if isinstance(x, str) else x / size for x in values)
+            columns[with_suffix(p.name, suffix)] = list(values)
         columns["missed"] = ["; ".join(each.missed) for each in designs]
         return pd.DataFrame(columns | {"fault": [each.fault for each in designs]})
 
@@ -358,13 +360,10 @@ def check_folder(folder: Path, *, overwrite: bool) -> None:
 def _best(search: Search, unit: LengthUnit) -> Section:
     pairs = zip(search.goals, search.best.objectives, strict=bool(search.best.objectives))
     rows = [(_goal_text(goal), _value_text(goal, value, unit), "") for goal, value in pairs]
+    rows += _parameter_rows(search, unit)
     ends = ", ".join(f"{name} at its {end} end" for name, end in search.at_ends.items())
-    return Section(
-        title="Best design",
-        head=("number", "best", "range"),
-        rows=[*rows, *_parameter_rows(search, unit)],
-        note=f"At an end of their range: {ends}. A wider one may be better." if ends else "",
-    )
+    note = f"At an end of their range: {ends}. A wider one may be better." if ends else ""
+    return Section(title="Best design", head=("number", "best", "range"), rows=rows, note=note)
 
 
 def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
@@ -375,13 +374,9 @@ def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
         numbers = (_number_text(p, each.values[p.name], unit) for p in free)
         rows.append((str(number), *(_value_text(*pair, unit) for pair in pairs), *numbers))
     if len(rows) > 1:
-        yield Section(
-            title="Front",
-            head=("front", *map(_goal_text, goals), *(p.name for p in free)),
-            rows=rows,
-            note="Designs that no other one beats in every objective, each judged to full "
-            "accuracy.",
-        )
+        head = ("front", *map(_goal_text, goals), *(p.name for p in free))
+        note = "Designs that no other one beats in every objective, each judged to full accuracy."
+        yield Section(title="Front", head=head, rows=rows, note=note)
 
 
 def _verdict(search: Search) -> str:
@@ -407,7 +402,7 @@ def _value_text(goal: Goal, value: Estimate, unit: LengthUnit) -> str:
     return readable(value.value, goal.objective.unit, unit, value.error)
 
 
-def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[tuple[str, ...]]:
+def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     values, ends, parameters = search.best.values, search.at_ends, search.problem.parameters
     free = {parameter.name: parameter for parameter in parameters.free}
     for name, each in free.items():

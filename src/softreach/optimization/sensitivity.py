@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -111,9 +111,8 @@ class Sensitivity:
         lines = [f"Sensitivity ({self.designs:,} designs):"]
         for k, goal in enumerate(self.goals):
             lines.append(f"{goal}:")
-            for name, unit, value, error in zip(
-                self.reals, self.units, self.gradient[k], self.gradient_error[k], strict=True
-            ):
+            slopes = (self.reals, self.units, self.gradient[k], self.gradient_error[k])
+            for name, unit, value, error in zip(*slopes, strict=True):
                 per = f"{self.goal_units[k].replace('m3', 'm³')}/{unit}"
                 if np.isfinite(value):
                     lines.append(f"  by {name}: {quantity(value, per, error)}")
@@ -126,8 +125,8 @@ class Sensitivity:
                 )
                 lines.append(f"  variance alone (in all): {each}")
         for each in self.multipliers:
-            unit = f" per {each.unit}" if each.unit else " per unit"
-            lines.append(f"decides: {each.name}, {each.value:.4g} {self.goal_units[0]}{unit}")
+            per = f"{self.goal_units[0]} per {each.unit or 'unit'}"
+            lines.append(f"decides: {each.name}, {each.value:.4g} {per}")
         if np.isfinite(self.residual):
             lines.append(f"not explained by requirements: {100 * self.residual:.2g} % of the slope")
         return "\n  ".join(lines)
@@ -202,11 +201,10 @@ def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
     for k, goal in enumerate(problem.goals):
         if goal.objective.smooth and len(widths):
             point = point_of(problem, candidate, problem.accuracy, k)
-            design, error = point.design, np.zeros(len(widths))
+            values[k], errors[k] = -goal.sense * _with_poses(point) / widths, 0.0
             if goal.name in SETS:
-                error = getattr(design.sets, f"{SETS[goal.name]}_error") @ np.abs(design.chain)
-            values[k] = -goal.sense * _with_poses(point) / widths
-            errors[k] = error / widths
+                error = getattr(point.design.sets, f"{SETS[goal.name]}_error")
+                errors[k] = error @ np.abs(point.design.chain) / widths
     return values, errors
 
 
@@ -220,17 +218,6 @@ def _with_poses(point: Point) -> Array:
     return slope[:count] + forces @ equations[:, :count]
 
 
-class _Condition(NamedTuple):
-    """A column of the conditions of optimality, and what its multiplier is worth."""
-
-    slope: Array
-    name: str = ""
-    """Empty for a pose at its bounds."""
-    unit: str = ""
-    gain: float = 0.0
-    """Of the goal per unit that is allowed more, for a multiplier of 1."""
-
-
 def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multiplier, ...], float]:
     """Multipliers of the first goal, and the part of its slope that they do not explain."""
     from scipy.optimize import nnls
@@ -241,27 +228,26 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     slope, equations = point.cost_slope, _equations(point)
     size = float(np.linalg.norm(slope))
     bounds = [
-        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
+        (-part.slope()[k], Multiplier(part.name, 1.0 / part.scale, part.unit))
         for part in point.inequalities
         for k in np.flatnonzero(part.value <= _ACTIVE)
     ]
     bounds += _ends(problem, point)
-    columns = [*equations, *-equations, *(each.slope for each in bounds)]
+    columns = [*equations, *-equations, *(slope for slope, _ in bounds)]
     if not size or not columns:
         return (), float(bool(size))
     weights, rest = nnls(np.stack(columns, axis=1), -slope)
     there, back, others = np.split(weights, [len(equations), 2 * len(equations)])
     pulls = np.linalg.norm((there - back).reshape(-1, 3), axis=1).tolist()
     pairs = zip(pulls, point.equations, strict=True)
-    each = [(what.name, what.unit, pull / what.scale) for pull, what in pairs]
+    each = [(part.name, part.unit, pull / part.scale) for pull, part in pairs]
     pairs = zip(others.tolist(), bounds, strict=True)
-    each += [(what.name, what.unit, weight * what.gain) for weight, what in pairs if what.name]
+    each += [(name, unit, weight * gain) for weight, (_, (name, gain, unit)) in pairs]
     gains: dict[tuple[str, str], float] = {}
     for name, unit, gain in each:  # a place under several payloads counts with all of them
         gains[name, unit] = gains.get((name, unit), 0.0) + gain
     result = [Multiplier(name, gain, unit) for (name, unit), gain in gains.items() if gain]
-    result.sort(key=lambda each: -each.value)
-    return tuple(result), float(rest) / size
+    return tuple(sorted(result, key=lambda each: -each.value)), float(rest) / size
 
 
 def _equations(point: Point) -> Array:
@@ -269,19 +255,18 @@ def _equations(point: Point) -> Array:
     return stacked_slopes(parts) if parts else np.empty((0, len(point.cost_slope)))
 
 
-def _ends(problem: Problem, point: Point) -> list[_Condition]:
+def _ends(problem: Problem, point: Point) -> Iterator[tuple[Array, Multiplier]]:
+    """Slopes of bounds of unknowns, and what these are worth per unit: nothing for a pose."""
     unknowns = np.concatenate([point.reals, point.poses.ravel()])
-    rows, result = np.eye(len(unknowns)), []
-    for j, place in enumerate(unknowns):
+    for j, (place, row) in enumerate(zip(unknowns, np.eye(len(unknowns)), strict=True)):
         for end, sign, word in ((0.0, -1.0, "low"), (1.0, 1.0, "high")):
-            if abs(place - end) > _AT_END:
-                continue
-            result.append(_Condition(sign * rows[j]))
-            if j < len(point.reals):
-                real = problem.parameters.real[j]
-                name, gain = f"{word} end of {real.name}", 1.0 / (real.high - real.low)
-                result[-1] = _Condition(sign * rows[j], name, real.unit, gain)
-    return result
+            if abs(place - end) <= _AT_END:
+                name, gain, unit = "", 0.0, ""
+                if j < len(point.reals):
+                    real = problem.parameters.real[j]
+                    name, unit = f"{word} end of {real.name}", real.unit
+                    gain = 1.0 / (real.high - real.low)
+                yield sign * row, Multiplier(name, gain, unit)
 
 
 def _variances(
