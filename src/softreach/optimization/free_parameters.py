@@ -128,15 +128,10 @@ class FreeParameters:
         numbers = {name: value for name, value in values.items() if name not in _WORDS}
         for tie in self.ties:
             numbers[tie.name] = tie.factor * float(numbers[tie.of]) + tie.constant
-        whole = {parameter.name for parameter in self.free if parameter.whole}
-        varies = DESIGN in values or BUNDLES in values
-        known = parameters_by_every_name(arm) if varies else numbers
-        numbers = {
-            name: int(value) if name in whole else float(value)
-            for name, value in numbers.items()
-            if name in known  # else of another base, or of another number of bundles
-        }
-        made = changed(arm, numbers)
+        if DESIGN in values or BUNDLES in values:  # another one may lack some
+            known = parameters_by_every_name(arm)
+            numbers = {name: value for name, value in numbers.items() if name in known}
+        made = changed(arm, {name: float(value) for name, value in numbers.items()})
         check_extension(made)
         return made
 

@@ -46,8 +46,7 @@ NEAR = 0.1
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
 
-_COARSE, _FINE = 1 << 12, 1 << 15
-"""Samples of the cloud of coarse and of fine cases."""
+_COARSE, _FINE = 1 << 12, 1 << 15  # samples of the cloud of coarse and of fine cases
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
 
@@ -172,15 +171,11 @@ def known_objective(word: str, given: str | Metric) -> Objective:
         raise InvalidInput(word, as_given(given), allowed, hint)
     if metric.over:
         raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
-    return Objective(
-        metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)), smooth=False
-    )
+    return _rough(metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)))
 
 
 def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
-    return lambda case: Estimate(
-        getattr(case.reached, name), getattr(case.reached, f"{name}_error")
-    )
+    return lambda case: Estimate(*(getattr(case.reached, x) for x in (name, f"{name}_error")))
 
 
 def _coverage(case: DesignCase) -> Estimate:
@@ -230,6 +225,7 @@ def _payload(case: DesignCase) -> Estimate:
     return Estimate(most.payload, most.payload_error)
 
 
+_rough = partial(Objective, smooth=False)
 _OBJECTIVES = (
     Objective("exact_volume", "m3", "volume of the reachable set", _of_set("volume")),
     Objective("exact_convex_volume", "m3", "volume of its convex hull", _of_set("convex_volume")),
@@ -237,29 +233,21 @@ _OBJECTIVES = (
     Objective("coverage", "1", "mean share of the regions that is reached", _coverage, "regions"),
     Objective("mean_effort", "1", "mean effort at the targets", _effort(np.mean), "targets"),
     Objective("worst_effort", "1", "largest effort at the targets", _effort(np.max), "targets"),
-    Objective(
+    _rough(
         "manipulability",
         "m3/input3",
         "mean √det(J Jᵀ) over the box",
         lambda case: _sampled(_dexterity(case).manipulability),
-        smooth=False,
     ),
-    Objective(
+    _rough(
         "dexterity",
         "1",
         "mean of 1 / condition of J over the box",
         lambda case: _sampled(1.0 / _dexterity(case).condition),
-        smooth=False,
     ),
-    Objective(
-        "activation_distance", "input", "mean D̄ within L/10", _activation_distance, smooth=False
-    ),
-    Objective(
-        "payload", "kg", "payload under which 80 % of the volume is left", _payload, smooth=False
-    ),
-    Objective(
-        "compliance", "m/N", "mean of the largest compliance of the tip", _compliance, smooth=False
-    ),
+    _rough("activation_distance", "input", "mean D̄ within L/10", _activation_distance),
+    _rough("payload", "kg", "payload under which 80 % of the volume is left", _payload),
+    _rough("compliance", "m/N", "mean of the largest compliance of the tip", _compliance),
     Objective("mass", "kg", "mass of the arm", lambda case: Estimate(mass(case.arm), 0.0)),
     Objective(
         "actuators", "1", "number of inputs", lambda case: Estimate(float(case.arm.inputs), 0.0)
@@ -293,8 +281,7 @@ class Candidate:
     @property
     def is_feasible(self) -> bool:
         """True of an arm that meets all requirements and has all objectives."""
-        known = all(math.isfinite(value.value) for value in self.objectives)
-        return self.excess == 0.0 and not self.fault and known
+        return self.excess == 0.0 and not self.fault
 
     def to_dict(self) -> dict[str, Any]:
         """All of it in plain values; `from_dict` makes an equal one."""
