@@ -15,14 +15,7 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.optimization import sensitivity
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.polish import point_of
-from softreach.optimization.problem import (
-    Candidate,
-    DesignCase,
-    Goal,
-    Objective,
-    Problem,
-    goals,
-)
+from softreach.optimization.problem import Candidate, DesignCase, Goal, Objective, Problem, goals
 from softreach.optimization.program import DesignPoint, Point, stacked, stacked_slopes
 from softreach.requirements import Box, Keep, Limits, Requirements, Sphere, Target
 from softreach.support.errors import InvalidInput, NotPossible

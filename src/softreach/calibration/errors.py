@@ -48,9 +48,9 @@ def misses(residuals: Array) -> PlacementErrors:
     distance = distance[np.isfinite(distance)]
     if not len(distance):
         return PlacementErrors(np.nan, np.nan, np.nan, np.nan, 0)
-    rms, most = np.sqrt((distance**2).mean()), np.quantile(distance, 0.95)
-    each = (float(x) for x in (np.median(distance), distance.mean(), rms, most))
-    return PlacementErrors(*each, number=len(distance))
+    rms, most = float(np.sqrt((distance**2).mean())), float(np.quantile(distance, 0.95))
+    median, mean = float(np.median(distance)), float(distance.mean())
+    return PlacementErrors(median, mean, rms, most, len(distance))
 
 
 class Repeatability(NamedTuple):

@@ -15,13 +15,7 @@ import numpy as np
 from softreach.arm.base import Base, rotation_matrices
 from softreach.arm.body import RestShape
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import (
-    Parameter,
-    find_parameters,
-    parameters,
-    parts,
-    with_values,
-)
+from softreach.arm.parameters import Parameter, find_parameters, parameters, parts, with_values
 from softreach.support.arguments import as_mapping, as_names, as_one_of, plain
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, Range

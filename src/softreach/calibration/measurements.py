@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.support.arguments import as_given, as_mapping, as_text
+from softreach.support.arguments import as_given, as_mapping, as_one_of, as_text
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import (
     InvalidInput,
@@ -151,7 +151,6 @@ def read_measurements(
         return data
     columns_of = {} if inputs is None else as_mapping("inputs", inputs, as_text)
     starts_of = {} if markers is None else as_mapping("markers", markers, as_text)
-    run, order = (None if x is None else as_text(n, x) for n, x in (("run", run), ("order", order)))
     table, source = _table(data)
     columns = list(table.columns)
     run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
@@ -191,13 +190,13 @@ def _runs_and_order(
     names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
     taken = np.arange(len(table))
     if order is not None and table[order].dtype.kind in "iuf":  # names of samples say nothing
-        taken = np.lexsort((_numbers(table, order), begins[runs])).astype(np.intp)
+        taken = np.lexsort((_numbers(table, order, gaps=True), begins[runs])).astype(np.intp)
     return tuple(names.tolist()), runs, taken
 
 
 def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
     """Places of markers from their columns [m], NaN where one was not seen."""
-    each = [[_numbers(table, x) * _unit(x)[2] for x in own] for own in columns.values()]
+    each = [[_numbers(table, x, gaps=True) * _unit(x)[2] for x in y] for y in columns.values()]
     places = np.moveaxis(np.array(each), 2, 0)
     seen = np.isfinite(places).all(axis=2)
     if not seen.any():
@@ -219,9 +218,6 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
             usual = f"{name}_{'mm' if unit == 'm' else unit}"
             raise NotPossible(f"the name of column {name} must end in its unit, such as {usual}")
         values[:, k] = _numbers(table, name) * size
-    if not np.isfinite(values).all():
-        row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
-        raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
     return values
 
 
@@ -306,12 +302,10 @@ def _refuse_short(text: str) -> None:
 
 
 def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:
-    if given is not None:
-        if given not in columns:
-            raise _missing(what, given, columns)
-        return given
+    if given is not None and as_text(what, given) not in columns:
+        raise _missing(what, given, columns)
     by_name = {name.lower(): name for name in columns}
-    return next((by_name[name] for name in usual if name in by_name), None)
+    return given or next((by_name[name] for name in usual if name in by_name), None)
 
 
 def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]]) -> None:
@@ -387,7 +381,7 @@ def _chosen_markers(
     arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
 ) -> dict[str, str]:
     names = marker_names(arm)
-    if chosen := _matched("marker", names, given, dict(zip(triples, triples, strict=True))):
+    if chosen := _matched("marker", names, given, {start: start for start in triples}):
         return chosen
     if len(names) != len(triples):
         listed = ", ".join(start or "x, y, z" for start in triples)
@@ -407,9 +401,7 @@ def _matched(
         return re.sub(r"[\s_\-.]+", "", name).lower()
 
     for name, column in given.items():
-        if name not in names:
-            hint = did_you_mean(name, names)
-            raise InvalidInput(f"{what}s", name, f"one of {', '.join(names)}", hint)
+        as_one_of(f"{what}s", name, names)
         if column not in columns and (column or what == "marker"):
             raise _missing(f"columns of {what} {name}", column, list(columns))
     known = {simple(name): column for column, name in columns.items()}
@@ -440,11 +432,14 @@ def _unit_text(unit: str) -> str:
     return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
 
 
-def _numbers(table: pd.DataFrame, column: str) -> Array:
+def _numbers(table: pd.DataFrame, column: str, *, gaps: bool = False) -> Array:
+    """Finite numbers of a column; NaN where there is none, if it may have gaps."""
     try:
         values = table[column].to_numpy(float)
     except (ValueError, TypeError) as error:
         raise InvalidInput(f"column {column}", in_short(str(error)), "numbers") from None
-    if (rows := np.flatnonzero(np.isinf(values))).size:
-        raise InvalidInput(f"{column} in row {rows[0]}", values[rows[0]], "a finite number")
+    wrong = np.isinf(values) if gaps else ~np.isfinite(values)
+    if wrong.any():
+        row = int(wrong.argmax())
+        raise InvalidInput(f"{column} in row {row}", values[row], "a finite number")
     return values

@@ -215,11 +215,10 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
     No two of them are nearer in the unit cube than half of the mean distance of n points.
     """
     each = np.einsum("crp,crq->cpq", slopes, slopes)
-    start = _START * np.trace(each.sum(axis=0)) / each.shape[1] * np.eye(each.shape[1])
+    total = _START * np.trace(each.sum(axis=0)) / each.shape[1] * np.eye(each.shape[1])
     room = _APART * n ** (-1.0 / max(at.shape[1], 1))
     near = np.zeros(len(slopes), int)  # chosen poses that each candidate is too near to
     chosen: list[int] = []
-    total = start
     for _ in range(n):
         best = _best(slopes, total, near)
         chosen.append(best)
@@ -240,9 +239,7 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
 
 def _within(at: Array, place: int, room: float) -> Mask:
     """Candidates that are too near to one that is chosen, itself among them."""
-    result = np.linalg.norm(at - at[place], axis=1) < room
-    result[place] = True
-    return result
+    return np.linalg.norm(at - at[place], axis=1) < room
 
 
 def _best(slopes: Array, total: Array, near: NDArray[np.int_]) -> int:

@@ -174,6 +174,12 @@ def known_objective(word: str, given: str | Metric) -> Objective:
     return _rough(metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)))
 
 
+def _rough(
+    name: str, unit: str, meaning: str, compute: Callable[[DesignCase], Estimate]
+) -> Objective:
+    return Objective(name, unit, meaning, compute, smooth=False)
+
+
 def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
     return lambda case: Estimate(*(getattr(case.reached, x) for x in (name, f"{name}_error")))
 
@@ -225,7 +231,6 @@ def _payload(case: DesignCase) -> Estimate:
     return Estimate(most.payload, most.payload_error)
 
 
-_rough = partial(Objective, smooth=False)
 _OBJECTIVES = (
     Objective("exact_volume", "m3", "volume of the reachable set", _of_set("volume")),
     Objective("exact_convex_volume", "m3", "volume of its convex hull", _of_set("convex_volume")),
