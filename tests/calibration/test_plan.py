@@ -17,7 +17,7 @@ FREE = [MODULUS, "t.distance", "pose"]
 def log_determinant(inputs):
     """Of JᵀJ in the scales of the numbers."""
     free = free_numbers(ARM, FREE)
-    slopes = MarkerModel(free, inputs, np.arange(2)).predict(free.start, slopes=True).slopes
+    slopes = MarkerModel(free, inputs, ("half", "tool")).predict(free.start, slopes=True).slopes
     rows = slopes.reshape(-1, len(free)) * free.scale
     return np.linalg.slogdet(rows.T @ rows)[1]
 

@@ -18,7 +18,7 @@ from softreach.calibration.errors import PlacementErrors, misses, with_products
 from softreach.calibration.fit import Fit, exchanged_columns, fitted, started
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
-from softreach.calibration.model import MarkerModel, marker_places, marker_stations
+from softreach.calibration.model import MarkerModel, marker_stations
 from softreach.calibration.result import Calibration, Rival
 from softreach.calibration.uncertainty import uncertainty
 from softreach.rod.summary import design_warnings
@@ -267,8 +267,6 @@ class _Arcs(NamedTuple):
 
     @classmethod
     def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:
-        stations, offsets = marker_stations(arm)
-        measured = marker_places(arm, data.marker_names)
         ends = [part.span(arm.length)[1] for part in arm.actuators]
         ends = np.unique(np.round([*ends, arm.length], 9))
         middles = 0.5 * (np.append(0.0, ends[:-1]) + ends)
@@ -277,7 +275,7 @@ class _Arcs(NamedTuple):
         moves = np.ptp(data.inputs, axis=0) > 0
         acts = (acts @ np.abs(Driving(arm).gains)[: arm.bundles] > 0) & moves
         scale = np.where(moves, np.abs(data.inputs).max(axis=0), 1.0)
-        return cls(ends, acts, scale, stations[measured], offsets[measured])
+        return cls(ends, acts, scale, *marker_stations(arm, data.marker_names))
 
     def start(self, arm: Manipulator, share: float) -> Array:
         """A share of the bends that the design has in the middle of each arc, without loads."""

@@ -18,7 +18,7 @@ from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
 from softreach.calibration.free_numbers import FreeNumbers, Neighbors
-from softreach.calibration.measurements import Measurements, marker_names
+from softreach.calibration.measurements import Measurements
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.pulled import LoadedLengths
@@ -36,7 +36,7 @@ from softreach.rod.response import (
 )
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask, joined
+from softreach.support.arrays import Array, Mask, joined
 
 _BLOCK = 1024  # samples at once: their shapes at all nodes are kept
 _TOL = 1e-6
@@ -69,20 +69,16 @@ class _Explicit(NamedTuple):
     rest: Array  # û at rest at the nodes, (step, 3, 3)
 
 
-def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
-    """Stations Z [m] of the markers of an arm, and their offsets in the directors [m].
+def marker_stations(arm: Manipulator, names: Iterable[str]) -> tuple[Array, Array]:
+    """Stations Z [m] of some markers of an arm, and their offsets in the directors [m].
 
     An arm without markers has one at its tip.
     """
     if not arm.markers:
         return np.array([arm.length]), np.zeros((1, 3))
-    places = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
-    return places, np.array([marker.offset for marker in arm.markers])
-
-
-def marker_places(arm: Manipulator, names: Iterable[str]) -> Index:
-    """Places of some markers among those of an arm, shape (n,)."""
-    return np.array([marker_names(arm).index(name) for name in names])
+    known = {marker.name: marker for marker in arm.markers}
+    places = [known[name].station_at("station", arm.length) for name in names]
+    return np.array(places), np.array([known[name].offset for name in names])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +87,12 @@ class MarkerModel:
 
     free: FreeNumbers
     inputs: Array  # Shape (n, input)
-    markers: NDArray[np.intp]  # Those of the arm's markers that were measured
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the markers that were measured."""
-        return tuple(marker_names(self.free.arm)[k] for k in self.markers)
+    names: tuple[str, ...]  # Of the markers that were measured
 
     @classmethod
     def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
         """The model of measured poses."""
-        return cls(free, data.inputs, marker_places(free.arm, data.marker_names))
+        return cls(free, data.inputs, data.marker_names)
 
     def predict(self, values: Array, *, slopes: bool = False) -> Prediction:
         """Places of the markers, and their derivatives if asked for.
@@ -113,7 +104,7 @@ class MarkerModel:
 
     def of_arm(self, arm: Manipulator, values: Array | None = None) -> Prediction:
         """Places of the markers of an arm that has these values."""
-        free, stations = self.free, marker_stations(arm)[0][self.markers]
+        free, (stations, _) = self.free, marker_stations(arm, self.names)
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
@@ -121,10 +112,10 @@ class MarkerModel:
         return joined([self._block(arm, neighbors, grid, self.inputs[rows]) for rows in blocks])
 
     def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
-        stations, offsets = marker_stations(arm)
+        stations, offsets = marker_stations(arm, self.names)
         body, driving = body_of(arm), Driving(arm)
         law = driving.law
-        table = node_tables(body, stations[self.markers], grid)
+        table = node_tables(body, stations, grid)
         columns = law.columns
         stiffness = np.zeros((*table.length.shape, 4))
         if len(columns):
@@ -138,7 +129,7 @@ class MarkerModel:
             table,
             arm.base.rotation,
             np.array(arm.base.position),
-            offsets[self.markers],
+            offsets,
             driving.bundles(inputs),
             law.taut_from,
             law.compliance,

@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.calibration.fit import identifiable
 from softreach.calibration.free_numbers import FreeNumbers, free_numbers
 from softreach.calibration.measurements import marker_names
-from softreach.calibration.model import MarkerModel, marker_places
+from softreach.calibration.model import MarkerModel
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.schema import provenance
@@ -165,8 +165,7 @@ def plan_poses(
     cube = _candidates(int(moving.sum()), candidates, seed)
     inputs = np.tile(low, (len(cube), 1))
     inputs[:, moving] += cube * (high - low)[moving]
-    model = MarkerModel(numbers, inputs, marker_places(arm, names))
-    prediction = model.predict(numbers.start, slopes=True)
+    prediction = MarkerModel(numbers, inputs, names).predict(numbers.start, slopes=True)
     usable = np.isfinite(prediction.slopes).all(axis=(1, 2, 3))
     usable &= prediction.status == TipStatus.STABLE
     if not usable.any():

@@ -12,6 +12,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters, shifted
 from softreach.arm.tables import check_extension
+from softreach.requirements.findings import share_error
 from softreach.requirements.requirements import Requirements, Target
 from softreach.support import parallel
 from softreach.support.arguments import as_mapping, as_number
@@ -251,9 +252,8 @@ class FirstOrder:
             for block in parallel.blocks(len(shares), max(1, _BLOCK // len(places))):
                 held = (depth + self.changes[block] @ speed.T >= 0.0).mean(axis=1)
                 shares[block] = np.minimum(shares[block], held)
-        error = math.sqrt(max(nominal * (1.0 - nominal), 1.0 / len(places)) / len(places))
-        mean = float(shares.mean())
-        return _spread_of(target.name, shares, nominal=nominal, mean=mean, error=error)
+        known = {"mean": float(shares.mean()), "error": float(share_error(nominal, len(places)))}
+        return _spread_of(target.name, shares, nominal=nominal, **known)
 
 
 def _spread_of(name: str, shares: Array, **known: Any) -> Spread:

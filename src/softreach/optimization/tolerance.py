@@ -13,6 +13,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
 from softreach.optimization.deviations import TOL, FirstOrder, Spread, deviations_of
+from softreach.requirements.findings import share_error
 from softreach.requirements.requirements import Requirements, Target
 from softreach.rod.rods import as_tip_map
 from softreach.sampling import sample_cube
@@ -51,8 +52,7 @@ class TargetTolerance(NamedTuple):
     @property
     def made_error(self) -> Array:
         """Standard errors of these shares; with 0 or 1, what one arm more would make of it."""
-        each = np.maximum(self.made * (1.0 - self.made), 1.0 / max(self.arms, 1))
-        return np.sqrt(each / max(self.arms, 1))
+        return share_error(self.made, max(self.arms, 1))
 
     @property
     def agrees(self) -> bool:

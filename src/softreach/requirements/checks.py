@@ -17,6 +17,7 @@ from softreach.requirements.findings import (
     design_limits,
     limit_finding,
     measure_findings,
+    share_error,
     verdict_of,
 )
 from softreach.requirements.parts import Keep, Target
@@ -281,8 +282,7 @@ def checked(
         posed.append(solved(rules, needs.places, needs.within, step, quick=quick))
         for target, region in needs.regions:
             share = float(_is_covered(rules, target, region.places(count), sets, step).mean())
-            # of a share of 0 or 1, what one place more or less makes of it
-            error = float(np.sqrt(max(share * (1.0 - share), 1.0 / count) / count))
+            error = float(share_error(share, count))
             coverages.append(Coverage(target.name, payload, share, error, count))
     whole = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
     made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *whole[:4])

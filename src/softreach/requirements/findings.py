@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -69,6 +69,11 @@ def verdict_of(margin: float, error: float = 0.0) -> Verdict:
     if abs(margin) < error:
         return "undecided"
     return "met" if margin >= 0.0 else "missed"
+
+
+def share_error(share: Any, count: int) -> Any:
+    """Standard error of a share of so many; of 0 or 1, what one more or less makes of it."""
+    return np.sqrt(np.maximum(share * (1.0 - share), 1.0 / count) / count)
 
 
 def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding, ...]:

@@ -173,8 +173,8 @@ class Requirements:
 
     def to_toml(self) -> str:
         """The text of a file in m and kg, from which `from_toml` makes the same."""
-        head = {"version": 1} | ({"payloads_kg": self.payloads} if self.payloads else {})
-        blocks = [["# softreach requirements", *_lines(head)]]
+        head = _lines({"version": 1, "payloads_kg": self.payloads or None})
+        blocks = [["# softreach requirements", *head]]
         for target in self.targets:
             lines = ["[[reach]]", *_lines({"name": target.name})]
             if target.places is not None:
@@ -182,10 +182,9 @@ class Requirements:
                 lines += ["places_m = [", *rows, "]"]
             elif target.region is not None:
                 lines += [_region_line(target.region), *_lines({"share": target.share})]
-            blocks.append(lines + _lines({"within_m": target.within} if target.within else {}))
+            blocks.append(lines + _lines({"within_m": target.within or None}))
         for keep in sorted(self.keeps, key=lambda keep: not keep.inside):
-            words = {"of": keep.of, "when": keep.when}
-            words |= {"clearance_m": keep.clearance} if keep.clearance else {}
+            words = {"of": keep.of, "when": keep.when, "clearance_m": keep.clearance or None}
             start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
             blocks.append([*start, _region_line(keep.region), *_lines(words)])
         if limits := self.limits.given:
@@ -465,7 +464,7 @@ def _keys(name: str, unit: str) -> dict[str, str]:
 
 
 def _lines(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {value_text(value)}" for key, value in values.items()]
+    return [f"{key} = {value_text(x)}" for key, x in values.items() if x is not None]
 
 
 def _region_line(region: Region) -> str:
