@@ -6,6 +6,7 @@ import datetime as dt
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.errors import PlacementErrors, misses, with_products
-from softreach.calibration.fit import Fit, exchanged_columns, fitted, started
+from softreach.calibration.fit import exchanged_columns, fitted
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel, marker_stations
@@ -94,11 +95,7 @@ def calibrate(
     held = _held_out(len(table), hold_out, as_integer("seed", seed))
     train, progress = table.of(~held), as_progress(progress)
     model = MarkerModel.of(free_numbers(arm, free, prior), train)
-
-    def fit_to(model: MarkerModel, places: Array) -> Fit:
-        model = replace(model, free=started(model, places))
-        return fitted(model, places, robust=robust, noise=noise, progress=progress)
-
+    fit_to = partial(fitted, robust=robust, noise=noise, progress=progress)
     fit = fit_to(model, train.places)
     result = Calibration(
         arm=fit.free.made(fit.values),

@@ -218,8 +218,9 @@ def fitted(
 
     Raises:
         InvalidInput: Numbers that the data cannot tell apart.
-        NotPossible: No equilibrium at the start.
+        NotPossible: Columns in another order, or no equilibrium at the start.
     """
+    model = replace(model, free=started(model, places))
     problem = _Problem(model, places, progress)
     values = np.clip(model.free.start, *problem.bounds)
     identifiable(model.free, problem.slopes(values))
