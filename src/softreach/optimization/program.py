@@ -199,10 +199,8 @@ class Point:
         return len(self.reals) + self.poses.size
 
     def _cost(self, goal: Goal) -> float:
-        is_effort = goal.name in EFFORTS
-        return -goal.sense * (
-            self._effort(goal.name)[0] if is_effort else self.design.value(goal.name)
-        )
+        name, of_poses = goal.name, goal.name in EFFORTS
+        return -goal.sense * (self._effort(name)[0] if of_poses else self.design.value(name))
 
     def _cost_slope(self, goal: Goal) -> Array:
         slope = np.zeros(self._size)
@@ -222,23 +220,18 @@ class Point:
         mean = float((each**power).mean() ** (1.0 / power))
         weight = (each / mean) ** (power - 1) / count
         widths = (box.widths / scales)[box.free]
-        slope = np.zeros(self._size)
-        slope[len(self.reals) :] = (
-            weight[:, None] * gamma[:, box.free] / each[:, None] * widths
-        ).ravel()
-        return mean, slope
+        moves = weight[:, None] * gamma[:, box.free] / each[:, None] * widths
+        return mean, np.concatenate([np.zeros(len(self.reals)), moves.ravel()])
 
     @lazy
     def _tips(self) -> list[Part]:
         needs, parts = self.design.problem.requirements, []
-        within = needs.within
         for number, (rod, cube) in enumerate(self._by_payload()):
             tips = rod.tips(rod.box.from_free_cube(cube))
             gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
             slopes = cache(partial(self._tip_slopes, number))
-            for k, gap in enumerate(gaps):
+            for k, (gap, near) in enumerate(zip(gaps, needs.within / rod.length, strict=True)):
                 slope = partial(lambda of, k: of()[k], slopes, k)
-                near = within[k] / rod.length
                 parts.append(Part(f"place {k + 1}", gap, slope, near, rod.length, "m"))
         return parts
 
@@ -249,10 +242,8 @@ class Point:
         _, slopes = rod.tips_and_slopes(box.from_free_cube(cube))
         result = np.zeros((len(cube), 3, self._size))
         result[:, :, :count] = self.design.derivatives[number].at(cube) @ self.design.chain
-        for j, column in enumerate(self._columns(number)):
-            result[np.arange(len(cube)), :, column] = (
-                slopes[:, :, box.free[j]] * box.widths[box.free[j]]
-            )
+        for k, column in zip(box.free, self._columns(number), strict=True):
+            result[np.arange(len(cube)), :, column] = slopes[:, :, k] * box.widths[k]
         return np.nan_to_num(result / rod.length)
 
     def _by_payload(self) -> list[tuple[TipMap, Array]]:
