@@ -32,12 +32,14 @@ TETRAHEDRON = (
 
 @pytest.fixture(scope="module")
 def things(trunk):
-    """What is written: a design, a small cloud of it, a bent arm, a figure."""
+    """What is written: a design, a small cloud of it, a bent arm, a figure and so on."""
     figure = plt.figure(figsize=(1, 1))
     yield {
         "arm": trunk,
         "cloud": sr.compute_cloud(trunk, n=50),
         "shape": sr.configuration(trunk, [-1.0, 0.0, -0.4], stations=5),
+        "needs": sr.Requirements(targets=[sr.requirements.Target(np.ones((9, 3)))]),
+        "plan": sr.calibration.plan_poses(trunk, ["taper"], 4, candidates=16),
         "figure": figure,
     }
     plt.close(figure)
@@ -56,6 +58,8 @@ WRITERS = {
     },
     "figure.html": lambda things: (save_figure, plot_3d(things["shape"])),
     "design.toml": lambda things: (sr.Manipulator.save, things["arm"]),
+    "needs.toml": lambda things: (things["needs"].save,),
+    "poses.csv": lambda things: (things["plan"].save,),
     "design.jl": lambda things: (write_design, things["arm"]),
     "pair.csv": lambda things: (write_cloud, things["cloud"]),
 }

@@ -8,12 +8,7 @@ from softreach.calibration import plan_poses
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.model import MarkerModel
 from softreach.support.errors import InvalidInput
-from tests.calibration.arms import (
-    MODULUS,
-    hanging_tentacle,
-    measured,
-    random_inputs,
-)
+from tests.calibration.arms import MODULUS, hanging_tentacle, measured, random_inputs
 
 ARM = hanging_tentacle()
 FREE = [MODULUS, "t.distance", "pose"]
@@ -22,7 +17,7 @@ FREE = [MODULUS, "t.distance", "pose"]
 def log_determinant(inputs):
     """Of JᵀJ in the scales of the numbers."""
     free = free_numbers(ARM, FREE)
-    slopes = MarkerModel(free, inputs, np.arange(2)).predict(free.start, slopes=True).slopes
+    slopes = MarkerModel(free, inputs, ("half", "tool")).predict(free.start, slopes=True).slopes
     rows = slopes.reshape(-1, len(free)) * free.scale
     return np.linalg.slogdet(rows.T @ rows)[1]
 
@@ -65,16 +60,6 @@ def test_a_plan_is_a_dataset_of_its_poses_and_of_the_errors_to_expect():
     np.testing.assert_array_equal(found.activation, plan.activations)
     assert dict(zip(found.number.values, found.sigma.values, strict=True)) == plan.sigma(2e-4)
     assert found.unit.sel(number="pose.rx") == "rad"
-
-
-def test_a_plan_replaces_no_measurements(tmp_path):
-    path = tmp_path / "poses.csv"
-    plan = plan_poses(ARM, [MODULUS], 3, candidates=16)
-    plan.save(path)
-    path.write_text(filled := path.read_text().replace(",,,,,,", ",1,2,3,4,5,6", 1))
-    with pytest.raises(InvalidInput, match="overwrite"):
-        plan.save(path)
-    assert path.read_text() == filled
 
 
 @pytest.mark.parametrize(

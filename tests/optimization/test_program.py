@@ -15,14 +15,7 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.optimization import sensitivity
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.polish import point_of
-from softreach.optimization.problem import (
-    Candidate,
-    DesignCase,
-    Goal,
-    Objective,
-    Problem,
-    goals,
-)
+from softreach.optimization.problem import Candidate, DesignCase, Goal, Objective, Problem, goals
 from softreach.optimization.program import DesignPoint, Point, stacked, stacked_slopes
 from softreach.requirements import Box, Keep, Limits, Requirements, Sphere, Target
 from softreach.support.errors import InvalidInput, NotPossible
@@ -64,9 +57,8 @@ def moved(point: Point, unknowns):
     parameters = point.design.problem.parameters
     low, high = parameters.bounds.T
     values = parameters.moved(point.design.values, low + unknowns[:count] * (high - low))
-    design = DesignPoint(
-        point.design.problem, values, point.design.accuracy, like=point.design.rods
-    )
+    of = point.design
+    design = DesignPoint(of.problem, values, of.accuracy, like=of.rods)
     poses = unknowns[count:].reshape(point.poses.shape)
     return Point(design, unknowns[:count], poses, point.goal, point.floors)
 
@@ -203,13 +195,9 @@ def test_effort_is_differentiated_with_poses_that_follow():
     asked = within({"length": (0.9, 1.1)}, needs, minimize="mean_effort")
     result = sensitivity(asked, Candidate(values={"length": NARROW.length}), n=0)
     step = 1e-3
-    ends = [
-        DesignCase(
-            changed(NARROW, {"length": NARROW.length + side}), needs, 1e-2
-        ).check.effort.mean()
-        for side in (-step, step)
-    ]
-    assert result.gradient[0, 0] == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-3)
+    arms = (changed(NARROW, {"length": NARROW.length + side}) for side in (-step, step))
+    back, there = (DesignCase(arm, needs, 1e-2).check.effort.mean() for arm in arms)
+    assert result.gradient[0, 0] == pytest.approx((there - back) / (2 * step), rel=1e-3)
 
 
 def of_design(name, compute):
@@ -222,14 +210,12 @@ def test_indices_of_a_sum_are_shares_of_its_variances():
     known = {name: find_parameter(NARROW, name) for name in ends}
 
     def total(arm):
-        first, second = (
-            (known[name].value(arm) - low) / (high - low) for name, (low, high) in ends.items()
-        )
+        pairs = ((known[name].value(arm), *own) for name, own in ends.items())
+        first, second = ((value - low) / (high - low) for value, low, high in pairs)
         return Estimate(2.0 * first + second)
 
-    asked = replace(
-        within(ends), goals=(of_design("sum", total), of_design("1", lambda _: Estimate(1.0)))
-    )
+    both = of_design("sum", total), of_design("1", lambda _: Estimate(1.0))
+    asked = replace(within(ends), goals=both)
     best = Candidate(values={"length": 1.0, "taper": 0.005})
     shares, constant = sensitivity(asked, best, n=256).variance
     expected = np.array([0.8, 0.2])
@@ -243,12 +229,8 @@ def test_no_shares_are_said_of_ranges_in_which_a_design_cannot_exist():
     asked = within({"rings[0].inner_ratio": (0.5, 0.9), "taper": (0.0, 0.12)}, maximize="mass")
     best = Candidate(values={"rings[0].inner_ratio": 0.7, "taper": 0.01})
     assert sensitivity(asked, best, n=16).variance == (None,)
-    existing = replace(
-        asked,
-        parameters=free_parameters(
-            NARROW, {"rings[0].inner_ratio": (0.5, 0.9), "taper": (0.0, 0.02)}
-        ),
-    )
+    ends = {"rings[0].inner_ratio": (0.5, 0.9), "taper": (0.0, 0.02)}
+    existing = replace(asked, parameters=free_parameters(NARROW, ends))
     (shares,) = sensitivity(existing, best, n=16).variance
     assert shares.total[1] > 0.5
     assert shares.total[0] == pytest.approx(0.0, abs=1e-9)
@@ -260,3 +242,12 @@ def test_a_problem_needs_a_design_and_rows_a_power_of_two():
         sensitivity(asked)
     with pytest.raises(InvalidInput, match="power of two"):
         sensitivity(asked, Candidate(values={"taper": 0.01}), n=12)
+
+
+def test_the_same_seed_gives_the_same_error_bars():
+    asked = within({"taper": (0.0, 0.02), "length": (0.9, 1.1)}, maximize="mass")
+    best = Candidate(values={"taper": 0.01, "length": 1.0})
+    (one,), (other,), (third,) = (sensitivity(asked, best, n=4, seed=s).variance for s in (5, 5, 6))
+    for name in one._fields:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert (one.total_error != third.total_error).any()

@@ -116,11 +116,9 @@ def test_parameters_that_mirror_each_other_cost_the_same():
 
 
 def test_larger_deviations_of_one_parameter_lose_in_proportion():
-    losses = [
-        1.0 - tolerance(NARROW, {"taper": s}, samples=100, checked=0).kept.mean
-        for s in (1e-4, 3e-4)
-    ]
-    assert losses[1] == pytest.approx(3.0 * losses[0], rel=1e-6)
+    each = (tolerance(NARROW, {"taper": s}, samples=100, checked=0) for s in (1e-4, 3e-4))
+    few, many = (1.0 - result.kept.mean for result in each)
+    assert many == pytest.approx(3.0 * few, rel=1e-6)
 
 
 def test_it_says_what_costs_most_and_can_be_passed_on():

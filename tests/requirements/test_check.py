@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -92,17 +93,16 @@ def test_a_finding_is_met_where_its_excess_is_zero_and_the_check_where_all_are()
     assert data.reached.values.tolist() == [[True] * 5 + [False]]
 
 
+TILTED = np.array([[0.1, 0.2, 1.0]])
+
+
 def needs_of(places, factor=1.0, move=lambda x: x, turn=lambda x: x):
     center, point = move(factor * np.array([[0.3, 0.1, 0.5], [0, 0, 0.55]]))
     return Requirements(
         targets=[Target(move(factor * places))],
         keeps=[
             Keep(Sphere(center, 0.25 * factor), False),
-            Keep(
-                HalfSpace(point, turn(np.array([[0.1, 0.2, 1.0]]))[0]),
-                True,
-                clearance=0.01 * factor,
-            ),
+            Keep(HalfSpace(point, turn(TILTED)[0]), True, clearance=0.01 * factor),
         ],
         limits=Limits(shortening=0.2, bending=0.3),
     )
@@ -149,8 +149,7 @@ def test_the_pose_that_keeps_to_a_region_is_chosen_where_there_are_several():
     arm = sr.designs.redundant_trunk()
     places = sr.tip_positions(arm, np.full((1, arm.bundles), -0.6))
     free = sr.check(arm, Requirements(targets=[Target(places)]))
-    middle = sr.configuration(arm, free.poses[0, 0], [0.6 * arm.length]).position.values[0]
-    beside = middle + np.array([0.0, 0.0, 0.0])
+    beside = sr.configuration(arm, free.poses[0, 0], [0.6 * arm.length]).position.values[0]
     others = sr.solve_inverse(arm, places, family=16).activations
     apart = sr.configuration(arm, others, [0.6 * arm.length]).position.values[:, 0] - beside
     room = np.linalg.norm(apart, axis=1).max() - float(arm.profile.radius(0.6 * arm.length))
@@ -163,8 +162,6 @@ def test_the_pose_that_keeps_to_a_region_is_chosen_where_there_are_several():
 
 
 def test_bounds_that_are_said_to_reach_a_place_reach_it():
-    import re
-
     narrow = ARM.with_bounds(0.6 * ARM.bounds)
     wanted = sr.tip_positions(ARM, 0.9 * ARM.bounds[:, :1].T)
     text = sr.check(narrow, Requirements(targets=[Target(wanted)])).findings[0].text
@@ -198,10 +195,9 @@ def test_the_share_of_a_region_is_that_of_its_volume():
     assert abs(coverage.share - share) < 3 * coverage.error
     assert open_check.met == (coverage.share >= 0.2)
     # The same by single poses, which a limit that nothing breaks asks for.
-    by_poses = sr.check(
-        ARM, Requirements(targets=[target], limits=Limits(bending=50.0)), accuracy=0.03
-    )
-    assert abs(by_poses.coverages[0].share - share) < 4 * by_poses.coverages[0].error
+    needs = Requirements(targets=[target], limits=Limits(bending=50.0))
+    (coverage,) = sr.check(ARM, needs, accuracy=0.03).coverages
+    assert abs(coverage.share - share) < 4 * coverage.error
 
 
 def test_limits_without_targets_are_those_of_all_bounds():
@@ -225,9 +221,8 @@ def test_more_payloads_are_never_less_to_ask_for():
         check = sr.check(arm, Requirements(targets=[Target(places)], payloads=payloads))
         gaps[payloads] = check.gaps
         assert check.excess >= 0.0
-    np.testing.assert_allclose(
-        gaps[0.0, 0.05], np.concatenate([gaps[0.0,], gaps[0.05,]]), atol=1e-12
-    )
+    both = np.concatenate([gaps[0.0,], gaps[0.05,]])
+    np.testing.assert_allclose(gaps[0.0, 0.05], both, atol=1e-12)
 
 
 def test_a_payload_that_nothing_holds_is_missed_and_not_an_error():
@@ -360,7 +355,7 @@ def test_a_check_passes_on_what_sets_warn_of(monkeypatch):
     needs = Requirements(measures={"exact_volume": (0.1, None)})
     with pytest.warns(SoftreachWarning, match="rough"):
         sr.check(ARM, needs, accuracy=0.1)
-    checks.quick_check(ARM, needs, 0.1)  # on the way of a search nothing is said
+    checks.checked(ARM, needs, 0.1, quick=True)  # on the way of a search nothing is said
 
 
 @pytest.fixture

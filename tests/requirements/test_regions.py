@@ -129,13 +129,10 @@ def test_places_lie_inside_and_are_spread_as_the_volume_is(region):
 def test_places_of_a_half_space_and_of_next_to_nothing_are_refused():
     with pytest.raises(InvalidInput, match="no end"):
         PLANE.places(3)
-    sliver = Mesh([[0, 0, 0], [1, 1, 1], [1, 1, 1.000001], [1, 1.000001, 1]], box_free_faces())
+    faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+    sliver = Mesh([[0, 0, 0], [1, 1, 1], [1, 1, 1.000001], [1, 1.000001, 1]], faces)
     with pytest.raises(NotPossible, match="too thin"):
         sliver.places(3)
-
-
-def box_free_faces():
-    return [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
 
 
 def test_faces_that_look_inward_are_turned():

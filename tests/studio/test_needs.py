@@ -113,14 +113,14 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
 
 
 def test_what_quick_poses_miss_is_looked_at_again(session, monkeypatch):
-    plain = goals.quick_check
+    plain = goals.checked
 
-    def blind(*arguments):
-        made = plain(*arguments)
+    def blind(*arguments, **options):
+        made = plain(*arguments, **options)
         wrong = tuple(dataclasses.replace(each, verdict="missed") for each in made.findings)
         return dataclasses.replace(made, findings=wrong, gaps=made.gaps + 0.1)
 
-    monkeypatch.setattr(goals, "quick_check", blind)
+    monkeypatch.setattr(goals, "checked", blind)
     added(session, "place to reach")
     assert session.found.check.met
     assert "place 1</b>: reached" in verdict(session)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import datetime as dt
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -15,10 +16,10 @@ from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.errors import PlacementErrors, misses, with_products
-from softreach.calibration.fit import Fit, exchanged_columns, fitted, started
+from softreach.calibration.fit import exchanged_columns, fitted
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
-from softreach.calibration.model import MarkerModel, marker_places, marker_stations
+from softreach.calibration.model import MarkerModel, marker_stations
 from softreach.calibration.result import Calibration, Rival
 from softreach.calibration.uncertainty import uncertainty
 from softreach.rod.summary import design_warnings
@@ -92,31 +93,10 @@ def calibrate(
     if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
         warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
     held = _held_out(len(table), hold_out, as_integer("seed", seed))
-    numbers, progress = free_numbers(arm, free, prior), as_progress(progress)
-    model = MarkerModel.of(numbers, table.of(~held))
-
-    def fit_to(model: MarkerModel, places: Array) -> Fit:
-        model = replace(model, free=started(model, places))
-        return fitted(model, places, robust=robust, noise=noise, progress=progress)
-
-    result = _calibrated(arm, model, table, held, fit_to, noise)
-    result = replace(result, seconds=perf_counter() - begin)
-    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
-
-
-def _calibrated(
-    arm: Manipulator,
-    model: MarkerModel,
-    table: Measurements,
-    held: Mask,
-    fit_to: Callable[[MarkerModel, Array], Fit],
-    noise: float | None,
-) -> Calibration:
-    """The fit and what the data says of it; warns of what a user should look at."""
-    train = table.of(~held)
+    train, progress = table.of(~held), as_progress(progress)
+    model = MarkerModel.of(free_numbers(arm, free, prior), train)
+    fit_to = partial(fitted, robust=robust, noise=noise, progress=progress)
     fit = fit_to(model, train.places)
-    if not fit.converged:
-        warn(f"the fit did not converge in {fit.evaluations} evaluations: look at its residuals")
     result = Calibration(
         arm=fit.free.made(fit.values),
         start=arm,
@@ -130,7 +110,8 @@ def _calibrated(
     spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
         result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
-    return result
+    result = replace(result, seconds=perf_counter() - begin)
+    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
 
 
 def _held_out(count: int, share: float, seed: int) -> Mask:
@@ -144,14 +125,13 @@ def _held_out(count: int, share: float, seed: int) -> Mask:
 def _rivals(
     arm: Manipulator, table: Measurements, held: Mask, progress: Progress
 ) -> tuple[Rival, ...]:
+    def rival(name: str, places: Array, numbers: int) -> Rival:
+        off = places - table.places
+        return Rival(name, numbers, misses(off[~held]), misses(off[held]))
+
     train = table.of(~held)
-    laws = {
-        "constant curvature": constant_curvature(arm, train, table, progress),
-        "quadratic ridge": quadratic(train, table),
-    }
-    left = {name: (places - table.places, count) for name, (places, count) in laws.items()}
-    each = (Rival(k, n, misses(x[~held]), misses(x[held])) for k, (x, n) in left.items())
-    return tuple(each)
+    arcs = constant_curvature(arm, train, table, progress)
+    return rival("constant curvature", *arcs), rival("quadratic ridge", *quadratic(train, table))
 
 
 def leave_one_run_out(
@@ -169,9 +149,8 @@ def leave_one_run_out(
         NotPossible: Fewer than two runs.
         InvalidInput: As `calibrate`.
     """
-    names = ("inputs", "markers", "run", "order")
-    columns = {name: options.pop(name) for name in names if name in options}
-    table = read_measurements(arm, data, **columns)
+    columns = ("inputs", "markers", "run", "order")
+    table = read_measurements(arm, data, **{k: options.pop(k, None) for k in columns})
     if len(table.run_names) < 2:
         raise NotPossible("leaving out a run needs two runs or more: name their column by `run`")
     errors = {}
@@ -188,30 +167,31 @@ def _left(ratio: float) -> bool:
 
 
 def _warn_of_numbers(result: Calibration) -> None:
-    if ends := [n for n, end in zip(result.names, result.fit.at_bound, strict=True) if end]:
-        warn(f"numbers that end at a bound of their range: {', '.join(ends)}")
-    own = [n.name for n in result.fit.free.numbers if n.prior is not None]
+    fit, names = result.fit, np.array(result.names)
+    if not fit.converged:
+        warn(f"the fit did not converge in {fit.evaluations} evaluations: look at its residuals")
+    if fit.at_bound.any():
+        warn(f"numbers that end at a bound of their range: {', '.join(names[fit.at_bound])}")
+    own = [n.name for n in fit.free.numbers if n.prior is not None]
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:
             warn(
                 f"{name} became {ratio:.3g} times what the design says: hold it, give it a prior, "
                 "and look whether the inputs are in their order"
             )
-    told = result.uncertainty.told | result.fit.at_bound
-    if vague := [name for name, is_told in zip(result.names, told, strict=True) if not is_told]:
+    if len(vague := names[~(result.uncertainty.told | fit.at_bound)]):
         warn(
             f"the data does not tell {', '.join(vague)}: its standard deviation is infinite; hold "
             "it, give it a prior, or measure more"
         )
-    if after := design_warnings(result.arm):
-        before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}
-        for text in after:
-            if re.sub(r"[\d.]+", "", text) not in before:
-                warn(f"the calibrated arm: {text}")
+    before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}
+    for text in design_warnings(result.arm):
+        if re.sub(r"[\d.]+", "", text) not in before:
+            warn(f"the calibrated arm: {text}")
 
 
-def _ridge(features: Array, target: Array, asked: Array) -> Array:
-    """Targets at the features that are asked, (n, number), by a linear law of the known ones.
+def _ridge(features: Array, target: Array, wanted: Array) -> Array:
+    """Targets at the features that are wanted, (n, number), by a linear law of the known ones.
 
     Its penalty is that of the least generalized cross-validation.
     """
@@ -229,7 +209,7 @@ def _ridge(features: Array, target: Array, asked: Array) -> Array:
 
     best = min(_PENALTIES, key=cross_validation)
     weights = axes.T @ ((values / (values**2 + n * best))[:, None] * along)
-    return mean + ((asked - middle) / size) @ weights
+    return mean + ((wanted - middle) / size) @ weights
 
 
 def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
@@ -241,12 +221,12 @@ def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
     """
     middle, span = train.inputs.mean(axis=0), np.ptp(train.inputs, axis=0)
     size = np.where(span > 0, span, 1.0)
-    seen, asked = (with_products((each.inputs - middle) / size) for each in (train, test))
+    seen, wanted = (with_products((each.inputs - middle) / size) for each in (train, test))
     places = np.full((len(test), test.markers, 3), np.nan)
     for marker in range(test.markers):
         known = np.isfinite(train.places[:, marker]).all(axis=1)
         if known.sum() > 1:
-            places[:, marker] = _ridge(seen[known], train.places[known, marker], asked)
+            places[:, marker] = _ridge(seen[known], train.places[known, marker], wanted)
     return places, 3 * train.markers * (1 + seen.shape[1])
 
 
@@ -269,12 +249,10 @@ def constant_curvature(
         progress(0)  # which may end the fit
         return (arcs.places(values, train.inputs) - train.places)[seen]
 
-    tries = [
-        least_squares(residuals, arcs.start(arm, share), x_scale="jac", max_nfev=60)
-        for share in _SHARES
-    ]
-    best = min(tries, key=lambda result: result.cost)
-    return arcs.places(best.x, test.inputs), len(best.x)
+    starts = (arcs.start(arm, share) for share in _SHARES)
+    ends = (least_squares(residuals, start, x_scale="jac", max_nfev=60) for start in starts)
+    best = min(ends, key=lambda end: end.cost).x
+    return arcs.places(best, test.inputs), len(best)
 
 
 class _Arcs(NamedTuple):
@@ -286,27 +264,23 @@ class _Arcs(NamedTuple):
 
     @classmethod
     def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:
-        stations, offsets = marker_stations(arm)
-        measured = marker_places(arm, data.marker_names)
         ends = [part.span(arm.length)[1] for part in arm.actuators]
-        whole = np.unique(np.round([*ends, arm.length], 9))
-        middles = 0.5 * (np.append(0.0, whole[:-1]) + whole)
+        ends = np.unique(np.round([*ends, arm.length], 9))
+        middles = 0.5 * (np.append(0.0, ends[:-1]) + ends)
         each = (part.acts(arm.profile, middles) for part in arm.actuators)
-        acts = np.concatenate([np.empty((len(whole), 0), bool), *each], axis=1)
-        gains = np.abs(Driving(arm).gains)[: arm.bundles]
-        acts = acts.astype(float) @ gains > 0
+        acts = np.concatenate([np.empty((len(ends), 0)), *each], axis=1)
         moves = np.ptp(data.inputs, axis=0) > 0
+        acts = (acts @ np.abs(Driving(arm).gains)[: arm.bundles] > 0) & moves
         scale = np.where(moves, np.abs(data.inputs).max(axis=0), 1.0)
-        return cls(whole, acts & moves, scale, stations[measured], offsets[measured])
+        return cls(ends, acts, scale, *marker_stations(arm, data.marker_names))
 
     def start(self, arm: Manipulator, share: float) -> Array:
         """A share of the bends that the design has in the middle of each arc, without loads."""
         from scipy.spatial.transform import Rotation
 
         middles = 0.5 * (np.append(0.0, self.ends[:-1]) + self.ends)
-        body, gains = body_of(arm), Driving(arm).gains
-        slopes = np.moveaxis(tables(body, middles).curvature[:, :2] @ gains, 1, 2)
-        slopes = slopes * self.scale[:, None]
+        slopes = tables(body_of(arm), middles).curvature[:, :2] @ Driving(arm).gains
+        slopes = np.moveaxis(slopes, 1, 2) * self.scale[:, None]
         most = np.abs(slopes).max(initial=0.0)
         if any(unit == "m" for unit in arm.bundle_units) or not np.isfinite(most):
             slopes *= 1.0 / (arm.length * max(most, 1e-12))
@@ -326,18 +300,16 @@ class _Arcs(NamedTuple):
         place = np.broadcast_to(values[:3], (len(x), 3))
         frame = np.broadcast_to(Rotation.from_rotvec(values[3:6]).as_matrix(), (len(x), 3, 3))
         result, begin = np.empty((len(x), len(self.markers), 3)), 0.0
+        own = np.searchsorted(self.ends[:-1], self.markers, "right")  # arc of each marker
         for k, end in enumerate(self.ends):
             bend = rest[k] + x @ slopes[k]
-            last = k == count - 1
-            for m, z in enumerate(self.markers):
-                if begin <= z < end or (last and z >= end):
-                    along, turn = _arc(bend, z - begin)
-                    along = along + turn @ self.offsets[m]
-                    result[:, m] = place + np.einsum("nab,nb->na", frame, along)
+            for m in np.flatnonzero(own == k):
+                along, turn = _arc(bend, self.markers[m] - begin)
+                along = along + turn @ self.offsets[m]
+                result[:, m] = place + np.einsum("nab,nb->na", frame, along)
             along, turn = _arc(bend, end - begin)
             place = place + np.einsum("nab,nb->na", frame, along)
-            frame = frame @ turn
-            begin = end
+            frame, begin = frame @ turn, end
         return result
 
 

@@ -48,13 +48,9 @@ def misses(residuals: Array) -> PlacementErrors:
     distance = distance[np.isfinite(distance)]
     if not len(distance):
         return PlacementErrors(np.nan, np.nan, np.nan, np.nan, 0)
-    return PlacementErrors(
-        float(np.median(distance)),
-        float(distance.mean()),
-        float(np.sqrt((distance**2).mean())),
-        float(np.quantile(distance, 0.95)),
-        len(distance),
-    )
+    rms, most = float(np.sqrt((distance**2).mean())), float(np.quantile(distance, 0.95))
+    median, mean = float(np.median(distance)), float(distance.mean())
+    return PlacementErrors(median, mean, rms, most, len(distance))
 
 
 class Repeatability(NamedTuple):
@@ -69,12 +65,8 @@ class Repeatability(NamedTuple):
 def repeatability(data: Measurements, residuals: Array) -> Repeatability:
     """From pairs of samples with the same inputs, or with near ones.
 
-    Residuals are compared and not places, so that the arm's own motion between near inputs does not
-    count.
-
-    Args:
-        data: All samples.
-        residuals: Predicted minus measured places, NaN where unknown, (n, marker, 3) [m].
+    Residuals are compared, predicted minus measured places (n, marker, 3) [m], NaN where unknown,
+    so that the arm's own motion between near inputs does not count.
     """
     spans = np.ptp(data.inputs, axis=0)
     moving = spans > 0
@@ -106,20 +98,13 @@ class Verdict:
 
 
 def judged(
-    data: Measurements,
-    residuals: Array,
-    repeated: Repeatability,
-    held: Mask,
-    far: Mask,
+    data: Measurements, residuals: Array, repeated: Repeatability, held: Mask, far: Mask
 ) -> Verdict:
     """Limitation of a fit, from its residuals in the order in which samples were taken.
 
-    Args:
-        data: All samples.
-        residuals: Predicted minus measured places, NaN where unknown, (n, marker, 3) [m].
-        repeated: What the data repeats.
-        held: Samples that the fit did not see, whose error is judged if there are some, shape (n,).
-        far: Samples far off, which are slips if they are few and of different inputs, shape (n,).
+    Residuals are predicted minus measured places, NaN where unknown, (n, marker, 3) [m]. The error
+    that is judged is that of the samples `held` out of the fit, if there are some; samples `far`
+    off are slips if they are few and of different inputs; shape (n,) each.
     """
     rows = held if held.any() else ~held
     finding = _finding(data, far)

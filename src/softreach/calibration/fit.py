@@ -114,15 +114,14 @@ class _Order(NamedTuple):
 
 def _orders(model: MarkerModel, values: Array, own: Array, places: Array) -> list[_Order]:
     """All exchanges, the one that leaves least first; `own` are the places as predicted."""
-    found, plain = [], np.arange(model.inputs.shape[1])
+    orders, plain = [], np.arange(model.inputs.shape[1])
     for order in _exchanges(model):
+        other = own
         if (order.inputs != plain).any():
             other = replace(model, inputs=model.inputs[:, order.inputs]).predict(values).places
-        else:
-            other = own
         miss = _miss(model.free, other, _ordered(places, order.columns))
-        found.append(order._replace(miss=miss))
-    return sorted(found, key=lambda order: order.miss)
+        orders.append(order._replace(miss=miss))
+    return sorted(orders, key=lambda order: order.miss)
 
 
 def _exchanges(model: MarkerModel) -> Iterator[_Order]:
@@ -162,8 +161,8 @@ def _ordered(places: Array, order: NDArray[np.intp]) -> Array:
     return places.reshape(len(places), -1)[:, order].reshape(places.shape)
 
 
-def _said(found: list[_Order]) -> str:
-    alike = [order.text for order in found if order.miss <= _ALIKE * found[0].miss]
+def _said(orders: list[_Order]) -> str:
+    alike = [order.text for order in orders if order.miss <= _ALIKE * orders[0].miss]
     return f"{' or '.join(alike[:4])} seem to be exchanged, or counted the other way round"
 
 
@@ -171,20 +170,18 @@ def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> No
     own = _miss(model.free, predicted, places)
     middle = np.nanmean(places, axis=(0, 1))
     if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):
-        found = _orders(model, model.free.start, predicted, places)
-        if found[0].miss < _FAR_BETTER * own:
+        orders = _orders(model, model.free.start, predicted, places)
+        if orders[0].miss < _FAR_BETTER * own:
             raise NotPossible(
-                f"the columns of the data fit no arm with right-handed axes: {_said(found)}; "
-                f"the middle then misses by {1e3 * found[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
+                f"the columns of the data fit no arm with right-handed axes: {_said(orders)}; "
+                f"the middle then misses by {1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
             )
 
 
 def identifiable(free: FreeNumbers, slopes: Array) -> None:
     """Refuse numbers that the data cannot tell: those that do nothing, and those that trade.
 
-    Args:
-        free: The numbers.
-        slopes: Derivatives of all residuals, those of priors among them, shape (residual, number).
+    `slopes` are derivatives of all residuals and priors, shape (residual, number).
 
     Raises:
         InvalidInput: The names of the numbers, and which to leave out.
@@ -215,49 +212,35 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
 def fitted(
     model: MarkerModel, places: Array, *, robust: bool, noise: float | None, progress: Progress
 ) -> Fit:
-    """The numbers at which predicted places are nearest to measured ones.
+    """The numbers at which predicted places are nearest to measured ones, as `calibrate` says.
 
-    Args:
-        model: Markers as functions of the free numbers.
-        places: Measured places [m], NaN where none was seen, shape (n, marker, 3).
-        robust: Let samples far off count less.
-        noise: Standard deviation of a coordinate [m], against which priors are weighed; None to
-            take that of the residuals.
-        progress: Called with 1 for each step.
+    `places` are measured [m], NaN where none was seen, shape (n, marker, 3).
 
     Raises:
         InvalidInput: Numbers that the data cannot tell apart.
         NotPossible: Columns in another order, or no equilibrium at the start.
     """
+    model = replace(model, free=started(model, places))
     problem = _Problem(model, places, progress)
     values = np.clip(model.free.start, *problem.bounds)
     identifiable(model.free, problem.slopes(values))
     if not np.isfinite(problem.residuals(values)).all():
         raise NotPossible("the design that the fit starts from has no equilibrium at any sample")
-    rounds = [None, _ROBUST] if robust else [None]
     converged, count = False, 0
-    for width in rounds:
-        if width is not None:
-            problem.width = width * robust_width(problem.miss(values))
+    for is_last in (False, True) if robust else (True,):
+        if robust and is_last:
+            problem.width = _ROBUST * robust_width(problem.miss(values))
         if any(number.prior for number in model.free.numbers):
             problem.unit = noise or robust_width(problem.miss(values))
-        result = problem.solved(values, _FINE if width == rounds[-1] else _COARSE)
+        result = problem.solved(values, _FINE if is_last else _COARSE)
         values, converged = result.x, bool(result.status > 0)
         count += int(result.nfev)
     prediction = problem.at(values)
     residuals = prediction.places - places
-    low, high = problem.bounds
-    hair = 1e-6 * model.free.scale
-    return Fit(
-        model.free,
-        values,
-        prediction,
-        residuals,
-        problem.weights_of(residuals),
-        (values <= low + hair) | (values >= high - hair),
-        count,
-        converged,
-    )
+    (low, high), hair = problem.bounds, 1e-6 * model.free.scale
+    at_bound = (values <= low + hair) | (values >= high - hair)
+    weights = problem.weights_of(residuals)
+    return Fit(model.free, values, prediction, residuals, weights, at_bound, count, converged)
 
 
 class _Problem:
@@ -298,9 +281,7 @@ class _Problem:
         return np.concatenate([miss.ravel(), self.unit * (self.rows @ values - self.means)])
 
     def slopes(self, values: Array) -> Array:
-        prediction = self.at(values)
-        assert prediction.slopes is not None
-        slopes = prediction.slopes[self.seen].reshape(-1, len(self.model.free))
+        slopes = self.at(values).slopes[self.seen].reshape(-1, len(self.model.free))
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
         return np.concatenate([slopes, self.unit * self.rows])
 
@@ -360,25 +341,21 @@ def exchanged_columns(
 ) -> tuple[str, float] | None:
     """What seems exchanged, as the same numbers then fit twice as well, and their error, rms [m].
 
-    Args:
-        fit: With the columns as they are.
-        model: Its model.
-        places: Its measured places [m].
-        refitted: Fit of another model to other places.
+    `fit` is that of a model to places [m]; `refitted` fits another model to other places.
     """
     some = slice(None, None, -(-len(places) // _SAMPLES))
     few, seen = replace(model, inputs=model.inputs[some]), places[some]
     least, best = _BETTER * misses(fit.residuals).rms, None
     for values in (model.free.start, fit.values):
         own = few.predict(values).places
-        found = _orders(few, values, own, seen)
-        if found[0].miss > _PROMISING * _miss(model.free, own, seen):
+        orders = _orders(few, values, own, seen)
+        if orders[0].miss > _PROMISING * _miss(model.free, own, seen):
             continue
-        other = replace(model, inputs=model.inputs[:, found[0].inputs])
+        other = replace(model, inputs=model.inputs[:, orders[0].inputs])
         try:
-            error = misses(refitted(other, _ordered(places, found[0].columns)).residuals).rms
+            error = misses(refitted(other, _ordered(places, orders[0].columns)).residuals).rms
         except (InvalidInput, NotPossible):
             continue
         if error < least:
-            least, best = error, (_said(found), error)
+            least, best = error, (_said(orders), error)
     return best

@@ -15,14 +15,8 @@ import numpy as np
 from softreach.arm.base import Base, rotation_matrices
 from softreach.arm.body import RestShape
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import (
-    Parameter,
-    find_parameters,
-    parameters,
-    parts,
-    with_values,
-)
-from softreach.support.arguments import as_mapping, as_names, plain
+from softreach.arm.parameters import Parameter, find_parameters, parameters, parts, with_values
+from softreach.support.arguments import as_mapping, as_names, as_one_of, plain
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
 
@@ -36,6 +30,10 @@ _UNSEEN = 1e-12  # angle by which an arm that counts as bent is bent at least [r
 _STEP = 1e-3  # of the scale of a number, for derivatives of tables of fourth order
 _CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 12))
+
+
+Neighbors = list[tuple[float, Manipulator | Base]]
+"""Arms around one, or their bases alone, with the factors of a derivative by a number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,12 +87,9 @@ class FreeNumbers:
         Raises:
             InvalidDesign: No such arm can exist.
         """
-        pose, paths = {}, {}
-        for number, value in zip(self.numbers, values.tolist(), strict=True):
-            if number.name in POSE:
-                pose[number.name] = value
-            else:
-                paths |= dict.fromkeys(_tied(number.name), value)
+        given = dict(zip(self.names, values.tolist(), strict=True))
+        pose = {name: value for name, value in given.items() if name in POSE}
+        paths = {path: value for name, value in given.items() for path in _tied(name)}
         arm = with_values(self.arm, {each: paths[x] for x, each in self._parameters.items()})
         return arm.replace(base=_moved(arm.base, pose)) if pose else arm
 
@@ -103,7 +98,7 @@ class FreeNumbers:
         names = [number.name for number in self.numbers if number.name not in POSE]
         return find_parameters(self.arm, tuple(path for name in names for path in _tied(name)))
 
-    def neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator | Base]]:
+    def neighbors(self, values: Array, k: int) -> Neighbors:
         """Arms around these values along one number, with the factors of a derivative by it.
 
         Differences of fourth order, inside the range of the number; of a number of the pose the
@@ -115,53 +110,43 @@ class FreeNumbers:
             points = _FORWARD
         elif value + 2 * step > high[k]:
             points, step = _FORWARD, -step
-        result: list[tuple[float, Manipulator | Base]] = []
+        result: Neighbors = []
         for offset, factor in points:
             other = values.copy()
             other[k] = value + offset * step
-            if number.name in POSE:
-                pairs = zip(self.names, other.tolist(), strict=True)
-                made = _moved(self.arm.base, {name: x for name, x in pairs if name in POSE})
-            else:
-                made = self.made(other)
+            pose = dict(zip(self.names, other.tolist(), strict=True))
+            in_pose = number.name in POSE
+            made = _moved(self.arm.base, pose) if in_pose else self.made(other)
             result.append((factor / step, made))
         return result
 
     def started_at(self, values: Mapping[str, float]) -> FreeNumbers:
         """The same with other values to start from."""
-        starts = [float(values.get(number.name, number.start)) for number in self.numbers]
-        pairs = zip(self.numbers, starts, strict=True)
-        return replace(self, numbers=tuple(replace(n, start=start) for n, start in pairs))
+        numbers = (replace(n, start=float(values.get(n.name, n.start))) for n in self.numbers)
+        return replace(self, numbers=tuple(numbers))
 
 
 def free_numbers(
     arm: Manipulator, free: Sequence[str], prior: Mapping[str, Any] | None = None
 ) -> FreeNumbers:
-    """Free numbers by their names.
-
-    Args:
-        arm: The design.
-        free: Paths of parameters, with `*` for any text; several tied by "=" have one value;
-            "pose" for the base; "pose.position" and "pose.rotation" for parts of it.
-        prior: Mean and width of what is known of a number, by its name; a width alone is about the
-            value of the design.
+    """Free numbers by their names, with "pose.position" and "pose.rotation" for parts of a pose.
 
     Raises:
         InvalidInput: A name that no number has, a number that counts something, or a prior that is
             no width above 0.
     """
-    if arm.rest.is_straight and any("rest." in name for name in as_names("free", free)):
+    given = as_names("free", free)
+    if arm.rest.is_straight and any("rest." in name for name in given):
         # All arms on the way have a rest shape, were it of the size of rounding.
         arm = arm.replace(rest=RestShape(curvature_x=_UNSEEN / arm.length))
     priors = {} if prior is None else as_mapping("prior", prior, lambda _, value: value)
     numbers = tuple(
         replace(number, prior=_prior(number, priors.pop(number.name, None)))
-        for number in _each(arm, as_names("free", free))
+        for number in _each(arm, given)
     )
-    if priors:
-        allowed = f"of a free number: {', '.join(number.name for number in numbers)}"
-        raise InvalidInput("prior", next(iter(priors)), allowed)
     names = [number.name for number in numbers]
+    if priors:
+        raise InvalidInput("prior", next(iter(priors)), f"of a free number: {', '.join(names)}")
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("free", twice[0], "given once")
     if not numbers:
@@ -170,22 +155,18 @@ def free_numbers(
 
 
 def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
-    known: dict[str, Parameter] | None = None
     for name in free:
         if name == "pose" or name.startswith("pose."):
             yield from _of_pose(arm, name)
-            continue
-        paths = _tied(name)
-        if "*" in name:
-            known = parameters(arm) if known is None else known
+        elif "*" in name:
+            known = parameters(arm)
             hits = [key for key in known if fnmatchcase(key, name.replace("[", "[[]"))]
             if not hits:
                 find_parameters(arm, (name,))
-            hits = _once(arm, known, hits) or hits
-            each = [_of_parameters(arm, hit, (hit,)) for hit in hits]
-            yield from [number for number in each if _changes_alone(arm, number)]
+            each = (_of_parameters(arm, hit) for hit in _once(arm, known, hits) or hits)
+            yield from (number for number in each if _changes_alone(arm, number))
         else:
-            yield _of_parameters(arm, " = ".join(paths), paths)
+            yield _of_parameters(arm, name)
 
 
 def _once(arm: Manipulator, known: Mapping[str, Parameter], names: Sequence[str]) -> list[str]:
@@ -215,28 +196,25 @@ def _tied(name: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in name.split("="))
 
 
-def _of_parameters(arm: Manipulator, name: str, paths: tuple[str, ...]) -> FreeNumber:
+def _of_parameters(arm: Manipulator, name: str) -> FreeNumber:
+    paths = _tied(name)
+    name = " = ".join(paths)
     if base := [path for path in paths if path.startswith("base.")]:
         allowed = "a number of the body: the base is free by pose, pose.position or pose.rotation"
         raise InvalidInput("free", base[0], allowed)
-    found = find_parameters(arm, paths)
-    first = found[paths[0]]
+    known = find_parameters(arm, paths)
+    first = known[paths[0]]
     if first.whole:
         raise InvalidInput("free", name, "a number that can change a little: this one counts")
-    if len({parameter.unit for parameter in found.values()}) > 1:
+    if len({parameter.unit for parameter in known.values()}) > 1:
         raise InvalidInput("free", name, "tied to numbers of the same unit")
-    values = [value for p in found.values() for value in p.values(arm) if math.isfinite(value)]
-    start = float(np.mean(values)) if values else _typical(arm, first.unit)
-    allowed = first.range
+    values = [value for p in known.values() for value in p.values(arm) if math.isfinite(value)]
+    typical, allowed = _typical(arm, first.unit), first.range
+    start = float(np.mean(values)) if values else typical
     if paths[0].rpartition(".")[2] in _PLACES:
         allowed = allowed._replace(high=arm.length)
-    return FreeNumber(
-        name=name,
-        unit=first.unit,
-        start=start,
-        range=allowed,
-        scale=max(0.1 * abs(start), 1e-2 * _typical(arm, first.unit)),
-    )
+    scale = max(0.1 * abs(start), 1e-2 * typical)
+    return FreeNumber(name=name, unit=first.unit, start=start, range=allowed, scale=scale)
 
 
 def _typical(arm: Manipulator, unit: str) -> float:
@@ -250,10 +228,7 @@ def _typical(arm: Manipulator, unit: str) -> float:
 
 def _of_pose(arm: Manipulator, name: str) -> Iterator[FreeNumber]:
     parts = {"pose": POSE, "pose.position": POSE[:3], "pose.rotation": POSE[3:]}
-    if name not in parts and name not in POSE:
-        allowed = f"one of {', '.join([*parts, *POSE])}"
-        raise InvalidInput("free", name, allowed)
-    for each in parts.get(name, (name,)):
+    for each in parts.get(as_one_of("free", name, [*parts, *POSE]), (name,)):
         axis = POSE.index(each)
         start = arm.base.position[axis] if axis < 3 else 0.0
         unit, scale = ("m", 1e-2 * arm.length) if axis < 3 else ("rad", 0.02)

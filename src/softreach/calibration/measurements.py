@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.support.arguments import as_given, as_mapping, as_text
+from softreach.support.arguments import as_given, as_mapping, as_one_of, as_text
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import (
     InvalidInput,
@@ -95,8 +95,7 @@ class Measurements:
     def of(self, rows: NDArray[np.intp] | Mask) -> Measurements:
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
-        rank = np.empty(len(self), np.intp)
-        rank[self.order] = np.arange(len(self))
+        rank = np.argsort(self.order)
         return replace(
             self,
             inputs=self.inputs[rows],
@@ -152,7 +151,6 @@ def read_measurements(
         return data
     columns_of = {} if inputs is None else as_mapping("inputs", inputs, as_text)
     starts_of = {} if markers is None else as_mapping("markers", markers, as_text)
-    run, order = (None if x is None else as_text(n, x) for n, x in (("run", run), ("order", order)))
     table, source = _table(data)
     columns = list(table.columns)
     run, order = _named(columns, run, _RUNS, "run"), _named(columns, order, _ORDERS, "order")
@@ -192,13 +190,13 @@ def _runs_and_order(
     names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
     taken = np.arange(len(table))
     if order is not None and table[order].dtype.kind in "iuf":  # names of samples say nothing
-        taken = np.lexsort((_numbers(table, order), begins[runs])).astype(np.intp)
+        taken = np.lexsort((_numbers(table, order, gaps=True), begins[runs])).astype(np.intp)
     return tuple(names.tolist()), runs, taken
 
 
 def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
     """Places of markers from their columns [m], NaN where one was not seen."""
-    each = [[_numbers(table, x) * _unit(x)[2] for x in own] for own in columns.values()]
+    each = [[_numbers(table, x, gaps=True) * _unit(x)[2] for x in y] for y in columns.values()]
     places = np.moveaxis(np.array(each), 2, 0)
     seen = np.isfinite(places).all(axis=2)
     if not seen.any():
@@ -220,9 +218,6 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
             usual = f"{name}_{'mm' if unit == 'm' else unit}"
             raise NotPossible(f"the name of column {name} must end in its unit, such as {usual}")
         values[:, k] = _numbers(table, name) * size
-    if not np.isfinite(values).all():
-        row, k = (int(i[0]) for i in np.nonzero(~np.isfinite(values)))
-        raise InvalidInput(f"{sources[k]} in row {row}", values[row, k], "a finite number")
     return values
 
 
@@ -307,56 +302,52 @@ def _refuse_short(text: str) -> None:
 
 
 def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:
-    if given is not None:
-        if given not in columns:
-            raise _missing(what, given, columns)
-        return given
+    if given is not None and as_text(what, given) not in columns:
+        raise _missing(what, given, columns)
     by_name = {name.lower(): name for name in columns}
-    return next((by_name[name] for name in usual if name in by_name), None)
+    return given or next((by_name[name] for name in usual if name in by_name), None)
 
 
 def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]]) -> None:
     offsets = [float(np.linalg.norm(marker.offset)) for marker in arm.markers]
     reach = _WIDEST * (arm.length + max(offsets, default=0.0))
     away = np.nan_to_num(np.abs(places - np.nanmedian(places, axis=0)))
-    if (far := int((away > reach).sum())) == 0:
-        return
-    row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
-    name, others = columns[marker][axis], f", as {far - 1} others" if far > 1 else ""
-    allowed = (
-        f"within {1e3 * reach:.4g} mm of the middle, for an arm of {1e3 * arm.length:.4g} mm: look "
-        "at the unit of the column, and leave a cell empty where the marker was not seen"
-    )
-    given = f"{1e3 * places[row, marker, axis]:.4g} mm{others}"
-    raise InvalidInput(f"{name} in row {row}", given, allowed)
+    if far := int((away > reach).sum()):
+        row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
+        given = f"{1e3 * places[row, marker, axis]:.4g} mm"
+        given += f", as {far - 1} others" if far > 1 else ""
+        allowed = f"within {1e3 * reach:.4g} mm of the middle, for an arm of "
+        allowed += f"{1e3 * arm.length:.4g} mm: look at the unit of the column, and leave a cell "
+        allowed += "empty where the marker was not seen"
+        raise InvalidInput(f"{columns[marker][axis]} in row {row}", given, allowed)
 
 
 def _refuse_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
-    bundles = [*[None] * len(arm.drives), *(arm.undriven if arm.drives else range(arm.bundles))]
+    actuators = [*[None] * len(arm.drives), *(arm.bundle_actuators[k] for k in arm.undriven)]
     most = np.abs(arm.input_bounds).max(axis=1)
+
+    def refuse(row: int, k: int, allowed: str) -> None:
+        given = f"{values[row, k]:.4g} {arm.input_units[k]}"
+        raise InvalidInput(f"{columns[k]} in row {row}", given, allowed)
+
     for unit in dict.fromkeys(arm.input_units):
         own = [k for k, each in enumerate(arm.input_units) if each == unit and columns[k]]
         bound = max((most[k] for k in own), default=0.0)
         size = np.abs(values[:, own])
         if not own or not size.any() or not 0 < bound < np.inf:
             continue
-        row, k = (int(i) for i in np.unravel_index(size.argmax(), size.shape))
-        name, reached = columns[own[k]], f"{values[row, own[k]]:.4g} {unit}"
         if size.max() > _HARD * bound:
-            allowed = f"near the bounds of the design, {bound:.4g} {unit}"
-            allowed += ": look at the column's unit"
-            raise InvalidInput(f"{name} in row {row}", reached, allowed)
-        for j in own:
-            actuator = None if bundles[j] is None else arm.bundle_actuators[bundles[j]]
-            row = int(values[:, j].argmin())
-            if values[row, j] < getattr(actuator, "least", -np.inf) - _SLACK * size.max():
-                given = f"{values[row, j]:.4g} {unit}"
-                allowed = f"at least 0 {unit}: a tendon pulls and cannot push"
-                raise InvalidInput(f"{columns[j]} in row {row}", given, allowed)
+            row, k = divmod(int(size.argmax()), len(own))
+            near = f"near the bounds of the design, {bound:.4g} {unit}: look at the column's unit"
+            refuse(row, own[k], near)
+        for k in own:
+            row = int(values[:, k].argmin())
+            if values[row, k] < getattr(actuators[k], "least", -np.inf) - _SLACK * size.max():
+                refuse(row, k, f"at least 0 {unit}: a tendon pulls and cannot push")
 
 
-def _missing(what: str, name: str, columns: list[str]) -> InvalidInput:
-    listed = ", ".join(columns[:12]) + (", ..." if len(columns) > 12 else "")
+def _missing(what: str, name: str, columns: Sequence[str]) -> InvalidInput:
+    listed = ", ".join(columns[:12]) + ", ..." * (len(columns) > 12)
     return InvalidInput(what, name, f"a column: {listed}", did_you_mean(name, columns))
 
 
@@ -370,28 +361,27 @@ def _unit(column: str) -> tuple[str, str, float]:
 
 def _triples(columns: list[str]) -> dict[str, list[str]]:
     """Columns x, y, z of places by the start, or the number, that they share."""
-    found: dict[str, dict[str, str]] = {}
+    places: dict[str, dict[str, str]] = {}
     for column in columns:
         name, unit, _ = _unit(column)
         if unit == "m" and (match := _PLACE.fullmatch(name)):
-            start = match["head"].rstrip("_ ") or match["number"]
-            start += match["number"] if match["head"].rstrip("_ ") else ""
-            found.setdefault(start, {})[match["axis"].lower()] = column
-    for axes in found.values():
+            start = match["head"].rstrip("_ ") + match["number"]
+            places.setdefault(start, {})[match["axis"].lower()] = column
+    for axes in places.values():
         if lacking := [axis for axis in "xyz" if axis not in axes]:
             given = ", ".join(axes.values())
             raise NotPossible(f"a place needs x, y and z: {lacking[0]} is missing beside {given}")
-    if not found:
+    if not places:
         usual = "x_mm, y_mm, z_mm or marker1_x_mm"
         raise NotPossible(f"the data has no places: no columns such as {usual}")
-    return {start: [axes[axis] for axis in "xyz"] for start, axes in found.items()}
+    return {start: [axes[axis] for axis in "xyz"] for start, axes in places.items()}
 
 
 def _chosen_markers(
     arm: Manipulator, triples: Mapping[str, list[str]], given: Mapping[str, str]
 ) -> dict[str, str]:
     names = marker_names(arm)
-    if chosen := _matched("marker", names, given, dict(zip(triples, triples, strict=True))):
+    if chosen := _matched("marker", names, given, {start: start for start in triples}):
         return chosen
     if len(names) != len(triples):
         listed = ", ".join(start or "x, y, z" for start in triples)
@@ -411,14 +401,12 @@ def _matched(
         return re.sub(r"[\s_\-.]+", "", name).lower()
 
     for name, column in given.items():
-        if name not in names:
-            hint = did_you_mean(name, names)
-            raise InvalidInput(f"{what}s", name, f"one of {', '.join(names)}", hint)
+        as_one_of(f"{what}s", name, names)
         if column not in columns and (column or what == "marker"):
             raise _missing(f"columns of {what} {name}", column, list(columns))
     known = {simple(name): column for column, name in columns.items()}
-    found = {name: given.get(name, known.get(simple(name))) for name in names}
-    return {name: column for name, column in found.items() if column is not None}
+    pairs = ((name, given.get(name, known.get(simple(name)))) for name in names)
+    return {name: column for name, column in pairs if column is not None}
 
 
 def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:
@@ -444,11 +432,14 @@ def _unit_text(unit: str) -> str:
     return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
 
 
-def _numbers(table: pd.DataFrame, column: str) -> Array:
+def _numbers(table: pd.DataFrame, column: str, *, gaps: bool = False) -> Array:
+    """Finite numbers of a column; NaN where there is none, if it may have gaps."""
     try:
         values = table[column].to_numpy(float)
     except (ValueError, TypeError) as error:
         raise InvalidInput(f"column {column}", in_short(str(error)), "numbers") from None
-    if (rows := np.flatnonzero(np.isinf(values))).size:
-        raise InvalidInput(f"{column} in row {rows[0]}", values[rows[0]], "a finite number")
+    wrong = np.isinf(values) if gaps else ~np.isfinite(values)
+    if wrong.any():
+        row = int(wrong.argmax())
+        raise InvalidInput(f"{column} in row {row}", values[row], "a finite number")
     return values

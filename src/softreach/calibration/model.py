@@ -17,8 +17,8 @@ from softreach.arm.base import Base
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
-from softreach.calibration.free_numbers import FreeNumbers
-from softreach.calibration.measurements import Measurements, marker_names
+from softreach.calibration.free_numbers import FreeNumbers, Neighbors
+from softreach.calibration.measurements import Measurements
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.pulled import LoadedLengths
@@ -35,7 +35,7 @@ from softreach.rod.response import (
 )
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Mask, joined
 from softreach.support.arrays import rows as table_rows
 
 _BLOCK = 1024  # samples at once: their shapes at all nodes are kept
@@ -50,7 +50,7 @@ class Prediction(NamedTuple):
     """Predicted places of the markers of all samples."""
 
     places: Array  # In the world [m], NaN without an equilibrium, shape (n, marker, 3)
-    slopes: Array | None  # Derivatives by the free numbers, shape (n, marker, 3, number)
+    slopes: Array  # Derivatives by the free numbers, (n, marker, 3, number); of none unless asked
     status: NDArray[np.int8]  # `TipStatus`, shape (n,)
 
 
@@ -69,20 +69,16 @@ class _Explicit(NamedTuple):
     rest: Array  # û at rest at the nodes, (step, 3, 3)
 
 
-def marker_stations(arm: Manipulator) -> tuple[Array, Array]:
-    """Stations Z [m] of the markers of an arm, and their offsets in the directors [m].
+def marker_stations(arm: Manipulator, names: Iterable[str]) -> tuple[Array, Array]:
+    """Stations Z [m] of some markers of an arm, and their offsets in the directors [m].
 
     An arm without markers has one at its tip.
     """
     if not arm.markers:
         return np.array([arm.length]), np.zeros((1, 3))
-    places = np.array([marker.station_at("station", arm.length) for marker in arm.markers])
-    return places, np.array([marker.offset for marker in arm.markers])
-
-
-def marker_places(arm: Manipulator, names: Iterable[str]) -> Index:
-    """Places of some markers among those of an arm, shape (n,)."""
-    return np.array([marker_names(arm).index(name) for name in names])
+    known = {marker.name: marker for marker in arm.markers}
+    places = [known[name].station_at("station", arm.length) for name in names]
+    return np.array(places), np.array([known[name].offset for name in names])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,17 +87,12 @@ class MarkerModel:
 
     free: FreeNumbers
     inputs: Array  # Shape (n, input)
-    markers: NDArray[np.intp]  # Those of the arm's markers that were measured
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the markers that were measured."""
-        return tuple(marker_names(self.free.arm)[k] for k in self.markers)
+    names: tuple[str, ...]  # Of the markers that were measured
 
     @classmethod
     def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
         """The model of measured poses."""
-        return cls(free, data.inputs, marker_places(free.arm, data.marker_names))
+        return cls(free, data.inputs, data.marker_names)
 
     def predict(self, values: Array, *, slopes: bool = False) -> Prediction:
         """Places of the markers, and their derivatives if asked for.
@@ -113,28 +104,18 @@ class MarkerModel:
 
     def of_arm(self, arm: Manipulator, values: Array | None = None) -> Prediction:
         """Places of the markers of an arm that has these values."""
-        free, stations = self.free, marker_stations(arm)[0][self.markers]
+        free, (stations, _) = self.free, marker_stations(arm, self.names)
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
-        neighbors: list[list[tuple[float, Manipulator | Base]]] = []
-        if values is not None:
-            neighbors = [free.neighbors(values, k) for k in range(len(free))]
-        blocks = [
-            self._block(arm, neighbors, grid, rows, values is not None)
-            for rows in parallel.blocks(len(self.inputs), _BLOCK)
-        ]
-        places, slopes, status = zip(*blocks, strict=True)
-        return Prediction(
-            np.concatenate(places),
-            None if values is None else np.concatenate([s for s in slopes if s is not None]),
-            np.concatenate(status),
-        )
+        neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
+        blocks = parallel.blocks(len(self.inputs), _BLOCK)
+        return joined([self._block(arm, neighbors, grid, self.inputs[rows]) for rows in blocks])
 
     def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
-        stations, offsets = marker_stations(arm)
+        stations, offsets = marker_stations(arm, self.names)
         body, driving = body_of(arm), Driving(arm)
         law = driving.law
-        table = node_tables(body, stations[self.markers], grid)
+        table = node_tables(body, stations, grid)
         columns = law.columns
         stiffness = np.zeros((*table.length.shape, 4))
         if len(columns):
@@ -148,7 +129,7 @@ class MarkerModel:
             table,
             arm.base.rotation,
             np.array(arm.base.position),
-            offsets[self.markers],
+            offsets,
             driving.bundles(inputs),
             law.taut_from,
             law.compliance,
@@ -157,14 +138,8 @@ class MarkerModel:
         )
 
     def _block(
-        self,
-        arm: Manipulator,
-        neighbors: list[list[tuple[float, Manipulator | Base]]],
-        grid: StepGrid,
-        rows: slice,
-        slopes: bool,
-    ) -> tuple[Array, Array | None, NDArray[np.int8]]:
-        inputs = self.inputs[rows]
+        self, arm: Manipulator, neighbors: list[Neighbors], grid: StepGrid, inputs: Array
+    ) -> Prediction:
         at = self._explicit(arm, grid, inputs)
         body = body_of(arm)
         bounds = body.bounds * 0.0  # which decide nothing
@@ -181,21 +156,16 @@ class MarkerModel:
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
         places = at.position + _beyond(at, state)[1] @ at.rotation.T
         places[lost] = np.nan
-        if not slopes:
-            return places, None, state.status
-        known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
-        changes = [self._change(arm, at, one, grid, inputs) for one in neighbors]
-        result = np.full((*places.shape, len(changes)), np.nan)
-        result[known] = _slopes(rod.arm, at, table_rows(state, known), changes, known)
-        return places, result, state.status
+        slopes = np.full((*places.shape, len(neighbors)), np.nan)
+        if neighbors:
+            known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
+            some = table_rows(state, known)
+            changes = [self._change(arm, at, each, grid, inputs) for each in neighbors]
+            slopes[known] = _slopes(rod.arm, at, some, changes, known)
+        return Prediction(places, slopes, state.status)
 
     def _change(
-        self,
-        arm: Manipulator,
-        at: _Explicit,
-        neighbors: list[tuple[float, Manipulator | Base]],
-        grid: StepGrid,
-        inputs: Array,
+        self, arm: Manipulator, at: _Explicit, neighbors: Neighbors, grid: StepGrid, inputs: Array
     ) -> _Explicit:
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
@@ -208,10 +178,10 @@ class MarkerModel:
                 each.append(self._explicit(other, grid, inputs))
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
-        table = each[0].table.combined([one.table for one in each], factors)
+        table = each[0].table.combined([other.table for other in each], factors)
         others = (
             np.tensordot(factors, np.stack(columns), axes=1)
-            for columns in zip(*(one[1:] for one in each), strict=True)
+            for columns in zip(*(other[1:] for other in each), strict=True)
         )
         return _Explicit(table, *others)
 
@@ -223,11 +193,7 @@ def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:
 
 
 def _slopes(
-    arm: Manipulator,
-    at: _Explicit,
-    state: RodState,
-    changes: list[_Explicit],
-    rows: Mask,
+    arm: Manipulator, at: _Explicit, state: RodState, changes: list[_Explicit], rows: Mask
 ) -> Array:
     """Derivatives of the places by all numbers, (n, marker, 3, number)."""
     bundles = state.gamma.shape[1]
@@ -266,13 +232,10 @@ def _with_tensions(
     """
     law = LengthLaw(arm)
     columns, bundles = law.columns, state.gamma.shape[1]
-    tension = state.gamma[:, columns]
-    bend, rise = _strains(at, state)
+    tension, strains = state.gamma[:, columns], _strains(at, state)
     own = [
-        _explicit_shortening(at, change, bend, rise)
-        + tension * change.compliance
-        + change.taut_from
-        for change in changes
+        _explicit_shortening(at, each, *strains) + tension * each.compliance + each.taut_from
+        for each in changes
     ]
     # The other changes act as if so much less were pulled in.
     pulled = driven.copy()

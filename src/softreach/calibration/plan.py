@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.calibration.fit import identifiable
 from softreach.calibration.free_numbers import FreeNumbers, free_numbers
 from softreach.calibration.measurements import marker_names
-from softreach.calibration.model import MarkerModel, marker_places
+from softreach.calibration.model import MarkerModel
 from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.schema import provenance
@@ -160,11 +160,12 @@ def plan_poses(
     numbers = free_numbers(arm, free)
     candidates = as_integer("candidates", candidates, 2, 200_000)
     n, seed = as_integer("n", n, 1, candidates), as_integer("seed", seed)
-    names = _markers(arm, markers)
-    inputs = _candidates(arm, candidates, seed)
-    model = MarkerModel(numbers, inputs, marker_places(arm, names))
-    prediction = model.predict(numbers.start, slopes=True)
-    assert prediction.slopes is not None
+    names, (low, high) = _markers(arm, markers), arm.input_bounds.T
+    moving = low < high
+    cube = _candidates(int(moving.sum()), candidates, seed)
+    inputs = np.tile(low, (len(cube), 1))
+    inputs[:, moving] += cube * (high - low)[moving]
+    prediction = MarkerModel(numbers, inputs, names).predict(numbers.start, slopes=True)
     usable = np.isfinite(prediction.slopes).all(axis=(1, 2, 3))
     usable &= prediction.status == TipStatus.STABLE
     if not usable.any():
@@ -176,14 +177,11 @@ def plan_poses(
     if not least <= n <= len(inputs):
         allowed = f"from {least} for these {len(numbers)} numbers to {len(inputs):,} candidates"
         raise InvalidInput("n", n, allowed)
-    low, high = arm.input_bounds.T
-    moving = low < high
-    at = (inputs[:, moving] - low[moving]) / (high - low)[moving]
     # An arm about to snap reacts to everything, and that at activations which are not known yet.
     trusted = slopes * numbers.scale
     size = np.linalg.norm(trusted, axis=(1, 2))
     trusted /= np.sqrt(1.0 + (size / (_TRUSTED * np.median(size))) ** 2)[:, None, None]
-    chosen = _chosen(trusted, at, n)
+    chosen = _chosen(trusted, cube[usable], n)
     np.random.default_rng(seed).shuffle(chosen)
     identifiable(numbers, own := slopes[chosen].reshape(-1, len(numbers)))
     return PosePlan(numbers, names, inputs[chosen], own.T @ own)
@@ -201,22 +199,13 @@ def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
     return names
 
 
-def _candidates(arm: Manipulator, count: int, seed: int) -> Array:
-    """Activations all over the box, then corners of it, shape (n, input)."""
-    low, high = arm.input_bounds.T
-    free = np.flatnonzero(low < high)
-    whole = 1 << (count - 1).bit_length()
-    inside = sample_cube("sobol", whole, len(free), seed)[:count]
-    if len(free) <= _CORNERS:
-        corners = np.stack(np.meshgrid(*[[0.0, 1.0]] * len(free), indexing="ij"), axis=-1)
-        corners = corners.reshape(-1, len(free))
-    else:
-        draw = np.random.default_rng(seed).integers(0, 2, (1 << _CORNERS, len(free)))
-        corners = np.unique(draw, axis=0).astype(float)
-    cube = np.concatenate([inside, corners])
-    inputs = np.tile(low, (len(cube), 1))
-    inputs[:, free] = low[free] + cube * (high - low)[free]
-    return inputs
+def _candidates(dim: int, count: int, seed: int) -> Array:
+    """Places all over the unit cube, then corners of it, shape (n, dim)."""
+    inside = sample_cube("sobol", 1 << (count - 1).bit_length(), dim, seed)[:count]
+    if dim <= _CORNERS:
+        return np.concatenate([inside, [*np.ndindex(*[2] * dim)]])
+    draw = np.random.default_rng(seed).integers(0, 2, (1 << _CORNERS, dim))
+    return np.concatenate([inside, np.unique(draw, axis=0)])
 
 
 def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
@@ -225,11 +214,10 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
     No two of them are nearer in the unit cube than half of the mean distance of n points.
     """
     each = np.einsum("crp,crq->cpq", slopes, slopes)
-    start = _START * np.trace(each.sum(axis=0)) / each.shape[1] * np.eye(each.shape[1])
+    total = _START * np.trace(each.sum(axis=0)) / each.shape[1] * np.eye(each.shape[1])
     room = _APART * n ** (-1.0 / max(at.shape[1], 1))
     near = np.zeros(len(slopes), int)  # chosen poses that each candidate is too near to
     chosen: list[int] = []
-    total = start
     for _ in range(n):
         best = _best(slopes, total, near)
         chosen.append(best)
@@ -250,9 +238,7 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
 
 def _within(at: Array, place: int, room: float) -> Mask:
     """Candidates that are too near to one that is chosen, itself among them."""
-    result = np.linalg.norm(at - at[place], axis=1) < room
-    result[place] = True
-    return result
+    return np.linalg.norm(at - at[place], axis=1) < room
 
 
 def _best(slopes: Array, total: Array, near: NDArray[np.int_]) -> int:

@@ -61,15 +61,6 @@ class Rival(NamedTuple):
     held_out: PlacementErrors
 
 
-class ErrorRow(NamedTuple):
-    """Errors of one law on some samples."""
-
-    law: str
-    samples: str
-    """Those of which the errors are."""
-    errors: PlacementErrors
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Reported):
     """A calibrated arm, the numbers that were fitted, and all that the data says of them."""
@@ -200,7 +191,6 @@ class Calibration(Reported):
         allowed = f"shape (n, {self.arm.inputs})"
         x = as_rows("inputs", inputs, self.arm.inputs, allowed)
         prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
-        assert prediction.slopes is not None
         covariance = self.uncertainty.covariance
         square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
         return prediction.places, np.sqrt(np.maximum(square, 0.0))
@@ -297,18 +287,17 @@ class Calibration(Reported):
         write_text(path, "\n".join(lines) + f"\n\n{self.arm.file_text}", overwrite=overwrite)
 
     @property
-    def errors(self) -> tuple[ErrorRow, ...]:
-        """Errors of the calibrated arm, of the design, and of rivals on the same samples."""
+    def errors(self) -> list[tuple[str, str, PlacementErrors]]:
+        """Law, samples and its errors there: the calibrated arm, the design, rivals."""
         held = int(self.held.sum())
         fitted = f"{len(self.data) - held} fitted"
         on = f"{held} held out" if held else fitted
-        rows = [ErrorRow("calibrated", fitted, self.train)]
-        rows += [ErrorRow("calibrated", on, self.held_out)] if held else []
-        rows.append(ErrorRow("design, base fitted", on, self.before))
-        for rival in self.rivals:
-            law = f"{rival.name}, {counted(rival.numbers, 'number')}"
-            rows.append(ErrorRow(law, on, rival.held_out if held else rival.train))
-        return tuple(rows)
+        rows = [("calibrated", fitted, self.train)]
+        rows += [("calibrated", on, self.held_out)] if held else []
+        rows.append(("design, base fitted", on, self.before))
+        for name, numbers, *errors in self.rivals:
+            rows.append((f"{name}, {counted(numbers, 'number')}", on, errors[held > 0]))
+        return rows
 
     def table(self, unit: str = "m") -> pd.DataFrame:
         """Inputs, measured and predicted places and their distances, a row for each sample.
@@ -404,8 +393,8 @@ def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
         each = ((name, errors.rms / unit.size) for name, errors in result.by_marker.items())
         listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)
         yield f"{unit.label('rms')} of each marker: {listed}"
-    for one, other, share in result.correlated[:3]:
-        yield f"hardly told apart: {one} and {other} (correlation {share:+.3f})"
+    for first, second, share in result.correlated[:3]:
+        yield f"hardly told apart: {first} and {second} (correlation {share:+.3f})"
     if len(far := result.outliers):
         rows = ", ".join(map(str, far[:_MOST_ROWS])) + ", ..." * (len(far) > _MOST_ROWS)
         yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"

@@ -53,15 +53,10 @@ class Uncertainty:
 def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertainty:
     """The sandwich of clusters, each freed of its own leverage [BellMcCaffrey2002].
 
-    Numbers at a bound are held there, and the variance of the others is as if they were known.
-
-    Args:
-        fit: The fit.
-        data: What it was made of.
-        noise: Standard deviation of a coordinate [m], against which priors are weighed.
+    Numbers at a bound are held there, and the variance of the others is as if they were known. The
+    noise is the standard deviation of a coordinate [m], against which priors are weighed.
     """
     slopes = fit.prediction.slopes
-    assert slopes is not None
     free = ~fit.at_bound
     count = len(fit.values)
     scale = np.maximum(fit.free.scale, 0.1 * np.abs(fit.values))
@@ -104,7 +99,6 @@ def _bent(fit: Fit, seen: Mask, scale: Array) -> Array:
     with w = 1/√(1 + d²/W²).
     """
     slopes, weight = fit.prediction.slopes, fit.weights
-    assert slopes is not None
     square = np.where(seen, (fit.residuals**2).sum(axis=2), 0.0)
     share = np.divide(
         weight * (1.0 - weight**2), square, out=np.zeros_like(square), where=square > 0
@@ -120,13 +114,8 @@ def _sandwich(
     """Squares of the scores of clusters, degrees of freedom, variances to expect of plain noise.
 
     The residuals of a cluster are freed of its own leverage, (1 - H)^-1/2; the degrees of freedom
-    are those of the chi square with the same mean and variance (Satterthwaite).
-
-    Args:
-        rows: Derivatives of the residuals of samples, shape (n, residual, number).
-        miss: Residuals, shape (n, residual).
-        keys: Cluster of each sample, shape (n,).
-        inverse: Of the sum of squares of all rows.
+    are those of the chi square with the same mean and variance (Satterthwaite). `inverse` is that
+    of the sum of squares of all rows, derivatives of residuals, shape (n, residual, number).
     """
     count = rows.shape[2]
     values, axes = np.linalg.eigh(inverse)

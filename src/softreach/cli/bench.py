@@ -137,7 +137,7 @@ def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
         "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
         "numbers": _numbers(result.to_dataset()),
         "errors": [
-            {"law": row.law, "samples": row.samples, **_errors(row.errors)} for row in result.errors
+            {"law": law, "samples": on, **_errors(errors)} for law, on, errors in result.errors
         ],
         "correlated": result.correlated,
         "outlier_rows": result.outliers,

@@ -12,6 +12,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters, shifted
 from softreach.arm.tables import check_extension
+from softreach.requirements.findings import share_error
 from softreach.requirements.requirements import Requirements, Target
 from softreach.rod.tip_map import InvalidLoads
 from softreach.support import parallel
@@ -132,10 +133,9 @@ class Spread:
         mean, deviation = float(values.mean()), float(values.std(ddof=1))
         fourth = float(((values - mean) ** 4).mean())
         spread = max(fourth - deviation**4, 0.0) / (4.0 * count * max(deviation**2, 1e-300))
-        ends = [
-            float(np.quantile(values, np.clip(self.level + side, 0.0, 1.0)))
-            for side in np.array([-1.0, 1.0]) * math.sqrt(self.level * (1.0 - self.level) / count)
-        ]
+        off = math.sqrt(self.level * (1.0 - self.level) / count)
+        levels = np.clip([self.level - off, self.level, self.level + off], 0.0, 1.0)
+        low, quantile, high = np.quantile(values, levels).tolist()
         return replace(
             self,
             made=count,
@@ -143,24 +143,23 @@ class Spread:
             made_error=math.hypot(deviation / math.sqrt(count), error),
             made_deviation=deviation,
             deviation_error=math.sqrt(spread),
-            made_quantile=float(np.quantile(values, self.level)),
-            quantile_error=math.hypot(0.5 * (ends[1] - ends[0]), error),
+            made_quantile=quantile,
+            quantile_error=math.hypot(0.5 * (high - low), error),
         )
 
     def __str__(self) -> str:
-        percent = self.unit == "1"
-        scale, unit = (100.0, "%") if percent else (1.0, self.unit.replace("m3", "m³"))
-        first = f"{self._text(self.mean, scale, unit)}, {100 * self.level:.0f} % quantile "
-        first += self._text(self.quantile, scale, unit)
+        scale, unit = (100.0, "%") if self.unit == "1" else (1.0, self.unit.replace("m3", "m³"))
+
+        def text(value: float, error: float) -> str:
+            return quantity(scale * value, unit, scale * error)
+
+        mean, low = (text(value, 0.01 * self.deviation) for value in (self.mean, self.quantile))
+        first = f"{mean}, {100 * self.level:.0f} % quantile {low}"
         if self.made < 2:
             return first
-        mean = quantity(scale * self.made_mean, unit, scale * self.made_error)
-        low = quantity(scale * self.made_quantile, unit, scale * self.quantile_error)
-        verdict = "agrees" if self.agrees else "DIFFERS"
-        return f"{first}; made {mean}, {low}: {verdict}"
-
-    def _text(self, value: float, scale: float, unit: str) -> str:
-        return quantity(scale * value, unit, 0.01 * scale * self.deviation)
+        mean = text(self.made_mean, self.made_error)
+        low = text(self.made_quantile, self.quantile_error)
+        return f"{first}; made {mean}, {low}: {'agrees' if self.agrees else 'DIFFERS'}"
 
 
 class FirstOrder:
@@ -172,7 +171,7 @@ class FirstOrder:
         self.deviations, self.needs = deviations, needs
         self.accuracy, self.changes = accuracy, changes
         self.targets = [target for target in needs.targets if target.region is None]
-        self.regions = [(x, x.region.places(_IN_REGION)) for x in needs.targets if x.region]
+        self.regions = [(target, region.places(_IN_REGION)) for target, region in needs.regions]
         self.gradient = volume_gradient(deviations.arm, deviations.names, accuracy=accuracy)
         self.solid = self.gradient.solid
         self.boundary = MovingBoundary.of(self.solid, deviations.parameters)
@@ -200,7 +199,7 @@ class FirstOrder:
         off = np.linalg.norm((self.boundary.growth - self.gradient.volume) * sigmas)
         mean = 1.0 - self.boundary.mean_lost(sigmas) / volume
         error = float(off) / volume / math.sqrt(2.0 * math.pi)
-        return _spread_of("reach kept", shares, 1.0, mean, error)
+        return _spread_of("reach kept", shares, nominal=1.0, mean=mean, error=error)
 
     def costs(self) -> Array:
         """Share lost by each parameter alone."""
@@ -225,13 +224,12 @@ class FirstOrder:
 
     def depths(self, places: Array, within: float) -> Iterator[tuple[Array, Array]]:
         """Depth of places within reach [m], and how the boundary there moves, by payloads."""
+        still = np.zeros((len(places), len(self.deviations.sigmas)))
         for known in self.loaded:
             if known is None:
-                still = np.zeros((len(places), len(self.deviations.sigmas)))
                 yield np.full(len(places), -np.inf), still
             else:
-                solid, boundary = known
-                yield within - solid.distance(places), boundary.speed_at(places)
+                yield within - known[0].distance(places), known[1].speed_at(places)
 
     def probability(self, target: Target) -> Array:
         """Φ(depth / σ) of each place under the worst payload: 0 or 1 where nothing moves."""
@@ -253,11 +251,10 @@ class FirstOrder:
             for block in parallel.blocks(len(shares), max(1, _BLOCK // len(places))):
                 held = (depth + self.changes[block] @ speed.T >= 0.0).mean(axis=1)
                 shares[block] = np.minimum(shares[block], held)
-        error = math.sqrt(max(nominal * (1.0 - nominal), 1.0 / len(places)) / len(places))
-        return _spread_of(target.name, shares, nominal, float(shares.mean()), error)
+        known = {"mean": float(shares.mean()), "error": float(share_error(nominal, len(places)))}
+        return _spread_of(target.name, shares, nominal=nominal, **known)
 
 
-def _spread_of(name: str, shares: Array, nominal: float, mean: float, error: float) -> Spread:
+def _spread_of(name: str, shares: Array, **known: Any) -> Spread:
     low = max(0.0, float(np.quantile(shares, _QUANTILE)))
-    known: dict[str, Any] = {"nominal": nominal, "mean": mean, "error": error}
     return Spread(name=name, unit="1", deviation=float(shares.std()), quantile=low, **known)

@@ -128,15 +128,10 @@ class FreeParameters:
         numbers = {name: value for name, value in values.items() if name not in _WORDS}
         for tie in self.ties:
             numbers[tie.name] = tie.factor * float(numbers[tie.of]) + tie.constant
-        whole = {parameter.name for parameter in self.free if parameter.whole}
-        varies = DESIGN in values or BUNDLES in values
-        known = parameters_by_every_name(arm) if varies else numbers
-        numbers = {
-            name: int(value) if name in whole else float(value)
-            for name, value in numbers.items()
-            if name in known  # else of another base, or of another number of bundles
-        }
-        made = changed(arm, numbers)
+        if DESIGN in values or BUNDLES in values:  # another one may lack some
+            known = parameters_by_every_name(arm)
+            numbers = {name: value for name, value in numbers.items() if name in known}
+        made = changed(arm, {name: float(value) for name, value in numbers.items()})
         check_extension(made)
         return made
 
@@ -150,20 +145,17 @@ class FreeParameters:
 
     def start(self) -> dict[str, float | str] | None:
         """Values of the first base, within the ranges; None where it does not tell them."""
-        arm, values = self.base, {}
-        known = parameters_by_every_name(arm)
-        for parameter in self.free:
-            if parameter.name in _WORDS:
-                values[parameter.name] = parameter.choices[0]
+        known, values = parameters_by_every_name(self.base), {}
+        for name, each in ((each.name, each) for each in self.free):
+            if name in _WORDS:
+                values[name] = each.choices[0]
                 continue
-            value = known[parameter.name].value(arm) if parameter.name in known else np.nan
+            value = known[name].value(self.base) if name in known else np.nan
             if not np.isfinite(value):
                 return None
-            if parameter.choices:
-                near = np.argmin([abs(float(choice) - value) for choice in parameter.choices])
-                values[parameter.name] = parameter.choices[int(near)]
-            else:
-                values[parameter.name] = float(np.clip(value, parameter.low, parameter.high))
+            values[name] = float(np.clip(value, each.low, each.high))
+            if each.choices:
+                values[name] = min(each.choices, key=lambda x, value=value: abs(float(x) - value))
         return values
 
 
@@ -172,14 +164,7 @@ def free_parameters(
     free: Mapping[str, Any],
     choices: Mapping[str, Sequence[Any]] | None = None,
 ) -> FreeParameters:
-    """Free parameters from what a user gives.
-
-    Args:
-        base: A design, or several by name, one of which is chosen.
-        free: Parameter -> (low, high) [SI unit], or the parameter that it is tied to:
-            `"-left.revolution"`, `"0.5*left.offset + 90deg"`.
-        choices: Parameter -> values; `bundles` -> numbers of copies of the first actuator, evenly
-            spread; `material` of everything -> names of materials.
+    """Free parameters from what a user gives to `search`.
 
     Raises:
         InvalidInput: An unknown parameter, a range that is reversed, empty or beyond what the
@@ -192,29 +177,24 @@ def free_parameters(
     picks = {} if choices is None else as_mapping("choices", choices, lambda _, value: value)
     known = known_parameters(bases.values(), picks.get(BUNDLES, ()))
     texts = {name: text for name, text in given.items() if isinstance(text, str)}
-    found = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]
+    parts = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]
     if len(bases) > 1:
-        found.append(FreeParameter(name=DESIGN, unit="1", choices=tuple(bases)))
-    found += [_choice(known, bases, name, values) for name, values in picks.items()]
-    names = [parameter.name for parameter in found]
+        parts.append(FreeParameter(name=DESIGN, unit="1", choices=tuple(bases)))
+    parts += [_choice(known, bases, name, values) for name, values in picks.items()]
+    names = [parameter.name for parameter in parts]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("free", twice[0], "given once")
-    if not found:
+    if not parts:
         raise InvalidInput("free", "none", "one parameter or more with a range or choices")
     ties = tuple(_tie(known, names, name, text) for name, text in texts.items())
-    return FreeParameters(bases=bases, free=tuple(found), ties=ties)
+    return FreeParameters(bases=bases, free=tuple(parts), ties=ties)
 
 
 def known_parameters(arms: Iterable[Manipulator], counts: Any) -> dict[str, Parameter]:
-    """Parameters that any of the designs has, also with other numbers of bundles.
-
-    Args:
-        arms: The designs.
-        counts: Numbers of bundles to choose from.
-    """
+    """Parameters that any of the designs has, also with numbers of bundles to choose from."""
+    counted = counts if isinstance(counts, list | tuple) else ()
     known: dict[str, Parameter] = {}
     for arm in arms:
-        counted = counts if isinstance(counts, list | tuple) else ()
         for variant in (arm, *(_with_bundles(arm, count) for count in counted)):
             known = {**parameters_by_every_name(variant), **known}
     return known
@@ -233,13 +213,13 @@ def _ranged(known: Mapping[str, Parameter], name: str, ends: Any) -> FreeParamet
     except (TypeError, ValueError):
         allowed = "a range (low, high), or text that ties it to a free parameter"
         raise InvalidInput(f"free {name}", as_given(ends), allowed) from None
+    whole = parameter.whole
+    low, high = (float(np.ceil(low)), float(np.floor(high))) if whole else (low, high)
     if not low < high:  # NaN too
         raise InvalidInput(f"free {name}", (low, high), "a range (low, high) with low < high")
     for end in (low, high):
         if not parameter.range._replace(whole=False).admits(end):
             raise InvalidInput(f"free {name}", end, f"in its range: {parameter.range.text}")
-    whole = parameter.whole
-    low, high = (float(np.ceil(low)), float(np.floor(high))) if whole else (low, high)
     return FreeParameter(name=name, unit=parameter.unit, low=low, high=high, whole=whole)
 
 
@@ -291,11 +271,8 @@ def _with_bundles(arm: Manipulator, count: Any) -> Manipulator:
         what = "arms with drives" if arm.drives else f"{first.name}, which has no offset"
         raise NotPossible(f"the number of bundles cannot be chosen for {what}")
     offset = float(first.value_on("offset", arm.profile, arm.section))
-    turns = (offset + 2.0 * np.pi * np.arange(count) / count) % (2.0 * np.pi)
-    copies = (
-        first.replace(name=f"{first.name} {k}", offset=turn)
-        for k, turn in enumerate(turns.tolist(), 1)
-    )
+    turns = enumerate(((offset + 2.0 * np.pi * np.arange(count) / count) % (2.0 * np.pi)).tolist())
+    copies = (first.replace(name=f"{first.name} {k + 1}", offset=turn) for k, turn in turns)
     return arm.replace(actuators=tuple(copies))
 
 

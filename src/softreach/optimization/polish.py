@@ -14,6 +14,7 @@ from softreach.optimization.problem import Candidate, Problem
 from softreach.optimization.program import DesignPoint, Part, Point, stacked, stacked_slopes
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
+from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
@@ -31,39 +32,30 @@ _WORSE = 10.0  # times the cost of the start: a design that cannot exist
 def can_polish(problem: Problem) -> bool:
     """True of problems with numbers that can change a little, and goals with derivatives."""
     needs = problem.requirements
-    regions = any(target.region is not None for target in needs.targets)
     of_poses = needs.keeps or needs.limits.of_poses
     return (
-        not (regions and of_poses)  # what is covered depends on poses at countless places
+        not (needs.regions and of_poses)  # what is covered depends on poses at countless places
         and len(problem.parameters.real) > 0
         and len(needs.places) * max(1, len(needs.payloads)) <= _MOST_POSES
         and all(goal.objective.smooth for goal in problem.goals)
     )
 
 
+@parallel.undivided()
 @no_warnings()
 def polished(
     problem: Problem,
     start: Candidate,
-    *,
+    designs: int,
+    goal: int,
+    floors: Sequence[float],
     accuracy: float | None = None,
-    goal: int = 0,
-    floors: Sequence[float] = (),
-    designs: int = MOST_DESIGNS,
 ) -> Candidate:
     """The local optimum of one goal next to a design; poses at the targets move along with it.
 
-    Args:
-        problem: The problem.
-        start: The design to begin with.
-        accuracy: Relative error of volumes, instead of that of coarse sets.
-        goal: Number of the goal that is optimized.
-        floors: Costs of all goals that are not to be exceeded, but for that one.
-        designs: Most designs that are made.
-
-    Returns:
-        The better of both ends, with the number of designs that were looked at: none for a start
-        that is too far from what is required.
+    The costs of the other goals do not exceed the `floors`; the relative error of volumes is that
+    of coarse sets unless another `accuracy` is given. Returned is the better of both ends, with the
+    number of designs that were made: none for a start that is too far from what is required.
     """
     if start.excess > _HOPELESS:
         return replace(start, designs=0)
@@ -92,11 +84,7 @@ def polished(
 
 @no_warnings()
 def point_of(problem: Problem, candidate: Candidate, accuracy: float, goal: int = 0) -> Point:
-    """The program of one goal at a design, with the poses that it has at the targets.
-
-    Raises:
-        InvalidDesign: It is no design.
-    """
+    """The program of one goal at a design, with the poses that it has at the targets."""
     program = _Program(problem, candidate, accuracy, goal)
     return program.point(program.begin())
 
@@ -125,11 +113,7 @@ class _Program:
     _like: Sequence[TipMap] = ()
 
     def begin(self) -> Array:
-        """Unknowns of the start.
-
-        Raises:
-            InvalidDesign: It is no design.
-        """
+        """Unknowns of the start."""
         parameters = self.problem.parameters
         low, high = parameters.bounds.T
         reals = (parameters.reals(self.start.values) - low) / (high - low)
@@ -147,11 +131,7 @@ class _Program:
         return first
 
     def optimum(self) -> Array:
-        """Unknowns at which the program ends, or at which it was cut.
-
-        Raises:
-            InvalidDesign: The start is no design.
-        """
+        """Unknowns at which the program ends, or at which it was cut."""
         from scipy.optimize import minimize
 
         first, constraints = self.begin(), []

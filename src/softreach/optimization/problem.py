@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
@@ -18,7 +19,7 @@ from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, MetricFailed
 from softreach.atlas.metrics import known_metric
 from softreach.optimization.free_parameters import FreeParameters, Values
-from softreach.requirements.checks import Check, Sets, checked, quick_check, sets_to
+from softreach.requirements.checks import Check, Sets, checked, sets_to
 from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
 from softreach.support.arguments import as_given, as_names
@@ -45,8 +46,7 @@ NEAR = 0.1
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
 
-_COARSE, _FINE = 1 << 12, 1 << 15
-"""Samples of the cloud of coarse and of fine cases."""
+_COARSE, _FINE = 1 << 12, 1 << 15  # samples of the cloud of coarse and of fine cases
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
 
@@ -75,10 +75,9 @@ class DesignCase:
     @lazy
     def check(self) -> Check:
         """Requirements met and missed; on the way by poses that few descents find."""
-        if self.fine:
-            return checked(self.arm, self.requirements, self.accuracy, self.set_of)
-        with no_warnings():
-            return quick_check(self.arm, self.requirements, self.accuracy, self.set_of)
+        design = self.arm, self.requirements, self.accuracy, self.set_of
+        with nullcontext() if self.fine else no_warnings():
+            return checked(*design, quick=not self.fine)
 
     @lazy
     @no_warnings()
@@ -144,9 +143,7 @@ def goals(
 ) -> tuple[Goal, ...]:
     """Objectives with their senses, in the order in which names or metrics are given.
 
-    Raises:
-        InvalidInput: An unknown one, one that is given twice, or one about targets or regions that
-            the requirements do not have.
+    Those about targets or regions are refused where the requirements have none.
     """
     result = []
     for word, given, sense in (("maximize", maximize, 1.0), ("minimize", minimize, -1.0)):
@@ -157,20 +154,14 @@ def goals(
     names = [goal.name for goal in result]
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("objective", twice[0], "given once")
-    targets = requirements.targets
-    has = {"", *["targets"] * bool(targets), *("regions" for t in targets if t.region is not None)}
-    for goal in (goal for goal in result if goal.objective.asks not in has):
-        allowed = f"left out: the requirements have no {goal.objective.asks}"
-        raise InvalidInput("objective", goal.name, allowed)
+    for goal in result:
+        if (asks := goal.objective.asks) and not getattr(requirements, asks):
+            raise InvalidInput("objective", goal.name, f"left out: the requirements have no {asks}")
     return tuple(result)
 
 
 def known_objective(word: str, given: str | Metric) -> Objective:
-    """The objective of a name, or of a metric, which errors call by a word.
-
-    Raises:
-        InvalidInput: There is none.
-    """
+    """The objective of a name, or of a metric, which errors call by a word."""
     if isinstance(given, str) and given in OBJECTIVES:
         return OBJECTIVES[given]
     metric = given if isinstance(given, Metric) else known_metric(given)
@@ -180,15 +171,17 @@ def known_objective(word: str, given: str | Metric) -> Objective:
         raise InvalidInput(word, as_given(given), allowed, hint)
     if metric.over:
         raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
-    return Objective(
-        metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)), smooth=False
-    )
+    return _rough(metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)))
+
+
+def _rough(
+    name: str, unit: str, meaning: str, compute: Callable[[DesignCase], Estimate]
+) -> Objective:
+    return Objective(name, unit, meaning, compute, smooth=False)
 
 
 def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
-    return lambda case: Estimate(
-        getattr(case.reached, name), getattr(case.reached, f"{name}_error")
-    )
+    return lambda case: Estimate(*(getattr(case.reached, x) for x in (name, f"{name}_error")))
 
 
 def _coverage(case: DesignCase) -> Estimate:
@@ -245,29 +238,21 @@ _OBJECTIVES = (
     Objective("coverage", "1", "mean share of the regions that is reached", _coverage, "regions"),
     Objective("mean_effort", "1", "mean effort at the targets", _effort(np.mean), "targets"),
     Objective("worst_effort", "1", "largest effort at the targets", _effort(np.max), "targets"),
-    Objective(
+    _rough(
         "manipulability",
         "m3/input3",
         "mean √det(J Jᵀ) over the box",
         lambda case: _sampled(_dexterity(case).manipulability),
-        smooth=False,
     ),
-    Objective(
+    _rough(
         "dexterity",
         "1",
         "mean of 1 / condition of J over the box",
         lambda case: _sampled(1.0 / _dexterity(case).condition),
-        smooth=False,
     ),
-    Objective(
-        "activation_distance", "input", "mean D̄ within L/10", _activation_distance, smooth=False
-    ),
-    Objective(
-        "payload", "kg", "payload under which 80 % of the volume is left", _payload, smooth=False
-    ),
-    Objective(
-        "compliance", "m/N", "mean of the largest compliance of the tip", _compliance, smooth=False
-    ),
+    _rough("activation_distance", "input", "mean D̄ within L/10", _activation_distance),
+    _rough("payload", "kg", "payload under which 80 % of the volume is left", _payload),
+    _rough("compliance", "m/N", "mean of the largest compliance of the tip", _compliance),
     Objective("mass", "kg", "mass of the arm", lambda case: Estimate(mass(case.arm), 0.0)),
     Objective(
         "actuators", "1", "number of inputs", lambda case: Estimate(float(case.arm.inputs), 0.0)
@@ -301,8 +286,7 @@ class Candidate:
     @property
     def is_feasible(self) -> bool:
         """True of an arm that meets all requirements and has all objectives."""
-        known = all(math.isfinite(value.value) for value in self.objectives)
-        return self.excess == 0.0 and not self.fault and known
+        return self.excess == 0.0 and not self.fault
 
     def to_dict(self) -> dict[str, Any]:
         """All of it in plain values; `from_dict` makes an equal one."""
@@ -346,15 +330,10 @@ class Problem:
     def is_finer_on_finer_sets(self) -> bool:
         """True if reachable sets decide, so that what is best depends on their accuracy."""
         names = {goal.name for goal in self.goals} | {*self.requirements.measures}
-        regions = any(target.region is not None for target in self.requirements.targets)
-        return regions or not names.isdisjoint(SETS)
+        return bool(self.requirements.regions) or not names.isdisjoint(SETS)
 
     def case(self, values: Values, accuracy: float) -> DesignCase:
-        """The design with these values, to be asked to a relative error of volumes.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """The design with these values, to be asked to a relative error of volumes."""
         fine = accuracy <= self.accuracy
         return DesignCase(self.parameters.arm(values), self.requirements, accuracy, fine)
 

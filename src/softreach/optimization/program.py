@@ -63,11 +63,11 @@ class DesignPoint:
     @lazy
     def derivatives(self) -> tuple[TipDerivatives, ...]:
         """∂r/∂p of each of these, by parameters of the arm."""
-        known = [find_parameters(rod.arm, self._paths[0]) for rod in self.rods]
-        return tuple(
-            TipDerivatives(rod, [each[name] for name in self._paths[0]])
-            for rod, each in zip(self.rods, known, strict=True)
-        )
+        return tuple(map(self._derivatives_of, self.rods))
+
+    def _derivatives_of(self, rod: TipMap) -> TipDerivatives:
+        known = find_parameters(rod.arm, self._paths[0])
+        return TipDerivatives(rod, [known[name] for name in self._paths[0]])
 
     @lazy
     def chain(self) -> Array:
@@ -99,12 +99,8 @@ class DesignPoint:
     @property
     def _covered(self) -> list[tuple[int, Region]]:
         """Numbers of the payloads with the regions that must be covered under them."""
-        return [
-            (number, target.region)
-            for number in range(len(self.arms))
-            for target in self.problem.requirements.targets
-            if target.region is not None
-        ]
+        regions = self.problem.requirements.regions
+        return [(number, region) for number in range(len(self.arms)) for _, region in regions]
 
     def share(self, number: int, region: Region) -> float:
         """Share of a region that the tip reaches under a payload."""
@@ -120,10 +116,8 @@ class DesignPoint:
             return np.zeros(self.chain.shape[1])
         nodes = boundary_samples(solid.image)
         inside = (region.distance(nodes.places) <= 0.0).astype(float)
-        derivatives, rod = self.derivatives[number], effective(self.rods[number])
-        if rod is not self.rods[number]:
-            known = find_parameters(rod.arm, self._paths[0])
-            derivatives = TipDerivatives(rod, [known[name] for name in self._paths[0]])
+        own, rod = self.rods[number], effective(self.rods[number])
+        derivatives = self.derivatives[number] if rod is own else self._derivatives_of(rod)
         swept = nodes.derivative(derivatives.at(nodes.cube), inside)
         return swept @ self.chain / region.volume
 
@@ -131,15 +125,11 @@ class DesignPoint:
     def neighbors(self) -> list[tuple[float, Manipulator, Manipulator]]:
         """Designs on both sides along each real parameter, and how far they are apart."""
         parameters, pairs = self.problem.parameters, []
-        reals, (low, high) = parameters.reals(self.values), parameters.bounds.T
-        for k in range(len(reals)):
-            ends = np.clip(reals[k] + np.array([1, -1]) * STEP * (high - low)[k], low[k], high[k])
-            arms = []
-            for end in ends:
-                moved = reals.copy()
-                moved[k] = end
-                arms.append(parameters.arm(parameters.moved(self.values, moved)))
-            pairs.append((float((ends[0] - ends[1]) / (high - low)[k]), *arms))
+        for p in parameters.real:
+            steps = np.array([1, -1]) * STEP * (p.high - p.low)
+            ends = np.clip(float(self.values[p.name]) + steps, p.low, p.high).tolist()
+            arms = (parameters.arm({**self.values, p.name: end}) for end in ends)
+            pairs.append(((ends[0] - ends[1]) / (p.high - p.low), *arms))
         return pairs
 
     @lazy
@@ -147,15 +137,12 @@ class DesignPoint:
         """Parameters of the arm that move, and the chain."""
         parameters = self.problem.parameters
         known = parameters_by_every_name(self.case.arm)
-        widths = np.ptp(parameters.bounds, axis=1)
         names = [each.name for each in parameters.real]
-        rows = {
-            name: widths[k] * np.eye(len(names))[k] for k, name in enumerate(names) if name in known
-        }
+        widths = dict(zip(names, np.diag(np.ptp(parameters.bounds, axis=1)), strict=True))
+        rows = {name: row for name, row in widths.items() if name in known}
         for tie in parameters.ties:
-            if tie.of in names and tie.name in known:
-                k = names.index(tie.of)
-                rows[tie.name] = tie.factor * widths[k] * np.eye(len(names))[k]
+            if tie.of in widths and tie.name in known:
+                rows[tie.name] = tie.factor * widths[tie.of]
         return tuple(rows), np.array(list(rows.values())).reshape(-1, len(names))
 
 
@@ -211,10 +198,8 @@ class Point:
         return len(self.reals) + self.poses.size
 
     def _cost(self, goal: Goal) -> float:
-        is_effort = goal.name in EFFORTS
-        return -goal.sense * (
-            self._effort(goal.name)[0] if is_effort else self.design.value(goal.name)
-        )
+        name, of_poses = goal.name, goal.name in EFFORTS
+        return -goal.sense * (self._effort(name)[0] if of_poses else self.design.value(name))
 
     def _cost_slope(self, goal: Goal) -> Array:
         slope = np.zeros(self._size)
@@ -234,23 +219,18 @@ class Point:
         mean = float((each**power).mean() ** (1.0 / power))
         weight = (each / mean) ** (power - 1) / count
         widths = (box.widths / scales)[box.free]
-        slope = np.zeros(self._size)
-        slope[len(self.reals) :] = (
-            weight[:, None] * gamma[:, box.free] / each[:, None] * widths
-        ).ravel()
-        return mean, slope
+        moves = weight[:, None] * gamma[:, box.free] / each[:, None] * widths
+        return mean, np.concatenate([np.zeros(len(self.reals)), moves.ravel()])
 
     @lazy
     def _tips(self) -> list[Part]:
         needs, parts = self.design.problem.requirements, []
-        within = needs.within
         for number, (rod, cube) in enumerate(self._by_payload()):
             tips = rod.tips(rod.box.from_free_cube(cube))
             gaps = np.nan_to_num((tips - needs.places) / rod.length, nan=_NOWHERE)
             slopes = cache(partial(self._tip_slopes, number))
-            for k, gap in enumerate(gaps):
+            for k, (gap, near) in enumerate(zip(gaps, needs.within / rod.length, strict=True)):
                 slope = partial(lambda of, k: of()[k], slopes, k)
-                near = within[k] / rod.length
                 parts.append(Part(f"place {k + 1}", gap, slope, near, rod.length, "m"))
         return parts
 
@@ -261,10 +241,8 @@ class Point:
         _, slopes = rod.tips_and_slopes(box.from_free_cube(cube))
         result = np.zeros((len(cube), 3, self._size))
         result[:, :, :count] = self.design.derivatives[number].at(cube) @ self.design.chain
-        for j, column in enumerate(self._columns(number)):
-            result[np.arange(len(cube)), :, column] = (
-                slopes[:, :, box.free[j]] * box.widths[box.free[j]]
-            )
+        for k, column in zip(box.free, self._columns(number), strict=True):
+            result[np.arange(len(cube)), :, column] = slopes[:, :, k] * box.widths[k]
         return np.nan_to_num(result / rod.length)
 
     def _by_payload(self) -> list[tuple[TipMap, Array]]:
@@ -323,9 +301,7 @@ class Point:
         return slope
 
     def _shares(self) -> Iterator[Part]:
-        for target in self.design.problem.requirements.targets:
-            if (region := target.region) is None:
-                continue
+        for target, region in self.design.problem.requirements.regions:
             for number in range(len(self.design.rods)):
                 share = self.design.share(number, region)
                 slope = partial(self.design.share_slope, number, region)
@@ -333,14 +309,14 @@ class Point:
 
     def _of_design(self) -> Iterator[Part]:
         needs = self.design.problem.requirements
-        asked = [
+        limits = [
             (name, sense, limit)
             for name, ends in needs.measures.items()
             for sense, limit in zip((-1.0, 1.0), ends, strict=True)
             if name in SETS and limit is not None
         ]
         given = needs.limits.given
-        for name, sense, limit in asked + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
+        for name, sense, limit in limits + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
             slope = partial(self.design.slope, name)
             yield self._limit(name, sense, self.design.value(name), limit, slope)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import unit_suffix
 from softreach.arm.parameters import with_suffix
 from softreach.optimization.free_parameters import FreeParameter
-from softreach.optimization.problem import NEAR, Candidate, Goal, Problem
+from softreach.optimization.problem import NEAR, Candidate, Fidelity, Goal, Problem
 from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
@@ -88,8 +88,7 @@ class Search(Reported):
             return 0, 0
         ends = [each for each in self.candidates if each.designs > 1 and each.is_feasible]
         best, *costs = (np.array(self.problem.costs(each)) for each in (self.best, *ends))
-        near = [bool((np.abs(each - best) <= NEAR * np.abs(best)).all()) for each in costs]
-        return len(ends), sum(near)
+        return len(ends), sum(np.allclose(each, best, rtol=NEAR, atol=0.0) for each in costs)
 
     @property
     def arm(self) -> Manipulator:
@@ -121,9 +120,8 @@ class Search(Reported):
     @property
     def judged(self) -> dict[str, int]:
         """Number of candidates by what they were judged by: "bounds", "coarse", "full"."""
-        ways = [each.fidelity for each in self.candidates]
-        ways += [each.fidelity for each in self.finalists if each.fidelity == "full"]
-        return {word: ways.count(word) for word in ("bounds", "coarse", "full")}
+        ways = [each.fidelity for each in self.every]
+        return {word: ways.count(word) for word in get_args(Fidelity)}
 
     @property
     def at_ends(self) -> dict[str, str]:
@@ -134,8 +132,10 @@ class Search(Reported):
         ends = {}
         for p in (p for p in self.problem.parameters.free if not p.choices):
             value, near = float(self.best.values[p.name]), _AT_END * (p.high - p.low)
-            if value <= p.low + near or value >= p.high - near:
-                ends[p.name] = "lower" if value <= p.low + near else "upper"
+            if value <= p.low + near:
+                ends[p.name] = "lower"
+            elif value >= p.high - near:
+                ends[p.name] = "upper"
         return ends
 
     @property
@@ -229,9 +229,9 @@ class Search(Reported):
         """
         place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)
         check_folder(place, overwrite=overwrite)
-        width = max(2, len(str(len(self.front))))
-        several = [f"front_{number:0{width}}.toml" for number in range(1, len(self.front) + 1)]
-        names = several if len(self.goals) > 1 else ["best.toml"]
+        width, names = max(2, len(str(len(self.front)))), ["best.toml"]
+        if len(self.goals) > 1:
+            names = [f"front_{number:0{width}}.toml" for number, _ in enumerate(self.front, 1)]
         for name, each in zip(names, self.front, strict=True):
             with suppress(SoftreachError):  # no such arm can exist
                 write_text(place / name, self._design_text(each), overwrite=overwrite)
@@ -240,9 +240,10 @@ class Search(Reported):
             with suppress(OSError):
                 if path.name not in names and path.read_text("utf-8").startswith(_FOUND):
                     path.unlink()
-        for name, every in (("front", False), ("candidates", True)):
-            table = self.table(every=every, unit=unit or "m")
-            write_table(place / f"{name}.csv", table, overwrite=overwrite)
+        for name, every in (("front.csv", False), ("candidates.csv", True)):
+            write_table(
+                place / name, self.table(every=every, unit=unit or "m"), overwrite=overwrite
+            )
         self.report(unit).save(place / "report.html", overwrite=overwrite)
 
     def _design_text(self, each: Candidate) -> str:
@@ -281,9 +282,8 @@ class Search(Reported):
         for p in self.problem.parameters.free:
             suffix, size = _written_unit(p.unit, length)
             values = (each.values[p.name] for each in designs)
-            columns[with_suffix(p.name, suffix)] = [
-                value if isinstance(value, str) else value / size for value in values
-            ]
+            values = (x if isinstance(x, str) else x / size for x in values)
+            columns[with_suffix(p.name, suffix)] = list(values)
         columns["missed"] = ["; ".join(each.missed) for each in designs]
         return pd.DataFrame(columns | {"fault": [each.fault for each in designs]})
 
@@ -332,7 +332,7 @@ class Search(Reported):
         return (*self.candidates, *self.finalists)
 
     def _is_in_front(self, candidate: Candidate) -> bool:
-        return any(candidate is one for one in self.front)
+        return any(candidate is each for each in self.front)
 
     def _numbers(self, designs: Sequence[Candidate]) -> Array:
         """Objectives with their errors, NaN where there are none, shape (design, goal, 2)."""
@@ -351,13 +351,7 @@ class Search(Reported):
 
 
 def check_folder(folder: Path, *, overwrite: bool) -> None:
-    """Refuse a folder that the files of a search could not be written to.
-
-    Raises:
-        InvalidInput: Something else is there.
-        NotWritten: Nothing can be written there.
-        MissingExtra: matplotlib or Jinja2 is not installed.
-    """
+    """Refuse a folder that the files of a search could not be written to."""
     check_libraries()
     for name in _FILES:
         check_place(folder / name, overwrite=overwrite, name="out")
@@ -366,13 +360,10 @@ def check_folder(folder: Path, *, overwrite: bool) -> None:
 def _best(search: Search, unit: LengthUnit) -> Section:
     pairs = zip(search.goals, search.best.objectives, strict=bool(search.best.objectives))
     rows = [(_goal_text(goal), _value_text(goal, value, unit), "") for goal, value in pairs]
+    rows += _parameter_rows(search, unit)
     ends = ", ".join(f"{name} at its {end} end" for name, end in search.at_ends.items())
-    return Section(
-        title="Best design",
-        head=("number", "best", "range"),
-        rows=[*rows, *_parameter_rows(search, unit)],
-        note=f"At an end of their range: {ends}. A wider one may be better." if ends else "",
-    )
+    note = f"At an end of their range: {ends}. A wider one may be better." if ends else ""
+    return Section(title="Best design", head=("number", "best", "range"), rows=rows, note=note)
 
 
 def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
@@ -383,13 +374,9 @@ def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
         numbers = (_number_text(p, each.values[p.name], unit) for p in free)
         rows.append((str(number), *(_value_text(*pair, unit) for pair in pairs), *numbers))
     if len(rows) > 1:
-        yield Section(
-            title="Front",
-            head=("front", *map(_goal_text, goals), *(p.name for p in free)),
-            rows=rows,
-            note="Designs that no other one beats in every objective, each judged to full "
-            "accuracy.",
-        )
+        head = ("front", *map(_goal_text, goals), *(p.name for p in free))
+        note = "Designs that no other one beats in every objective, each judged to full accuracy."
+        yield Section(title="Front", head=head, rows=rows, note=note)
 
 
 def _verdict(search: Search) -> str:
@@ -415,7 +402,7 @@ def _value_text(goal: Goal, value: Estimate, unit: LengthUnit) -> str:
     return readable(value.value, goal.objective.unit, unit, value.error)
 
 
-def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[tuple[str, ...]]:
+def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     values, ends, parameters = search.best.values, search.at_ends, search.problem.parameters
     free = {parameter.name: parameter for parameter in parameters.free}
     for name, each in free.items():
@@ -463,9 +450,7 @@ def _figures(search: Search, unit: LengthUnit) -> Iterator[tuple[Any, str]]:
 
 def _written_unit(unit: str, length: LengthUnit) -> tuple[str, float]:
     """Suffix of a column, and the size of its unit; pressures stay in Pa."""
-    if unit == "Pa":
-        return "_pa", 1.0
-    name, size = readable_unit(unit, 0.0, length)
-    if unit not in ("m", "m2", "m3"):
-        return unit_suffix(unit).replace("/", "_per_"), size
-    return f"_{name.replace('²', '2').replace('³', '3')}", size
+    if unit in ("m", "m2", "m3"):
+        name, size = readable_unit(unit, 0.0, length)
+        return f"_{name.replace('²', '2').replace('³', '3')}", size
+    return unit_suffix(unit).replace("/", "_per_"), math.radians(1.0) if unit == "rad" else 1.0

@@ -68,11 +68,9 @@ def read_search(
         reader.parameters(bases)
     lengths = {arm.length for arm in bases.values()}
     alike = len(lengths) == 1 and "length" not in {*reader.free, *reader.choices}
-    needs, faults = None, ()
+    needs, faults, length = None, (), lengths.pop() if alike else None
     try:
-        needs = Requirements.from_toml(
-            text, folder=folder, length=lengths.pop() if alike else None, source=source
-        )
+        needs = Requirements.from_toml(text, folder=folder, length=length, source=source)
     except InvalidDesign as error:
         faults = error.faults
     options = reader.options(needs)

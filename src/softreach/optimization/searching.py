@@ -179,18 +179,18 @@ class _Run:
 
     @property
     def _is_over(self) -> bool:
-        found = not self.problem.goals and any(each.is_feasible for each in self._study.candidates)
-        return found or self._left <= 0
+        is_met = any(each.is_feasible for each in self._study.candidates)
+        return self._left <= 0 or (is_met and not self.problem.goals)
 
     def _sample(self, count: int) -> None:
         while count > 0:
-            asked = self._study.ask(min(_BATCH, count))
-            count -= len(asked)
+            trials = self._study.ask(min(_BATCH, count))
+            count -= len(trials)
             tasks = (
                 partial(self._study.judged, ["design", values], partial(self._judged, values))
-                for _, values in asked
+                for _, values in trials
             )
-            for (trial, _), judged in zip(asked, parallel.in_order(tasks), strict=True):
+            for (trial, _), judged in zip(trials, parallel.in_order(tasks), strict=True):
                 self._note(*judged, trial)
 
     def _judged(self, values: Any, *, bounds: bool = True) -> Candidate:
@@ -205,9 +205,9 @@ class _Run:
         most = min(MOST_DESIGNS, self._left // max(1, len(starts)))
         tasks = []
         for k, start in enumerate(starts):
-            turn = self._turn(start, k)
-            what = ["polish", dict(start.values), most, *turn]
-            make = partial(self._polished, start, most, turn)
+            goal, floors = self._turn(start, k)
+            what = ["polish", dict(start.values), most, goal, floors]
+            make = partial(polished, self.problem, start, most, goal, floors)
             tasks.append(partial(self._study.judged, what, make))
         for candidate, is_new in parallel.in_order(tasks):
             if candidate.designs:
@@ -223,14 +223,6 @@ class _Run:
         goal = (moving or [0])[(len(self._starts) + k) % max(1, len(moving))]
         return goal, self.problem.costs(start) if start.is_feasible else ()
 
-    def _polished(
-        self, start: Candidate, most: int, turn: tuple[int, Any], accuracy: float | None = None
-    ) -> Candidate:
-        goal, floors = turn
-        at = {"accuracy": accuracy, "goal": goal, "floors": floors}
-        with parallel.undivided():
-            return polished(self.problem, start, designs=most, **at)
-
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
         """The best designs that lie apart from each other and from ends of polishes."""
         judged = [each for each in candidates if each.fidelity != "bounds"]
@@ -239,7 +231,7 @@ class _Run:
             ordered = []
             for _ in range(_FRONTS):
                 ordered += (front := self.problem.front(judged))
-                judged = [each for each in judged if all(each is not one for one in front)]
+                judged = [each for each in judged if all(each is not best for best in front)]
         chosen: list[Candidate] = []
         for candidate in ordered:
             place = self._place(candidate)
@@ -271,8 +263,8 @@ class _Run:
             best = sorted(finite, key=problem.score)[:_LAST] or list(candidates[:1])
         left = min(MOST_DESIGNS, self._designs - self._spent)
         if self._polishes and left >= _LEAST_OF_POLISH:
-            end = self._polished(best[0], left, self._turn(best[0]), problem.accuracy)
-            best.append(end)
+            turn = self._turn(best[0])
+            best.append(end := polished(problem, best[0], left, *turn, problem.accuracy))
             self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]
 
@@ -289,6 +281,6 @@ class _Run:
         while waiting and waiting[0].excess < least:
             values, waiting = [each.values for each in waiting[:_BATCH]], waiting[_BATCH:]
             tasks = (partial(self._judged, each, bounds=False) for each in values)
-            known += (found := list(parallel.in_order(tasks)))
-            least = min([least, *(each.excess for each in found if not each.fault)])
+            known += (judged := list(parallel.in_order(tasks)))
+            least = min([least, *(each.excess for each in judged if not each.fault)])
         return known

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 _ACTIVE = 1e-3  # room below which a requirement may decide
 _AT_END = 1e-6  # of a range
-_CONFIDENCE = 0.95
+_CONFIDENCE = (0.025, 0.975)
 _RESAMPLES = 400
 _MOST = 1 << 16
 
@@ -50,7 +49,7 @@ class VarianceShares(NamedTuple):
     first: Array
     """By itself: Sobol's index of first order, shape (parameters,)."""
     first_error: Array
-    """Half the confidence interval of 95 % by bootstrap."""
+    """Half the confidence interval of 95 %, by bootstrap over the rows of designs."""
     total: Array
     """With all that it does together with others: the total index."""
     total_error: Array
@@ -112,9 +111,8 @@ class Sensitivity:
         lines = [f"Sensitivity ({self.designs:,} designs):"]
         for k, goal in enumerate(self.goals):
             lines.append(f"{goal}:")
-            for name, unit, value, error in zip(
-                self.reals, self.units, self.gradient[k], self.gradient_error[k], strict=True
-            ):
+            slopes = (self.reals, self.units, self.gradient[k], self.gradient_error[k])
+            for name, unit, value, error in zip(*slopes, strict=True):
                 per = f"{self.goal_units[k].replace('m3', 'm³')}/{unit}"
                 if np.isfinite(value):
                     lines.append(f"  by {name}: {quantity(value, per, error)}")
@@ -127,8 +125,8 @@ class Sensitivity:
                 )
                 lines.append(f"  variance alone (in all): {each}")
         for each in self.multipliers:
-            unit = f" per {each.unit}" if each.unit else " per unit"
-            lines.append(f"decides: {each.name}, {each.value:.4g} {self.goal_units[0]}{unit}")
+            per = f"{self.goal_units[0]} per {each.unit or 'unit'}"
+            lines.append(f"decides: {each.name}, {each.value:.4g} {per}")
         if np.isfinite(self.residual):
             lines.append(f"not explained by requirements: {100 * self.residual:.2g} % of the slope")
         return "\n  ".join(lines)
@@ -155,7 +153,7 @@ def sensitivity(
         candidate: The design; by default the best of the search.
         n: Rows of designs for the shares of variance, a power of two; parameters + 2 designs each.
             0 for none.
-        seed: Of these designs.
+        seed: Of these designs, and of the bootstrap.
         progress: Called with the number of designs looked at since its last call.
 
     Raises:
@@ -203,11 +201,10 @@ def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
     for k, goal in enumerate(problem.goals):
         if goal.objective.smooth and len(widths):
             point = point_of(problem, candidate, problem.accuracy, k)
-            design, error = point.design, np.zeros(len(widths))
+            values[k], errors[k] = -goal.sense * _with_poses(point) / widths, 0.0
             if goal.name in SETS:
-                error = getattr(design.sets, f"{SETS[goal.name]}_error") @ np.abs(design.chain)
-            values[k] = -goal.sense * _with_poses(point) / widths
-            errors[k] = error / widths
+                error = getattr(point.design.sets, f"{SETS[goal.name]}_error")
+                errors[k] = error @ np.abs(point.design.chain) / widths
     return values, errors
 
 
@@ -221,17 +218,6 @@ def _with_poses(point: Point) -> Array:
     return slope[:count] + forces @ equations[:, :count]
 
 
-class _Condition(NamedTuple):
-    """A column of the conditions of optimality, and what its multiplier is worth."""
-
-    slope: Array
-    name: str = ""
-    """Empty for a pose at its bounds."""
-    unit: str = ""
-    gain: float = 0.0
-    """Of the goal per unit that is allowed more, for a multiplier of 1."""
-
-
 def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multiplier, ...], float]:
     """Multipliers of the first goal, and the part of its slope that they do not explain."""
     from scipy.optimize import nnls
@@ -242,27 +228,26 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     slope, equations = point.cost_slope, _equations(point)
     size = float(np.linalg.norm(slope))
     bounds = [
-        _Condition(-part.slope()[k], part.name, part.unit, 1.0 / part.scale)
+        (-part.slope()[k], Multiplier(part.name, 1.0 / part.scale, part.unit))
         for part in point.inequalities
         for k in np.flatnonzero(part.value <= _ACTIVE)
     ]
     bounds += _ends(problem, point)
-    columns = [*equations, *-equations, *(each.slope for each in bounds)]
+    columns = [*equations, *-equations, *(slope for slope, _ in bounds)]
     if not size or not columns:
         return (), float(bool(size))
     weights, rest = nnls(np.stack(columns, axis=1), -slope)
     there, back, others = np.split(weights, [len(equations), 2 * len(equations)])
     pulls = np.linalg.norm((there - back).reshape(-1, 3), axis=1).tolist()
     pairs = zip(pulls, point.equations, strict=True)
-    each = [(what.name, what.unit, pull / what.scale) for pull, what in pairs]
+    each = [(part.name, part.unit, pull / part.scale) for pull, part in pairs]
     pairs = zip(others.tolist(), bounds, strict=True)
-    each += [(what.name, what.unit, weight * what.gain) for weight, what in pairs if what.name]
+    each += [(name, unit, weight * gain) for weight, (_, (name, gain, unit)) in pairs]
     gains: dict[tuple[str, str], float] = {}
     for name, unit, gain in each:  # a place under several payloads counts with all of them
         gains[name, unit] = gains.get((name, unit), 0.0) + gain
     result = [Multiplier(name, gain, unit) for (name, unit), gain in gains.items() if gain]
-    result.sort(key=lambda each: -each.value)
-    return tuple(result), float(rest) / size
+    return tuple(sorted(result, key=lambda each: -each.value)), float(rest) / size
 
 
 def _equations(point: Point) -> Array:
@@ -270,54 +255,55 @@ def _equations(point: Point) -> Array:
     return stacked_slopes(parts) if parts else np.empty((0, len(point.cost_slope)))
 
 
-def _ends(problem: Problem, point: Point) -> list[_Condition]:
+def _ends(problem: Problem, point: Point) -> Iterator[tuple[Array, Multiplier]]:
+    """Slopes of bounds of unknowns, and what these are worth per unit: nothing for a pose."""
     unknowns = np.concatenate([point.reals, point.poses.ravel()])
-    rows, result = np.eye(len(unknowns)), []
-    for j, place in enumerate(unknowns):
+    for j, (place, row) in enumerate(zip(unknowns, np.eye(len(unknowns)), strict=True)):
         for end, sign, word in ((0.0, -1.0, "low"), (1.0, 1.0, "high")):
-            if abs(place - end) > _AT_END:
-                continue
-            result.append(_Condition(sign * rows[j]))
-            if j < len(point.reals):
-                real = problem.parameters.real[j]
-                name, gain = f"{word} end of {real.name}", 1.0 / (real.high - real.low)
-                result[-1] = _Condition(sign * rows[j], name, real.unit, gain)
-    return result
+            if abs(place - end) <= _AT_END:
+                name, gain, unit = "", 0.0, ""
+                if j < len(point.reals):
+                    real = problem.parameters.real[j]
+                    name, unit = f"{word} end of {real.name}", real.unit
+                    gain = 1.0 / (real.high - real.low)
+                yield sign * row, Multiplier(name, gain, unit)
 
 
 def _variances(
     problem: Problem, n: int, seed: int, progress: Progress
 ) -> tuple[VarianceShares | None, ...]:
-    """Shares of variance of each goal, of designs on coarse sets."""
-    from scipy.stats import sobol_indices, uniform
+    """Shares of variance of each goal, of designs on coarse sets [Saltelli2010]."""
+    from scipy.stats import qmc
 
-    free, known = problem.parameters.free, []
-
-    def at(cube: Array) -> Array:
-        tasks = (
-            partial(_values, problem, {p.name: p.at(x) for p, x in zip(free, place, strict=True)})
-            for place in cube.T.tolist()
-        )
-        for row in parallel.in_order(tasks):
-            known.append([*row, 0.0])  # SciPy fails at one goal of one parameter
-            progress(1)
-        return np.array(known[-cube.shape[1] :]).T
-
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what does not depend on a parameter
-        indices = sobol_indices(
-            func=at, n=n, dists=[uniform()] * len(free), rng=np.random.default_rng(seed)
-        )
-        again = indices.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
-    ends = (each.confidence_interval for each in (again.first_order, again.total_order))
-    first, total = (0.5 * np.nan_to_num(np.subtract(each.high, each.low)) for each in ends)
-    parts = np.array([indices.first_order, first, indices.total_order, total])
-    shares = parts.reshape(4, -1, len(free))  # SciPy drops axes of one
-    values = np.array(known)
-    return tuple(
-        VarianceShares(*shares[:, k]) if np.isfinite(values[:, k]).all() else None
-        for k in range(len(problem.goals))
+    free, rng = problem.parameters.free, np.random.default_rng(seed)
+    known: list[list[float]] = []
+    cube = qmc.Sobol(2 * len(free), rng=rng, bits=64).random(n)
+    first, second = np.split(cube, 2, axis=1)
+    mixed = np.where(np.eye(len(free), dtype=bool)[:, None], second, first)
+    tasks = (
+        partial(_values, problem, {p.name: p.at(x) for p, x in zip(free, place, strict=True)})
+        for place in np.concatenate([first, second, *mixed]).tolist()
     )
+    for row in parallel.in_order(tasks):
+        known.append(row)
+        progress(1)
+    values = np.array(known).reshape(-1, n, len(problem.goals))
+    values -= values[:2].mean(axis=(0, 1))
+
+    def indices(rows: Any) -> Array:
+        """Of first order, and total ones, shape (2, parameter, goal); 0 of what never changes."""
+        here, there, *between = values[:, rows]
+        moved = np.array(between) - here
+        parts = (there * moved).mean(axis=1), 0.5 * (moved**2).mean(axis=1)
+        with np.errstate(all="ignore"):
+            shares = np.array(parts) / np.var([here, there], axis=(0, 1))
+        return np.where(np.isfinite(shares), shares, 0.0)
+
+    again = [indices(rng.integers(n, size=n)) for _ in range(_RESAMPLES)]
+    errors = 0.5 * np.ptp(np.quantile(again, _CONFIDENCE, axis=0), axis=0)
+    shares = np.stack([indices(slice(None)), errors], axis=1).reshape(4, len(free), -1)
+    is_known = np.isfinite(values).all(axis=(0, 1)).tolist()
+    return tuple(VarianceShares(*shares[..., k]) if x else None for k, x in enumerate(is_known))
 
 
 def _values(problem: Problem, values: Mapping[str, Any]) -> list[float]:

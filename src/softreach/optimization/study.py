@@ -6,7 +6,7 @@ import json
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -43,14 +43,7 @@ class Study:
     def __init__(
         self, problem: Problem, *, storage: str | None, sampler: str, seed: int, first: int
     ) -> None:
-        """Open the storage, or begin it; the first designs are spread evenly, before the sampler's.
-
-        Without a storage designs are kept in memory alone.
-
-        Raises:
-            InvalidInput: The storage cannot be opened, or belongs to another search or program.
-            MissingExtra: Optuna is not installed.
-        """
+        """Open the storage, if there is one; the first designs are spread evenly."""
         self.problem, self._first = problem, first
         self._sampler, self.seed = sampler, seed
         self.candidates: list[Candidate] = []
@@ -81,14 +74,12 @@ class Study:
         with self._lock:
             self._asked.add(key)
             self._read()
-            known = self._kept.get(key)
-        if known is not None:
-            return known, False
+            if key in self._kept:
+                return self._kept[key], False
         made = make()
-        with self._lock, _quiet():
-            if self._storage is not None:
-                kept = {_JUDGED: made.to_dict(), _KEY: key}
-                self._storage.add_trial(self._trial(made, kept))
+        if self._storage is not None:
+            with self._lock, _quiet():
+                self._storage.add_trial(self._trial(made, {_JUDGED: made.to_dict(), _KEY: key}))
         return made, True
 
     def tell(self, candidate: Candidate, trial: Any = None) -> None:
@@ -148,20 +139,21 @@ class Study:
         )
 
     def _opened(self, place: str) -> optuna.Study:
+        digest = self.problem.digest
         try:
             study = self._created(_storage(place))
-            if (noted := study.user_attrs.get(_PROBLEM)) is None:
-                study.set_user_attr(_PROBLEM, self.problem.digest)
+            if _PROBLEM not in study.user_attrs:
+                study.set_user_attr(_PROBLEM, digest)
+            if study.user_attrs[_PROBLEM] == digest:
+                return study
         except InvalidInput:
             raise
         except Exception as error:
             allowed = "a file that can be written, of this kind of search"
             raise InvalidInput("storage", place, allowed, in_short(error)) from error
-        if noted not in (None, self.problem.digest):
-            allowed = "a new file, or that of the same designs, requirements and objectives"
-            hint = "it belongs to another search: remove it, or choose another file"
-            raise InvalidInput("storage", place, allowed, hint)
-        return study
+        allowed = "a new file, or that of the same designs, requirements and objectives"
+        hint = "it belongs to another search: remove it, or choose another file"
+        raise InvalidInput("storage", place, allowed, hint)
 
     @property
     def kind(self) -> str:
@@ -234,7 +226,7 @@ def _storage(place: str) -> Any:
         raise InvalidInput("storage", place, "a file in a folder that exists")
     is_new = not path.exists() or not path.stat().st_size
     is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
-    if not is_new and not _is_own(path, is_database):
+    if not is_new and not (_is_own_database(path) if is_database else _is_own_journal(path)):
         raise InvalidInput("storage", place, "a new file, or that of a search: choose another name")
     if is_database:
         return f"sqlite:///{path}"
@@ -252,23 +244,22 @@ def _storage(place: str) -> Any:
     return JournalStorage(JournalFileBackend(str(path)))
 
 
-def _is_own(path: Path, is_database: bool) -> bool:
-    if is_database:
-        import sqlite3
+def _is_own_database(path: Path) -> bool:
+    import sqlite3
 
+    with suppress(sqlite3.Error):
         place = f"{path.absolute().as_uri()}?mode=ro"
-        try:
-            with closing(sqlite3.connect(place, uri=True)) as database:
-                names = database.execute("SELECT study_name FROM studies").fetchall()
-            return set(names) <= {(_NAME,)}
-        except sqlite3.Error:
-            return False
-    try:
-        with path.open("rb") as file:
-            first = json.loads(file.readline(4096))
+        with closing(sqlite3.connect(place, uri=True)) as database:
+            names = database.execute("SELECT study_name FROM studies").fetchall()
+        return set(names) <= {(_NAME,)}
+    return False
+
+
+def _is_own_journal(path: Path) -> bool:
+    with suppress(ValueError, KeyError, TypeError), path.open("rb") as file:
+        first = json.loads(file.readline(4096))
         return first["op_code"] == 0 and first["study_name"] == _NAME
-    except (ValueError, KeyError, TypeError):
-        return False
+    return False
 
 
 def _library() -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,6 +13,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.solve import solve_inverse
 from softreach.optimization.deviations import TOL, FirstOrder, Spread, deviations_of
+from softreach.requirements.findings import share_error
 from softreach.requirements.requirements import Requirements, Target
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import InvalidLoads
@@ -52,8 +53,7 @@ class TargetTolerance(NamedTuple):
     @property
     def made_error(self) -> Array:
         """Standard errors of these shares; with 0 or 1, what one arm more would make of it."""
-        each = np.maximum(self.made * (1.0 - self.made), 1.0 / max(self.arms, 1))
-        return np.sqrt(each / max(self.arms, 1))
+        return share_error(self.made, max(self.arms, 1))
 
     @property
     def agrees(self) -> bool:
@@ -109,8 +109,8 @@ def tolerance(
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     seed, progress = as_integer("seed", seed, 0), as_progress(progress)
     if (count := as_tip_map(deviations.arm).box.dimension) < 3:
-        found = counted(count, "free bundle")
-        raise NotPossible(f"a tolerance needs three free bundles or more, and this arm has {found}")
+        bundles = f"three free bundles or more, and this arm has {counted(count, 'free bundle')}"
+        raise NotPossible(f"a tolerance needs {bundles}")
     with no_warnings():
         shape = samples, len(deviations.sigmas)
         changes = np.random.default_rng(seed).standard_normal(shape) * deviations.sigmas
@@ -219,28 +219,25 @@ def _target_text(target: TargetTolerance) -> str:
 
 def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
     """Numbers to first order, and of arms that are made with the first of the changes."""
-    deviations, followed = first.deviations, _Followed.of(first, seed) if checked else None
-    numbers: list[tuple[Spread, _Asked]] = [
-        (first.kept(), lambda arm, solid: followed.kept(solid) if followed else math.nan),
-        (first.of_set("volume", "m3", 1.0), lambda arm, solid: solid.volume),
-        (first.of_set("unreachability", "1", -1.0), lambda arm, solid: solid.unreachability),
-        *((first.covered(*region), partial(_share, first, *region)) for region in first.regions),
+    deviations = first.deviations
+    spreads = [
+        first.kept(),
+        first.of_set("volume", "m3", 1.0),
+        first.of_set("unreachability", "1", -1.0),
+        *(first.covered(*region) for region in first.regions),
     ]
-    starts = [_starts(first, target) for target in first.targets] if checked else []
-    asked = [ask for _, ask in numbers]
-    tasks = (partial(_made, first, asked, starts, change) for change in first.changes[:checked])
     made: list[tuple[list[float], list[Mask]]] = []
-    for each in parallel.in_order(tasks):
-        progress(1)
-        made += [] if each is None else [each]
-    values = np.array([row for row, _ in made]).reshape(len(made), len(numbers)).T.copy()
-    errors = np.zeros(len(numbers))
-    if made and followed:
-        errors[0] = followed.error(float(values[0].mean()))
-    spreads = zip(numbers, values, errors.tolist(), strict=True)
-    kept, volume, unreachability, *regions = (
-        spread.with_made(own, error) for (spread, _), own, error in spreads
-    )
+    errors = np.zeros(len(spreads))
+    if checked:
+        followed, starts = _Followed.of(first, seed), [_starts(first, x) for x in first.targets]
+        make = partial(_made, first, followed, starts)
+        for each in parallel.in_order(partial(make, change) for change in first.changes[:checked]):
+            progress(1)
+            made += [] if each is None else [each]
+        errors[0] = followed.error(float(np.mean([row[0] for row, _ in made]))) if made else 0.0
+    values = np.array([row for row, _ in made]).reshape(len(made), len(spreads)).T
+    each = zip(spreads, values, errors.tolist(), strict=True)
+    kept, volume, unreachability, *regions = (x.with_made(own, error) for x, own, error in each)
     return Tolerance(
         arm=deviations.arm,
         parameters=deviations.names,
@@ -270,10 +267,10 @@ def _target(first: FirstOrder, target: Target, reached: list[Mask]) -> TargetTol
 class _Followed(NamedTuple):
     """Places within the reach of the design, more of them near its boundary."""
 
-    places: tuple[Array, Array]
-    """Near the boundary, and away from it."""
-    shares: tuple[float, float]
-    """Share of the volume that each stands for."""
+    near: Array
+    away: Array
+    share: float
+    """Share of the volume near the boundary."""
 
     @classmethod
     def of(cls, first: FirstOrder, seed: int) -> _Followed:
@@ -284,42 +281,35 @@ class _Followed(NamedTuple):
         moves = np.linalg.norm(boundary.speed_at(pool) * first.deviations.sigmas, axis=1)
         width = math.sqrt(float(boundary.area.mean()))
         near = boundary.distance(pool) < _NEAR * moves + width
-        parts = pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED]
-        return cls(parts, (float(near.mean()), float((~near).mean())))
+        return cls(pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED], float(near.mean()))
 
     def kept(self, solid: ReachableSet) -> float:
         """Share of the volume that another set contains."""
-        return sum(
-            share * float(solid.contains(part).mean())
-            for part, share in zip(self.places, self.shares, strict=True)
-            if len(part)
-        )
+        parts = ((self.near, self.share), (self.away, 1.0 - self.share))
+        return sum(x * float(solid.contains(part).mean()) for part, x in parts if len(part))
 
     def error(self, kept: float) -> float:
         """Standard error of such a share, as if the places were random."""
-        share, count = self.shares[0], max(1, len(self.places[0]))
-        lost = min(1.0, (1.0 - kept) / max(share, 1e-9))
-        return share * math.sqrt(lost * (1.0 - lost) / count)
-
-
-_Asked = Callable[[Manipulator, ReachableSet], float]
-"""A number of an arm that is made, and of its reachable set."""
+        lost = min(1.0, (1.0 - kept) / max(self.share, 1e-9))
+        return self.share * math.sqrt(lost * (1.0 - lost) / max(1, len(self.near)))
 
 
 def _made(
-    first: FirstOrder, asked: list[_Asked], starts: list[list[Array]], change: Array
+    first: FirstOrder, followed: _Followed, starts: list[list[Array]], change: Array
 ) -> tuple[list[float], list[Mask]] | None:
     """Numbers of an arm with deviations, and the places that it reaches; None without one."""
     with parallel.undivided(), no_warnings():
         try:
             arm = first.deviations.made(change)
             solid = reachable_set(arm, accuracy=first.accuracy)
-            if solid.dimension < 3:
-                return None
-            pairs = zip(first.targets, starts, strict=True)
-            return [ask(arm, solid) for ask in asked], [_reached(arm, first, *x) for x in pairs]
+            if solid.dimension == 3:
+                covered = (_share(first, *region, arm, solid) for region in first.regions)
+                numbers = [followed.kept(solid), solid.volume, solid.unreachability, *covered]
+                pairs = zip(first.targets, starts, strict=True)
+                return numbers, [_reached(arm, first, *x) for x in pairs]
         except (InvalidDesign, InvalidLoads):
             return None
+    return None
 
 
 def _tried(target: Target) -> Index:

@@ -19,13 +19,9 @@ _ALONG = 0.97  # cosine between what is missing and the tip's direction
 
 
 def advice(arm: Manipulator, place: Array, gamma: Array, unit: LengthUnit) -> str:
-    """Sentences on what keeps the tip from a place, and what would bring it there.
+    """Sentences on what keeps the tip from a place [m], and what would bring it there.
 
-    Args:
-        arm: The design.
-        place: The place [m], shape (3,).
-        gamma: Inputs of the nearest pose, shape (inputs,).
-        unit: Unit of lengths.
+    `gamma` are the inputs of the nearest pose, shape (inputs,).
     """
     rod = as_tip_map(arm)
     tip, slope = (each[0] for each in rod.tips_and_slopes(gamma[None]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,13 +17,13 @@ from softreach.requirements.findings import (
     design_limits,
     limit_finding,
     measure_findings,
+    share_error,
     verdict_of,
 )
 from softreach.requirements.parts import Keep, Target
 from softreach.requirements.poses import TOL, Posed, PoseRules, solved
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
-from softreach.rod.bending import bending_over_bounds
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map, in_steps
 from softreach.rod.tip_map import InvalidLoads
@@ -124,8 +123,7 @@ class Check(Reported):
     def regions(self) -> tuple[tuple[str, Region], ...]:
         """Regions with what they are for: "stay_inside", "avoid" or "cover"."""
         kept = ((keep.kind, keep.region) for keep in self.requirements.keeps)
-        targets = (target.region for target in self.requirements.targets)
-        return (*kept, *(("cover", region) for region in targets if region is not None))
+        return (*kept, *(("cover", region) for _, region in self.requirements.regions))
 
     def shapes(self, count: int) -> xr.Dataset | None:
         """The arm in poses of some places that are apart, under the largest payload.
@@ -149,24 +147,21 @@ class Check(Reported):
         """Verdict, every requirement and a picture, to be printed, or saved as an .html file."""
         from softreach.plot.arm import plot_check
 
-        own = [finding.verdict for finding in self.findings]
+        own, unit = [finding.verdict for finding in self.findings], self.arm.length_unit
         words = [word for word in ("missed", "undecided") if word in own]
         counts = [f"{word}, {own.count(word)} of {len(own)}" for word in words]
         counts = counts or [f"met, all {len(own)}"]
-        size = self.arm.length_unit.text(self.arm.length)
         space = 9 if "undecided" in own else 6
         rows = [(f.word.ljust(space), f.name, f.text) for f in self.findings]
         caption = "The arm at the places that it must reach."
+        drawn = partial(plot_check, self, unit=unit)
         return Report(
             title="Requirements of an arm",
-            verdict=f"Requirements of an arm of {size}: {'; '.join(counts)}",
+            verdict=f"Requirements of an arm of {unit.text(self.arm.length)}: {'; '.join(counts)}",
             state=self.verdict,
             sections=[
                 Section(title="Requirements", rows=rows, printed=max(1, len(rows))),
-                Section(
-                    title="Picture",
-                    figures=lambda: [(plot_check(self, unit=self.arm.length_unit).figure, caption)],
-                ),
+                Section(title="Picture", figures=lambda: [(drawn().figure, caption)]),
                 Section(title="The design", text=self.arm.to_toml()),
                 Section(title="The requirements", text=self.requirements.to_toml()),
             ],
@@ -249,18 +244,7 @@ def check(
         raise NotPossible(
             "the requirements are empty: add a target, a region to keep to, a limit or a measure"
         )
-    return checked(arm, needs, accuracy, sets_to(accuracy), as_progress(progress))
-
-
-def quick_check(
-    arm: Manipulator, requirements: Requirements, accuracy: float, sets: Sets | None = None
-) -> Check:
-    """As `check`, with poses from a few descents to each place, for designs on the way of a search.
-
-    A place that these do not reach counts as missed, although another pose may reach it.
-    """
-    sets = sets_to(accuracy, quiet=True) if sets is None else sets
-    return checked(arm, requirements, accuracy, sets, quick=True)
+    return checked(arm, needs, accuracy, step=as_progress(progress))
 
 
 def sets_to(accuracy: float, *, quiet: bool = False) -> Sets:
@@ -273,70 +257,64 @@ def checked(
     arm: Manipulator,
     needs: Requirements,
     accuracy: float,
-    sets: Sets,
-    step: Progress = silent,
+    sets: Sets | None = None,
     *,
+    step: Progress = silent,
     quick: bool = False,
 ) -> Check:
-    """As `check`, with reachable sets to its accuracy; `quick` as `quick_check`."""
+    """As `check`, with reachable sets that are known.
+
+    `quick`, for designs on the way of a search, with poses from a few descents to each place: one
+    that these do not reach counts as missed, although another pose may reach it.
+    """
+    sets = sets_to(accuracy, quiet=quick) if sets is None else sets
     payloads = tuple(needs.payloads) or (None,)
     keeps = tuple(keep for keep in needs.keeps if keep.when == "targets" and needs.targets)
+    count = int(np.clip(0.25 / accuracy**2, _LEAST_PLACES, _MOST_PLACES))
     every: list[PoseRules] = []
     posed: list[Posed] = []
     coverages: list[Coverage] = []
     for payload, loaded in zip(payloads, needs.under_payloads(arm), strict=True):
         rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
-        if quick:  # on the way, with shapes in no more steps than tips
+        if quick:  # with shapes in no more steps than tips
             rod = as_tip_map(loaded, _ROUGH_TOL)
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
         posed.append(solved(rules, needs.places, needs.within, step, quick=quick))
-        for target in needs.targets:
-            if target.region is not None:
-                coverages.append(_coverage(rules, target, payload, accuracy, sets, step))
-    joined = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
-    made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *joined[:4])
+        for target, region in needs.regions:
+            share = float(_is_covered(rules, target, region.places(count), sets, step).mean())
+            error = float(share_error(share, count))
+            coverages.append(Coverage(target.name, payload, share, error, count))
+    whole = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
+    made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *whole[:4])
     findings = (
         *_reach_findings(made, every),
         *_cover_findings(made),
-        *_keep_findings(made, joined, every),
+        *_keep_findings(made, whole, every),
         *design_limits(arm, needs),
-        *_limit_findings(made, joined, every),
+        *_limit_findings(made, whole, every),
         *measure_findings(arm, needs, accuracy, partial(sets, arm)),
     )
     return replace(made, findings=findings)
 
 
-def _coverage(
-    rules: PoseRules,
-    target: Target,
-    payload: float | None,
-    accuracy: float,
-    sets: Sets,
-    step: Progress,
-) -> Coverage:
-    assert target.region is not None
-    count = int(np.clip(0.25 / accuracy**2, _LEAST_PLACES, _MOST_PLACES))
-    places = target.region.places(count)
-    near = max(target.within, TOL * rules.arm.length)
+def _is_covered(
+    rules: PoseRules, target: Target, places: Array, sets: Sets, step: Progress
+) -> Mask:
     if len(rules):
-        posed = solved(rules, places, np.full(count, target.within), step)
-        inside = (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
-    else:
-        inside = np.zeros(count, bool)
-        with suppress(InvalidLoads):
-            reached = sets(rules.arm)
-            if reached.dimension == 3 and not target.within:
-                inside = reached.contains(places)
-            else:
-                rod = reached.tip_map
-                least = rod.tol * rod.length if reached.dimension < 3 else 0.0
-                inside = reached.distance(places) <= max(target.within, least)
-        step(count)
-    share = float(inside.mean())
-    # of a share of 0 or 1, what one place more or less makes of it
-    error = float(np.sqrt(max(share * (1.0 - share), 1.0 / count) / count))
-    return Coverage(target.name, payload, share, error, count)
+        posed = solved(rules, places, np.full(len(places), target.within), step)
+        near = max(target.within, TOL * rules.arm.length)
+        return (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
+    step(len(places))
+    try:
+        reached = sets(rules.arm)
+    except InvalidLoads:
+        return np.zeros(len(places), bool)
+    if reached.dimension == 3 and not target.within:
+        return reached.contains(places)
+    rod = reached.tip_map
+    least = rod.tol * rod.length if reached.dimension < 3 else 0.0
+    return reached.distance(places) <= max(target.within, least)
 
 
 def _largest(values: Array) -> tuple[int, int]:
@@ -383,9 +361,7 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
 
 
 def _cover_findings(made: Check) -> Iterator[Finding]:
-    for target in made.requirements.targets:
-        if target.region is None:
-            continue
+    for target, _ in made.requirements.regions:
         own = [each for each in made.coverages if each.name == target.name]
         worst = min(own, key=lambda each: each.share)
         # Where every place is reached that was tried, no share is left to be in doubt.
@@ -448,11 +424,7 @@ def _limit_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> It
             where = f", at place {place + 1}{_under(made.payloads[load])}"
         elif made.requirements.targets:
             value, where = 0.0, ", counted in what is covered"
-        elif name == "bending":
-            bending = [bending_over_bounds(each.arm) for each in rules]
-            value = max(each.sharpest.value for each in bending)
-            where = ", over all bounds" + ", by search" * (not bending[0].exact)
         else:
-            value = max(each.of_bounds(name) for each in rules)
-            where = ", over all bounds, by search"
+            value, exact = max(each.of_bounds(name) for each in rules)
+            where = ", over all bounds" + ", by search" * (not exact)
         yield limit_finding(name, value if np.isfinite(value) else 0.0, most, made.arm, where)

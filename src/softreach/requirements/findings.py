@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -32,7 +32,7 @@ _SAMPLES, _FEWER = 2**15, 8
 as this one is: errors of extents and hulls fall with the cube root of their number or faster."""
 _PIECES = 8
 _ROUNDING = 1e-9
-_WORDS = {"load_number": "load number", "bending": "bending κR2", "actuators": "actuators"}
+_WORDS = {"load_number": "load number", "bending": "bending κR2"}
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,11 @@ def verdict_of(margin: float, error: float = 0.0) -> Verdict:
     return "met" if margin >= 0.0 else "missed"
 
 
+def share_error(share: Any, count: int) -> Any:
+    """Standard error of a share of so many; of 0 or 1, what one more or less makes of it."""
+    return np.sqrt(np.maximum(share * (1.0 - share), 1.0 / count) / count)
+
+
 def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding, ...]:
     """Proved lower bounds of what a design misses, in a few milliseconds; `check` finds no less.
 
@@ -90,18 +95,13 @@ def quick_excess(arm: Manipulator, requirements: Requirements) -> tuple[Finding,
     return (*_too_far(arm, needs), *(f for f in design_limits(arm, needs) if not f.met))
 
 
-def longest_reach(arm: Manipulator) -> float:
-    """No tip of the arm without loads is farther from its base than this [m]."""
-    inner = inner_arm(arm)
-    z, weights, _ = quadrature(inner, _PIECES)
-    most = ends_over(tables(inner, z).extension, inner.bounds)[:, 1]
-    return float(weights @ (1.0 + most)) * (1.0 + 1e-6)  # more than the error of the quadrature
-
-
 def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     if arm.loads is not None or any(needs.payloads) or not needs.targets:
         return
-    longest = longest_reach(arm)
+    inner = inner_arm(arm)
+    z, weights, _ = quadrature(inner, _PIECES)
+    most = ends_over(tables(inner, z).extension, inner.bounds)[:, 1]
+    longest = float(weights @ (1.0 + most)) * (1.0 + 1e-6)  # more than the error of the quadrature
     for target in needs.targets:
         room, text = longest + target.within, "farther from the base than the arm is ever long"
         if target.region is None:
@@ -135,10 +135,9 @@ def limit_finding(name: str, value: float, most: float, arm: Manipulator, where:
 
 def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     """Limits that follow from the design alone."""
-    low, high = arm.input_bounds.T
     heaviest = max(needs.payloads, default=None)
     numbers: dict[str, Callable[[], float]] = {
-        "actuators": lambda: int((low < high).sum()),
+        "actuators": lambda: int(np.less(*arm.input_bounds.T).sum()),
         "mass": lambda: mass(arm),
         "load_number": lambda: load_number(with_payload(arm, heaviest)),
     }

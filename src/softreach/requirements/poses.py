@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,15 +16,15 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.prepared import prepared_map
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
-from softreach.requirements.parts import Keep
+from softreach.requirements.parts import LIMIT_UNITS, Keep
 from softreach.requirements.regions import HalfSpace
-from softreach.rod.bending import some_corners, worst_inputs
+from softreach.rod.bending import bending_over_bounds, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import InvalidLoads, TipMap
 from softreach.sampling import sample_cube
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, joined, rows
 from softreach.support.errors import no_warnings
 from softreach.support.progress import Progress
 from softreach.workspace.search import nearest_tips
@@ -40,7 +41,6 @@ _LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""
 _BLOCK = 256  # poses at once
 _SAFETY = 1.2  # of speeds and turns between stations, which are known at these
-_SIZES = {"N": "force", "Pa": "pressure", "m": "stroke"}
 
 
 class Judged(NamedTuple):
@@ -90,11 +90,8 @@ class PoseRules:
 
     def judged(self, gamma: Array) -> Judged:
         """Poses of inputs (n, inputs) by every rule; a pose without an arm breaks none."""
-        value, error = np.zeros((2, len(gamma), len(self)))
-        if not value.size:
-            return Judged(value, value, error)
+        (value, error), k = np.zeros((2, len(gamma), len(self))), len(self.keeps)
         for block in parallel.blocks(len(gamma), _BLOCK):
-            k = len(self.keeps)
             value[block, :k], error[block, :k] = self._kept(gamma[block])
             for column, name in enumerate(self.limits, k):
                 value[block, column] = self._limited(name, gamma[block])
@@ -118,12 +115,12 @@ class PoseRules:
             else:
                 left[column] = np.arange(len(gamma))
         for parts in levels:
-            rows = np.unique(np.concatenate([np.empty(0, int), *left.values()]))
-            if not len(rows):
+            poses = np.unique(np.concatenate([np.empty(0, int), *left.values()]))
+            if not len(poses):
                 break
-            body = Body.of(self.rod, gamma[rows], parts)
+            body = Body.of(self.rod, gamma[poses], parts)
             for column, own in left.items():
-                seen, bound = body.missed(self.keeps[column], np.searchsorted(rows, own))
+                seen, bound = body.missed(self.keeps[column], np.searchsorted(poses, own))
                 value[own, column], error[own, column] = seen, bound - seen
                 left[column] = own[(bound > 0.0) & (bound - seen > self.tolerance)]
         return value, error
@@ -142,30 +139,31 @@ class PoseRules:
             else:
                 lengths = configuration(self.rod, gamma, 2)["line_length"].values
             return (1.0 - lengths / straight).max(axis=1)
-        own = Driving(self.arm).bundles(gamma)[:, : self.arm.bundles]
-        driven = [_SIZES.get(unit) == name for unit in self.arm.bundle_units]
-        sizes = np.abs(own[:, driven])
-        if name == "force" and "m" in self.arm.bundle_units:
+        units = np.array(self.arm.bundle_units)
+        every = Driving(self.arm).bundles(gamma)[:, : self.arm.bundles]
+        sizes = every[:, units == LIMIT_UNITS[name]]
+        if name == "force" and "m" in units:
             tension = configuration(self.rod, gamma, 2)["bundle_activation"].values
-            by_length = [unit == "m" for unit in self.arm.bundle_units]
-            sizes = np.concatenate([sizes, np.abs(tension[:, by_length])], axis=1)
-        return sizes.max(axis=1, initial=0.0)
+            sizes = np.concatenate([sizes, tension[:, units == "m"]], axis=1)
+        return np.abs(sizes).max(axis=1, initial=0.0)
 
     def worst_pose(self) -> tuple[Array, Judged]:
         """The pose within the bounds that misses the one region by most, by search."""
 
         def missed(gamma: Array) -> Array:
             blocks = parallel.blocks(len(gamma), _BLOCK)
-            each = [self._kept(gamma[block], _LEVELS[:1])[0] for block in blocks]
-            return np.nan_to_num(np.concatenate(each), nan=-np.inf)
+            return np.concatenate([self._kept(gamma[block], _LEVELS[:1])[0] for block in blocks])
 
         worst, _ = worst_inputs(self.rod, missed)
         return worst[0], self.judged(worst)
 
-    def of_bounds(self, name: str) -> float:
-        """Value of a limit of poses other than bending over all of the bounds, by search."""
+    def of_bounds(self, name: str) -> tuple[float, bool]:
+        """Value of a limit of poses over all of the bounds, and whether it is exact."""
+        if name == "bending":
+            bending = bending_over_bounds(self.arm)
+            return bending.sharpest.value, bending.exact
         _, worst = worst_inputs(self.rod, lambda gamma: self._limited(name, gamma)[:, None])
-        return float(worst[0])
+        return float(worst[0]), False
 
 
 class Body(NamedTuple):
@@ -207,22 +205,22 @@ class Body(NamedTuple):
             lost=np.isnan(frames.position.sum(axis=(1, 2))),
         )
 
-    def missed(self, keep: Keep, rows: Index) -> tuple[Array, Array]:
+    def missed(self, keep: Keep, poses: Index) -> tuple[Array, Array]:
         """Distances by which poses miss a region at stations [m], and at most between, (n,)."""
-        part = (self.center[rows], self.tangent[rows], self.radius[rows])
-        least, most = keep.region.section_distances(*part)
+        center, tangent, radius, farthest, bulge, lost = rows(self, poses)
+        least, most = keep.region.section_distances(center, tangent, radius)
         missed = (most if keep.inside else -least) + keep.clearance
         seen = missed.max(axis=1)
         if (keep.inside and keep.region.convex) or isinstance(keep.region, HalfSpace):
             # Along a straight line the distance from such a region is largest at an end.
             # The bulge is that of a parabola, which a slope from end to end takes from its top.
-            slope, bulge = np.abs(np.diff(missed, axis=1)), np.maximum(self.bulge[rows], 1e-300)
+            slope, bulge = np.abs(np.diff(missed, axis=1)), np.maximum(bulge, 1e-300)
             top = np.maximum(4.0 * bulge - slope, 0.0) ** 2 / (16.0 * bulge)
             between = np.maximum(missed[:, 1:], missed[:, :-1]) + top
         else:
-            between = 0.5 * (missed[:, 1:] + missed[:, :-1] + self.between[rows])
+            between = 0.5 * (missed[:, 1:] + missed[:, :-1] + farthest)
         bound = np.maximum(between.max(axis=1), seen)
-        seen[self.lost[rows]] = bound[self.lost[rows]] = np.nan
+        seen[lost] = bound[lost] = np.nan
         return seen, bound
 
 
@@ -238,18 +236,15 @@ def _widest(arm: Manipulator, z: Array) -> Array:
 
 
 class Posed(NamedTuple):
-    """The pose chosen for each place, under one payload."""
+    """The pose chosen for each place under one payload, and what the rules say of it."""
 
     gaps: Array
     poses: Array
     effort: Array
     nearest: Array
-    excess: Array
-    """Of each rule, shape (place, rule)."""
     value: Array
-    """Of each rule, shape (place, rule)."""
+    excess: Array
     error: Array
-    """Of the values of regions between stations [m], shape (place, rule)."""
 
 
 def solved(
@@ -259,54 +254,49 @@ def solved(
 
     From all solutions of the inverse, or `quick` ones from a few descents.
     """
-    choose = _descended if quick else _chosen
-    count, inputs, k = len(places), rules.arm.inputs, len(rules)
-    shapes = ((), (inputs,), (), (3,), (k,), (k,), (k,))
-    room = Posed(*(np.zeros((count, *shape)) for shape in shapes))
-    for block in parallel.blocks(count, _PLACES):
-        for whole, part in zip(room, choose(rules, places[block], within[block]), strict=True):
-            whole[block] = part
+    posed: list[Posed] = []
+    for block in parallel.blocks(len(places), _PLACES):
+        choose = partial(_descended, within=within[block]) if quick else _chosen
+        posed.append(choose(rules, places[block]))
         step(len(places[block]))
-    return room
+    return joined(posed or [_without_equilibrium(rules, places)])
 
 
-def _chosen(rules: PoseRules, places: Array, within: Array) -> Posed:
-    arm = rules.arm
+def _chosen(rules: PoseRules, places: Array) -> Posed:
     try:
         with no_warnings():
-            prepared = prepared_map(arm, TOL, cells=_CELLS)
+            prepared = prepared_map(rules.arm, TOL, cells=_CELLS)
             solutions = solve_inverse(prepared, places, from_rest=True)
     except InvalidLoads:
         return _without_equilibrium(rules, places)
     best, reached = _best(rules, solutions), solutions.statuses == Status.REACHED
-    rows = np.flatnonzero((best.excess.sum(axis=1) > 0.0) & reached)
-    if (as_tip_map(arm).box.dimension > 3) and 0 < len(rows) <= _MOST_TRIED:
+    breaks = np.flatnonzero((best.excess.sum(axis=1) > 0.0) & reached)
+    if rules.rod.box.dimension > 3 and 0 < len(breaks) <= _MOST_TRIED:
         with no_warnings():
-            family = solve_inverse(prepared, places[rows], family=_FAMILY)
-        for all_places, some in zip(best, _best(rules, family), strict=True):
-            all_places[rows] = some
+            family = solve_inverse(prepared, places[breaks], family=_FAMILY)
+        for every, own in zip(best, _best(rules, family), strict=True):
+            every[breaks] = own
     # A place that is reached to the error of the tips is reached.
-    gaps = np.where(reached, np.minimum(best.gaps, TOL * arm.length), best.gaps)
-    return best._replace(gaps=gaps)
+    best.gaps[reached] = np.minimum(best.gaps[reached], TOL * rules.arm.length)
+    return best
 
 
 def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     """Poses at the ends of descents from the samples whose tips are nearest to each place."""
     from scipy.spatial import KDTree
 
-    rod, count = rules.rod, len(places)
+    rod = rules.rod
     gamma = rod.box.from_cube(sample_cube("sobol", _SEEDS, rod.box.bundles))
     gamma = np.concatenate([gamma, some_corners(rod)])
     tips = rod.tips(gamma)
     known = np.isfinite(tips).all(axis=1)
     if not known.any():
         return _without_equilibrium(rules, places)
-    gamma, tips = gamma[known], tips[known]
-    near = KDTree(tips).query(places, k=min(_NEIGHBORS, len(tips)))[1].reshape(count, -1)
-    owner = np.repeat(np.arange(count), near.shape[1])
-    enough = TOL * rod.length
-    ends = nearest_tips(rod, gamma[near.ravel()], places[owner], enough)
-    least = np.full(count, np.inf)
+    neighbors = range(1, 1 + min(_NEIGHBORS, int(known.sum())))
+    near = KDTree(tips[known]).query(places, neighbors)[1]
+    owner, enough = np.repeat(np.arange(len(places)), len(neighbors)), TOL * rod.length
+    ends = nearest_tips(rod, gamma[known][near.ravel()], places[owner], enough)
+    least = np.full(len(places), np.inf)
     np.minimum.at(least, owner, ends.distance)
     # Local minima that are farther away than another are no poses at the place.
     wanted = np.maximum(np.maximum(within, enough)[owner], least[owner] * (1.0 + 1e-9))
@@ -314,9 +304,8 @@ def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     # Most descents to a place end in one pose.
     same = np.column_stack([owner[kept], np.rint(rod.box.to_cube(ends.gamma[kept]) / _SAME)])
     kept = kept[np.unique(same, axis=0, return_index=True)[1]]
-    return _ranked(
-        rules, places, owner[kept], ends.gamma[kept], ends.distance[kept], ends.tips[kept]
-    )
+    parts = (ends.gamma, ends.distance, ends.tips)
+    return _ranked(rules, places, owner[kept], *(part[kept] for part in parts))
 
 
 def _best(rules: PoseRules, solutions: Solutions) -> Posed:
@@ -325,9 +314,8 @@ def _best(rules: PoseRules, solutions: Solutions) -> Posed:
     owner = np.concatenate([np.repeat(np.arange(len(solutions)), solutions.counts), missing])
     gamma = np.concatenate([solutions.activations, solutions.nearest_activations[missing]])
     gaps = np.concatenate([solutions.residuals, solutions.gaps[missing]])
-    nearest = np.concatenate(
-        [np.repeat(solutions.targets, solutions.counts, axis=0), solutions.nearest[missing]]
-    )
+    reached = np.repeat(solutions.targets, solutions.counts, axis=0)
+    nearest = np.concatenate([reached, solutions.nearest[missing]])
     return _ranked(rules, solutions.targets, owner, gamma, gaps, nearest)
 
 
@@ -339,13 +327,11 @@ def _ranked(
     gamma[lost] = rules.rod.box.low
     judged = rules.judged(gamma)
     effort = np.linalg.norm(gamma / effort_scales(rules.arm), axis=1)
-    broken = judged.excess.sum(axis=1)
-    order = np.lexsort((effort, broken, owner))
+    order = np.lexsort((effort, judged.excess.sum(axis=1), owner))
     best = order[np.searchsorted(owner[order], np.arange(len(places)))]
-    away = np.linalg.norm(places - rules.arm.base.position, axis=1)
-    gaps = np.where(np.isfinite(gaps[best]), gaps[best], away + rules.arm.length)
-    rest = (judged.excess[best], judged.value[best], judged.error[best])
-    return Posed(gaps, gamma[best], effort[best], np.nan_to_num(nearest[best]), *rest)
+    gaps = np.where(np.isfinite(gaps[best]), gaps[best], _farthest(rules, places))
+    nearest = np.nan_to_num(nearest[best])
+    return Posed(gaps, gamma[best], effort[best], nearest, *rows(judged, best))
 
 
 def effort_scales(arm: Manipulator) -> Array:
@@ -356,9 +342,11 @@ def effort_scales(arm: Manipulator) -> Array:
 
 def _without_equilibrium(rules: PoseRules, places: Array) -> Posed:
     """Poses of an arm that no activation holds under its loads: its tip is near no place."""
-    arm, count = rules.arm, len(places)
-    away = np.linalg.norm(places - arm.base.position, axis=1) + arm.length
-    gamma = np.tile(rules.rod.box.low, (count, 1))
-    rule = np.zeros((count, len(rules)))
-    base = np.tile(arm.base.position, (count, 1))
-    return Posed(away, gamma, np.zeros(count), base, rule, rule, rule)
+    none = np.zeros((count := len(places), len(rules)))
+    gamma, base = (np.tile(x, (count, 1)) for x in (rules.rod.box.low, rules.arm.base.position))
+    return Posed(_farthest(rules, places), gamma, np.zeros(count), base, none, none, none)
+
+
+def _farthest(rules: PoseRules, places: Array) -> Array:
+    """Gaps of places without a pose [m]: no tip of the arm as it is drawn is farther away."""
+    return np.linalg.norm(places - rules.arm.base.position, axis=1) + rules.arm.length

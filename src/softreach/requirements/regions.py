@@ -319,8 +319,6 @@ class Mesh(Region):
             vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
         except Exception as error:  # of readers of many formats
             raise InvalidInput("path", repr(name), f"a mesh that can be read: {error}") from None
-        if not len(faces):
-            raise InvalidInput("path", repr(name), "a file with triangles")
         if name.lower().endswith(".glb"):  # whose y points up
             vertices = vertices[:, [0, 2, 1]] * (1.0, -1.0, 1.0)
         return cls(vertices * size.size, faces, name, size.name)
@@ -421,11 +419,7 @@ class Mesh(Region):
 
 
 def _unit_of(name: str) -> str | None:
-    """The unit that the beginning of the file of a mesh states, if it does.
-
-    Raises:
-        InvalidInput: No such file, one that is packed, or too large a one.
-    """
+    """The unit that the beginning of the file of a mesh states, if it does."""
     path = Path(name)
     if not path.is_file():
         raise InvalidInput("path", repr(name), "a file that exists")

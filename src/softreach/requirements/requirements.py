@@ -108,6 +108,11 @@ class Requirements:
         each = (np.full(len(target.points), target.within) for target in self.targets)
         return np.concatenate([np.empty(0), *each])
 
+    @property
+    def regions(self) -> tuple[tuple[Target, Region], ...]:
+        """Targets that are regions to cover, with these."""
+        return tuple((each, each.region) for each in self.targets if each.region is not None)
+
     def under_payloads(self, arm: Manipulator) -> list[Manipulator]:
         """An arm under each payload, or as it is where there are none."""
         return [with_payload(arm, payload) for payload in self.payloads or (None,)]
@@ -156,20 +161,20 @@ class Requirements:
         size = None if length is None else as_number("length", length, POSITIVE)
         reader = _Reader(Path(folder), size)
         parts = reader.parts(document_of(text, LONGEST, as_text("source", source)))
-        faults: Sequence[Fault] = reader.faults
-        if not faults:
-            try:
-                return cls(**parts)
-            except InvalidInput as error:
-                faults = [Fault(error.name, error.value, f"must be {error.allowed}")]
-            except InvalidDesign as error:
-                faults = error.faults
-        raise InvalidDesign(faults, source)
+        if reader.faults:
+            raise InvalidDesign(reader.faults, source)
+        try:
+            return cls(**parts)
+        except InvalidInput as error:
+            fault = Fault(error.name, error.value, f"must be {error.allowed}")
+            raise InvalidDesign([fault], source) from None
+        except InvalidDesign as error:
+            raise InvalidDesign(error.faults, source) from None
 
     def to_toml(self) -> str:
         """The text of a file in m and kg, from which `from_toml` makes the same."""
-        head = {"version": 1} | ({"payloads_kg": self.payloads} if self.payloads else {})
-        blocks = [["# softreach requirements", *_lines(head)]]
+        head = _lines({"version": 1, "payloads_kg": self.payloads or None})
+        blocks = [["# softreach requirements", *head]]
         for target in self.targets:
             lines = ["[[reach]]", *_lines({"name": target.name})]
             if target.places is not None:
@@ -177,10 +182,9 @@ class Requirements:
                 lines += ["places_m = [", *rows, "]"]
             elif target.region is not None:
                 lines += [_region_line(target.region), *_lines({"share": target.share})]
-            blocks.append(lines + _lines({"within_m": target.within} if target.within else {}))
+            blocks.append(lines + _lines({"within_m": target.within or None}))
         for keep in sorted(self.keeps, key=lambda keep: not keep.inside):
-            words = {"of": keep.of, "when": keep.when}
-            words |= {"clearance_m": keep.clearance} if keep.clearance else {}
+            words = {"of": keep.of, "when": keep.when, "clearance_m": keep.clearance or None}
             start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
             blocks.append([*start, _region_line(keep.region), *_lines(words)])
         if limits := self.limits.given:
@@ -227,15 +231,10 @@ def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
 
 
 def _named(parts: Sequence[Any]) -> Iterator[Any]:
-    """The parts, those without a name called "target 1" or "avoid 2" by their places.
-
-    Raises:
-        InvalidInput: Two of one name.
-    """
+    """The parts, those without a name called "target 1" or "avoid 2" by their places."""
     names = [part.name for part in parts if part.name]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidInput("name", repr(name), "of one target, or of one region, only")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InvalidInput("name", repr(twice[0]), "of one target, or of one region, only")
     for number, part in enumerate(parts, 1):
         kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
         yield part if part.name else dataclasses.replace(part, name=f"{kind} {number}")
@@ -430,26 +429,20 @@ class _Reader(FaultReader):
         return values
 
     def _read(self, value: Any, unit: str, symbol: str, plain: bool) -> Any:
-        """Numbers in SI units, however nested.
-
-        Raises:
-            ValueError: Anything else.
-        """
+        """Numbers in SI units, however nested; `ValueError` of anything else."""
         if isinstance(value, str) and "," in value:
             value = value.split(",")
         if isinstance(value, list):
             return [self._read(item, unit, symbol, plain) for item in value]
-        if isinstance(value, str) and unit and not symbol:
-            return self._quantity(value, unit)
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if is_number and symbol in ("", unit) and (symbol or plain or value == 0):
+            return value
+        if is_number and symbol:
+            value = f"{value!r}{symbol}"
+        elif not isinstance(value, str) or not unit or symbol:
             raise ValueError(value)
-        if not (symbol or plain) and value != 0:
-            raise ValueError(value)
-        return value if symbol in ("", unit) else self._quantity(f"{value!r}{symbol}", unit)
-
-    def _quantity(self, text: str, unit: str) -> float:
-        is_relative = unit == "m" and text.strip().endswith("L")
-        return read_length(text, self.length) if is_relative else read_quantity(text, unit)
+        is_relative = unit == "m" and value.strip().endswith("L")
+        return read_length(value, self.length) if is_relative else read_quantity(value, unit)
 
     def _allowed(self, unit: str, symbol: str, name: str) -> str:
         if symbol == "L" and self.length is None:
@@ -471,7 +464,7 @@ def _keys(name: str, unit: str) -> dict[str, str]:
 
 
 def _lines(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {value_text(value)}" for key, value in values.items()]
+    return [f"{key} = {value_text(x)}" for key, x in values.items() if x is not None]
 
 
 def _region_line(region: Region) -> str:

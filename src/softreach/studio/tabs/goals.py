@@ -15,7 +15,7 @@ from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import read_measurements, read_table
 from softreach.calibration.model import MarkerModel
 from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target, check
-from softreach.requirements.checks import quick_check
+from softreach.requirements.checks import checked
 from softreach.studio import markup
 from softreach.studio.fields import GRAY, Attribute, Fields
 from softreach.studio.found import Bench, Found, Sample
@@ -385,7 +385,7 @@ def _check(given: Given) -> Results:
         return
     try:
         with no_warnings():
-            quick = quick_check(state.design, requirements_of(state.needs), _ACCURACY)
+            quick = checked(state.design, requirements_of(state.needs), _ACCURACY, quick=True)
     except SoftreachError as error:
         yield Learned({"check": None, "check_refusal": str(error)})
         return
