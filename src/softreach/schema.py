@@ -270,6 +270,18 @@ def activation_units(activation: xr.DataArray) -> tuple[str, ...]:
     return (str(activation.attrs.get("units", "1")),) * count
 
 
+def activation_text(
+    arm: Manipulator, values: Iterable[float], names: Sequence[str] | None = None
+) -> str:
+    """Activations with the names and units of their bundles: "left -1, right 0.5 N"."""
+    return ", ".join(
+        f"{name} {round(value, 6) + 0.0:.5g}" if unit == "1" else f"{name} {value:.5g} {unit}"
+        for name, value, unit in zip(
+            names or arm.input_names, values, _units(arm, names), strict=True
+        )
+    )
+
+
 def activation_attributes(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, str]:
     """The unit of activations if all bundles share it; else the coordinate `unit` has each."""
     units = set(_units(arm, names))

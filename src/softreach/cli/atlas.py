@@ -12,8 +12,8 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Whole, pairs_in, read_positive, rows_of
-from softreach.support.arguments import as_integer
+from softreach.cli.values import Whole, pairs_in, read_as, rows_of
+from softreach.support.arguments import POSITIVE, as_integer
 from softreach.support.errors import InvalidInput, NotPossible, counted
 from softreach.support.files.formats import check_installed
 from softreach.support.files.text import read_text
@@ -229,7 +229,7 @@ def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
     allowed = "a radius > 0 over the length of each design, like 0.05L"
     bare = text.removesuffix("L") if text.endswith("L") else ""
-    return read_positive("alpha", text, lambda _: read_number(bare), allowed)
+    return read_as("alpha", text, lambda _: read_number(bare), allowed, POSITIVE)
 
 
 def _shard(text: str) -> tuple[int, int]:

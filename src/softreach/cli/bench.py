@@ -12,13 +12,14 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, pairs_in, read_positive
+from softreach.cli.values import Number, Whole, as_read, pairs_in, read_as
 from softreach.support import progress
+from softreach.support.arguments import POSITIVE
 from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_table
-from softreach.support.quantity import columns, quantity
-from softreach.support.units import TYPED, LengthUnit, read_length, readable_unit
+from softreach.support.quantity import columns
+from softreach.support.units import TYPED, LengthUnit, read_length, readable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -125,7 +126,7 @@ def calibrate(
 
 
 def _noise(text: str) -> float:
-    return read_positive("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})")
+    return read_as("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})", POSITIVE)
 
 
 def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
@@ -222,7 +223,7 @@ def plan_poses(
         seen = ", ".join(plan.markers)
         console.line(
             f"{n} poses of {design} with {seen}, "
-            f"noise {arm.length_unit.rounded(width, digits='.6g')}"
+            f"noise {arm.length_unit.rounded(width, digits='.5g')}"
         )
         for line in columns([("number", "to be known", "share"), *_rows(found, arm.length_unit)]):
             console.line(f"  {line}")
@@ -233,9 +234,8 @@ def plan_poses(
 def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     names = ("number", "unit", "value", "sigma")
     for name, own, value, width in zip(*(found[k].values.tolist() for k in names), strict=True):
-        shown, size = readable_unit(own, value, unit)
         share = f"{100 * width / abs(value):.2g} %" if value else "-"
-        yield name, quantity(value / size, shown, width / size, digits=2), share
+        yield name, readable(value, own, unit, width, digits=2), share
 
 
 def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:

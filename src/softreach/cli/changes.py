@@ -12,7 +12,14 @@ from cyclopts import Group, Parameter
 
 import softreach as sr
 from softreach.cli.values import Number, pairs_in, read_as
-from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, did_you_mean, warn
+from softreach.support.errors import (
+    InvalidDesign,
+    InvalidInput,
+    NotPossible,
+    Range,
+    did_you_mean,
+    warn,
+)
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import as_unit
 
@@ -168,10 +175,7 @@ def _unchanged(text: str) -> sr.Manipulator:
 def read_mass(name: str, text: str) -> float:
     """A mass [kg] that was written with its unit."""
     allowed = f"a mass >= 0 with its unit ({', '.join(unit_names('kg'))}), such as 200g"
-    mass = read_as(name, text, lambda text: read_quantity(text, "kg"), allowed)
-    if mass < 0:
-        raise InvalidInput(name, text, allowed)
-    return mass
+    return read_as(name, text, lambda text: read_quantity(text, "kg"), allowed, Range(0.0))
 
 
 def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:

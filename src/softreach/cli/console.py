@@ -15,7 +15,7 @@ from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 import softreach as sr
-from softreach.cli.values import Rows, key, plain, rows_for_machines, rows_for_people, shown
+from softreach.cli.values import Rows, for_machines, for_people, plain, shown
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
 from softreach.support.quantity import columns
@@ -74,12 +74,11 @@ class Console:
             arm: The design whose unit people see, and whose length is the unit L for machines.
         """
         if as_json:
-            each = rows_for_machines(rows, None if arm is None else arm.length)
-            self.json({key(name, unit): value for name, value, unit in each})
+            self.json(for_machines(rows, None if arm is None else arm.length))
             return
         self.line(title)
-        texts = rows_for_people(rows, METER if arm is None else arm.length_unit)
-        for line in columns([(name, text) for name, text in texts.items()]):
+        unit = METER if arm is None else arm.length_unit
+        for line in columns([*for_people(rows, unit)]):
             self.line(f"  {line}")
 
     def table(self, records: Sequence[Mapping[str, Any]], as_json: bool) -> None:

@@ -12,7 +12,8 @@ from cyclopts import Group, Parameter
 import softreach as sr
 from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
-from softreach.cli.values import Whole, read_positive
+from softreach.cli.values import Whole, read_as
+from softreach.support.arguments import POSITIVE
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import (
@@ -161,7 +162,7 @@ def radius_of(text: str, length: float) -> float | str:
     if text == "critical":
         return text
     allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
-    return read_positive("alpha", text, lambda text: read_length(text, length), allowed)
+    return read_as("alpha", text, lambda text: read_length(text, length), allowed, POSITIVE)
 
 
 def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:

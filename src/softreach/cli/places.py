@@ -9,7 +9,7 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Whole, activation_text, record
+from softreach.cli.values import Whole, fields_of, for_machines
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
@@ -17,8 +17,6 @@ from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_EXACT = 1e-6  # of L, the error of tips
 
 
 def solve(
@@ -63,35 +61,13 @@ def solve(
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
         known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]
-        console.json([record(each, arm.length, *lengths) for each in known])
+        console.json([for_machines(fields_of(each, *lengths), arm.length) for each in known])
         return
     for solution in solutions:
-        _print(solution, arm, count)
-
-
-def _print(solution: sr.inverse.Solution, arm: sr.Manipulator, family: int) -> None:
-    unit = arm.length_unit
-    status = solution.status.name.lower().replace("_", " ")
-    if len(solution) and solution.gap > _EXACT * arm.length:
-        status += f" within {unit.rounded(solution.gap)}"
-    console.line(f"target {unit.place(solution.target)}: {status}")
-    numbers = solution.residuals, solution.conditions, solution.margins, solution.sheets
-    for gamma, residual, condition, margin, sheet in zip(
-        solution.activations, *numbers, strict=True
-    ):
-        quality = f"residual {unit.rounded(residual, digits='.1e')}"
-        quality += f", condition {condition:.3g}, margin {margin:.3g}" if gamma.size else ""
-        quality += ", in a posture that it does not take straight from rest" if sheet else ""
-        console.line(f"  {activation_text(arm, gamma)}  ({quality})")
-    if not len(solution):
-        least = unit.rounded(solution.gap_bound)
-        bound = f", proved to be at least {least}" if solution.gap_bound else ""
-        gap = unit.rounded(solution.gap)
-        console.line(f"  nearest {unit.place(solution.nearest)}, {gap} away{bound}")
-        console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
-    elif len(solution) < family:
-        known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
-        console.line(f"  no others found: further searches end at {known}")
+        console.line(solution)
+        if 0 < len(solution) < count:
+            known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
+            console.line(f"  no others found: further searches end at {known}")
 
 
 def track(
@@ -130,7 +106,7 @@ def track(
 
 def _end(tracked: xr.Dataset, unit: LengthUnit) -> str:
     end = tracked.attrs["end"]
-    at = f"{unit.rounded(float(tracked.end_length), digits='.7g')} of path"
+    at = f"{unit.rounded(float(tracked.end_length), digits='.5g')} of path"
     bundle, bound = tracked.attrs["end_bundle"], tracked.attrs["end_bound"]
     error = unit.rounded(float(tracked.end_length_error), digits=".1g")
     ends = {
@@ -170,8 +146,10 @@ def equilibria(
         status = [sr.rod.TipStatus(each) for each in result.status]
         fields = vars(result) | {"status": status, "degree": result.degree}
         del fields["rod"], fields["solver"]
-        console.json(record(fields, arm.length, "tips"))
+        console.json(for_machines(fields_of(fields, "tips"), arm.length))
     else:
+        from softreach.schema import activation_text
+
         at = activation_text(arm, result.activation)
         console.line(f"equilibria{f' at {at}' if at else ''}: {result}")
     if out is not None:

@@ -14,7 +14,7 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
 from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, pairs_in, record
+from softreach.cli.values import Number, Whole, as_read, fields_of, for_machines, pairs_in
 from softreach.support import progress
 from softreach.support.files.text import read_text
 
@@ -67,10 +67,9 @@ def check(
 
 def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
+    fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
     return {
-        **record(
-            {name: getattr(result, name) for name in names}, result.arm.length, "places", "gaps"
-        ),
+        **for_machines(fields, result.arm.length),
         "findings": [_finding(finding) for finding in result.findings],
         "payloads_kg": result.payloads,
         "coverages": [coverage._asdict() for coverage in result.coverages],

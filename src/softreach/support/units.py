@@ -25,7 +25,8 @@ _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6)}
 """Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
 
-_POWERS = {"m": 1, "m2": 2, "m3": 3}
+POWERS = {"m": 1, "m2": 2, "m²": 2, "m3": 3, "m³": 3}
+"""SI unit of lengths, areas and volumes -> power of the length."""
 
 _PRESSURES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}
 
@@ -74,7 +75,7 @@ class LengthUnit(NamedTuple):
 
     def place(self, point: Iterable[float]) -> str:
         """A position [m] in words: "(200, 100, 600) mm"."""
-        return f"({', '.join(f'{x / self.size:.6g}' for x in point)}) {self.name}"
+        return f"({', '.join(f'{x / self.size:.5g}' for x in point)}) {self.name}"
 
     def scale(self, power: int = 1) -> float:
         """Size of the unit of lengths [m], of areas [m²] for power 2, of volumes [m³] for 3."""
@@ -134,8 +135,7 @@ def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, flo
         value: The number, for a unit of pressure of its size.
         length: Unit of lengths, areas and volumes.
     """
-    if unit in _POWERS:
-        power = _POWERS[unit]
+    if power := POWERS.get(unit):
         return length.symbol(power), length.scale(power)
     if unit == "rad":
         return "°", math.pi / 180.0
@@ -144,7 +144,9 @@ def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, flo
     return ("" if unit == "1" else unit), 1.0
 
 
-def readable(value: float, unit: str, length: LengthUnit, error: float = math.nan) -> str:
+def readable(
+    value: float, unit: str, length: LengthUnit, error: float = math.nan, *, digits: int = 1
+) -> str:
     """A number as people read it, to the first digit of its error: "12.5 mm", "20.3°".
 
     Args:
@@ -152,9 +154,10 @@ def readable(value: float, unit: str, length: LengthUnit, error: float = math.na
         unit: Its SI unit; "1" for none.
         length: Unit of lengths, areas and volumes.
         error: How far off it may be, same unit as the number.
+        digits: Number of digits of the error.
     """
     name, size = readable_unit(unit, value, length)
-    return quantity(value / size, name, error / size)
+    return quantity(value / size, name, error / size, digits)
 
 
 def read_length(text: str, length: float | None = None) -> float:
