@@ -38,7 +38,6 @@ from softreach.support.files.stores import (
     DamagedStore,
     Opened,
     StoreFailed,
-    Watch,
     absolute,
     opened_store,
     place_of,
@@ -111,7 +110,7 @@ class AtlasStore:
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
         assert opened is not None
         store = cls(location, command, opened)  # this command has all functions
-        with writing(location), opened.watch.noting():  # what is damaged counts as missing
+        with writing(location), opened.noting():  # what is damaged counts as missing
             _complete(store)
         return store
 
@@ -133,11 +132,6 @@ class AtlasStore:
         opened.check_arrays()
         return cls(location, command, opened)
 
-    @property
-    def watch(self) -> Watch:
-        """Watch over damage that is found."""
-        return self.opened.watch
-
     def array(self, name: str) -> Any:
         """One of the arrays, which writes also chunks that are empty.
 
@@ -153,7 +147,7 @@ class AtlasStore:
 
     def status(self) -> NDArray[np.uint8]:
         """The status of every design, TODO to DAMAGED, in C order, shape (designs,)."""
-        with self.watch.noting() as noted:
+        with self.opened.noting() as noted:
             status = np.array(self.array("status")[...]).ravel()
         status[[self.number(chunk) for chunk in noted]] = DAMAGED
         return status
@@ -218,7 +212,7 @@ def _command_of(opened: Opened | None, location: StoreLike, allowed: str) -> Com
     text = None if opened is None else opened.group.attrs.get("command")
     if opened is None or not isinstance(text, str):
         raise InvalidInput("store", location, allowed)
-    opened.watch.required = lambda chunk: chunk.array not in PER_DESIGN
+    opened.required = lambda chunk: chunk.array not in PER_DESIGN
     return Command.from_json(text)
 
 
@@ -289,7 +283,7 @@ def _complete(store: AtlasStore) -> None:
     from zarr.errors import ContainsArrayError
 
     for plan in array_plans(store.command):
-        with store.watch.noting() as noted:
+        with store.opened.noting() as noted:
             there = plan.name in store.opened.group
             if there and plan.name not in PER_DESIGN:
                 _ = store.array(plan.name)[...]
