@@ -165,15 +165,14 @@ def radius_of(text: str, length: float) -> float | str:
     return read_as("alpha", text, lambda text: read_length(text, length), allowed, POSITIVE)
 
 
-def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
-    """Refuse a file that could not be written in the end, before anything is computed."""
-    check_outputs([] if path is None else [path], formats, overwrite)
-
-
-def check_outputs(
-    paths: list[Path], formats: Formats, overwrite: bool, *libraries: tuple[str, str]
+def check_output(
+    out: Path | list[Path] | None, formats: Formats, overwrite: bool, *libraries: tuple[str, str]
 ) -> None:
-    """As `check_output`, of several files; all libraries that are missing are named at once."""
+    """Refuse files that could not be written in the end, before anything is computed.
+
+    All libraries that are missing are named at once.
+    """
+    paths = out if isinstance(out, list) else [] if out is None else [out]
     if not paths:
         refuse("without --out", overwrite=overwrite)
     known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]

@@ -50,7 +50,7 @@ def reach(
     arm = design_from(design, changes, unit)
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
     meshed = [("skimage", "surface")] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
-    options.check_outputs(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite, *meshed)
+    options.check_output(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite, *meshed)
     free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:
         if not options.is_page(path) and free < (3 if _is_drawn(path) else 2):

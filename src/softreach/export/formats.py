@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from io import BufferedWriter
 from os import PathLike
 from typing import Any, BinaryIO
@@ -12,7 +12,6 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, format_of
 
@@ -51,7 +50,7 @@ def write_vtu(
     file: BufferedWriter, points: Any, cells: Any, *, compression: str | None = "zlib", **data: Any
 ) -> None:
     """Write a mesh as meshio has it, which for this format opens what it is given itself."""
-    meshio = load_library("meshio")
+    meshio = import_module("meshio")
     options = {"compression": compression, "header_type": "UInt64"}
     meshio.vtu.write(os.fspath(file.name), meshio.Mesh(points, cells, **data), **options)
 
@@ -91,21 +90,6 @@ def write_ply(
         triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
         triangles["count"], triangles["corners"] = 3, faces
         file.write(triangles.data)
-
-
-def load_library(module: str) -> Any:
-    """An optional library, loaded at first use.
-
-    Raises:
-        MissingExtra: It is not installed.
-    """
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        library = module.partition(".")[0]
-        if error.name is None or error.name.partition(".")[0] != library:
-            raise
-        raise MissingExtra((library, "export")) from error
 
 
 def _ascii(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Sequence
+from importlib import import_module
 from io import BufferedWriter
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +17,6 @@ from softreach.arm.manipulator import a_manipulator
 from softreach.arm.skin import arm_surface, bundle_surfaces, inside
 from softreach.export.formats import (
     format_file,
-    load_library,
     write_by_suffix,
     write_ply,
     write_vtu,
@@ -189,12 +189,12 @@ def _write_ply(scene: Scene, file: BufferedWriter) -> None:
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
     meshes = [_colored(part) for part in scene.parts]
-    binary = load_library("trimesh").util.concatenate(meshes).export(file_type="stl")
+    binary = import_module("trimesh").util.concatenate(meshes).export(file_type="stl")
     file.write(_said_unit(scene).encode().ljust(80) + binary[80:])
 
 
 def _write_obj(scene: Scene, file: BufferedWriter) -> None:
-    trimesh = load_library("trimesh")
+    trimesh = import_module("trimesh")
     meshes = trimesh.Scene([_colored(part) for part in scene.parts])
     # exact enough for an arm of a millimeter; a name of ours, not an address, in the first line
     options = {"include_normals": False, "digits": 12, "header": _said_unit(scene)}
@@ -202,7 +202,7 @@ def _write_obj(scene: Scene, file: BufferedWriter) -> None:
 
 
 def _write_glb(scene: Scene, file: BufferedWriter) -> None:
-    trimesh = load_library("trimesh")
+    trimesh = import_module("trimesh")
     meshes = trimesh.Scene(base_frame="world", metadata={"about": _said_unit(scene)})
     # as a node and not in the numbers, so that a reader gets back the vertices we have
     meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
@@ -264,7 +264,7 @@ def _said_unit(scene: Scene) -> str:
 
 def _colored(part: Part) -> Any:
     look = {"vertex_colors": _colors(part), "metadata": {"name": part.name}, "process": False}
-    return load_library("trimesh").Trimesh(part.vertices, part.faces, **look)
+    return import_module("trimesh").Trimesh(part.vertices, part.faces, **look)
 
 
 def _colors(part: Part) -> NDArray[np.uint8]:

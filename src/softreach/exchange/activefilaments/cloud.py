@@ -65,7 +65,7 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     activations = gamma_path(path)
     tip = _table(Path(path), 3, "x, y, z")
     sectors = ", ".join(ring.name or "no fibers" for ring in filament.rings)
-    columns = _table(activations, filament.columns, f"the sectors of {sectors}")
+    columns = _table(activations, len(filament.columns[0]), f"the sectors of {sectors}")
     if len(tip) != len(columns):
         rows = counted(len(columns), "row")
         raise InvalidInput(fspath(activations), rows, f"{len(tip)}, as {fspath(path)} has")
