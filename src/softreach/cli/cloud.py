@@ -96,7 +96,9 @@ def volume(
 
     options.check_output(out, SURFACE_FILES, overwrite)
     options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
-    cloud, arm = options.cloud_of(source, sampling, changes, unit, check_hull_memory)
+    if not options.is_stored(source):
+        check_hull_memory(sampling.count)
+    cloud, arm = options.cloud_of(source, sampling, changes, unit)
     bias = cloud.attrs["sampler"] == "uniform"
     concave = sr.concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
     rows = volume_rows(concave, sr.convex_hull(cloud.tip))

@@ -34,7 +34,6 @@ _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]"
 
 
 def _printable(text: object) -> str:
-    """The text with such characters as backslash escapes."""
     return _COMMANDS.sub(lambda match: ascii(match[0])[1:-1], str(text))
 
 

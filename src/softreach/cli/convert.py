@@ -47,7 +47,7 @@ def export(
         raise InvalidInput("format", format, "activefilaments, or left out")
     if options.is_stored(source):
         options.refuse("on a cloud, which has many", activation=activation)
-        options.refuse("on a stored cloud: give the design instead", **changes.given)
+        options.refuse(options.STORED, **changes.given)
         write = _export_pair if format else _export_cloud
         write(source, out, overwrite, unit)
     elif format is not None and out.suffix != ".jl":

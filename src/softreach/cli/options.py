@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -36,7 +35,8 @@ OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
 """The one name of the file or folder that a command writes."""
 
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
-_STORED = "on a stored cloud: give the design instead"
+STORED = "on a stored cloud: give the design instead"
+"""Where changes of a design and options of sampling have no effect."""
 
 
 def _output(help: str, name: str | None = None) -> Parameter:
@@ -102,22 +102,16 @@ def is_stored(source: str) -> bool:
 
 
 def cloud_of(
-    source: str,
-    sampling: Sampling,
-    changes: Changes,
-    unit: str | None,
-    check: Callable[[int], None] | None = None,
+    source: str, sampling: Sampling, changes: Changes, unit: str | None
 ) -> tuple[xr.Dataset, sr.Manipulator]:
-    """The stored cloud, or one of the design once its number of samples is checked; its design."""
+    """The stored cloud, or one of the design; its design."""
     if unit is not None:
         as_unit(unit, 1.0)  # before anything is computed
     if is_stored(source):
-        refuse(_STORED, **changes.given, **vars(sampling))
+        refuse(STORED, **changes.given, **vars(sampling))
         cloud = sr.open_cloud(source)
         say_limits(arm := shown_in(unit, sr.cloud.design_of(cloud)))
         return cloud, arm
-    if check is not None:
-        check(sampling.count)
     arm = design_from(source, changes, unit)
     return sr.compute_cloud(arm, **sampling.arguments), arm
 
@@ -131,11 +125,10 @@ def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.input_bounds[:, 0].tolist()
-    values = numbers_in(text, arm.inputs)
-    if values is None:
-        allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
-        raise InvalidInput(name, text, allowed)
-    return values
+    if (values := numbers_in(text, arm.inputs)) is not None:
+        return values
+    allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
+    raise InvalidInput(name, text, allowed)
 
 
 def shape_of(text: str | None, arm: sr.Manipulator) -> xr.Dataset:

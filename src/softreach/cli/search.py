@@ -169,8 +169,6 @@ def _searched(asked: dict[str, Any], storage: Path) -> sr.optimization.Search:
 
 
 class _Watch:
-    """How far a search is, in a few words."""
-
     def __init__(self) -> None:
         self._met, self._excess = 0, math.inf
 

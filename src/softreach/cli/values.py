@@ -39,8 +39,6 @@ def read_as(
 
 
 def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
-    """Options that are read by a function from text."""
-
     def convert(kind: Any, tokens: Sequence[Token]) -> float:
         del kind
         name = (tokens[0].keyword or "number").lstrip("-").replace("-", "_")

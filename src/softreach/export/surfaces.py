@@ -268,7 +268,6 @@ def _colored(part: Part) -> Any:
 
 
 def _colors(part: Part) -> NDArray[np.uint8]:
-    """RGBA of each vertex."""
     color = np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
     return np.tile(color, (len(part.vertices), 1))
 

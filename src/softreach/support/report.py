@@ -117,7 +117,6 @@ def check_libraries() -> None:
 
 
 def _source(figure: Any) -> str:
-    """Source of a picture inside the page."""
     if not isinstance(figure, bytes):
         from matplotlib import pyplot as plt
 
