@@ -38,15 +38,20 @@ def _shown_default(value: object) -> Any:
     return None if value is None or value is False else str(value)
 
 
-def _flowing(console: Any, options: Any, panel: Any) -> None:
-    """Lays out help whose lines docstrings break."""
-    from cyclopts.help import DefaultFormatter  # takes time, as Rich does
+class _Flowing:
+    """Lays out help whose lines docstrings break; loaded when it is needed, as Rich takes time."""
 
-    for entry in panel.entries:
-        text = getattr(entry.description, "primary_renderable", None)
-        if text is not None:
-            text.plain = text.plain.replace("\n", " ")
-    DefaultFormatter()(console, options, panel)
+    def __call__(self, console: Any, options: Any, panel: Any) -> None:
+        for entry in panel.entries:
+            text = getattr(entry.description, "primary_renderable", None)
+            if text is not None:
+                text.plain = text.plain.replace("\n", " ")
+        self.__getattr__("__call__")(console, options, panel)
+
+    def __getattr__(self, name: str) -> Any:
+        from cyclopts.help import DefaultFormatter
+
+        return getattr(DefaultFormatter(), name)
 
 
 app = App(
@@ -64,7 +69,7 @@ Start with
     print_error=False,
     suppress_keyboard_interrupt=False,
     help_format="plaintext",
-    help_formatter=_flowing,
+    help_formatter=_Flowing(),
     console=cast(Any, HelpConsole()),
     default_parameter=Parameter(negative=(), show_default=_shown_default),
 )

@@ -57,9 +57,7 @@ def calibrate(
     out: options.Out = None,
     report: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
     table: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Fit numbers of a design to measured poses, with honest errors.
 
@@ -91,10 +89,10 @@ def calibrate(
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.support.report import REPORT
 
-    arm = design_from(design, changes, unit)
+    arm = design_from(design, changes, output.unit)
     outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
     for path, formats in outputs or [(None, {})]:
-        options.check_output(path, formats, overwrite)
+        options.check_output(path, formats, output.overwrite)
     with progress.bar("fitting", None) as step:
         result = sr.calibrate(
             arm,
@@ -112,17 +110,18 @@ def calibrate(
             seed=seed,
             progress=step,
         )
-    if json:
+    if output.json:
         console.json(_record(result))
     else:
         console.line(f"calibration of {design}: {result.report(arm.length_unit.name)}")
     if out is not None:
-        result.save(out, overwrite=overwrite)
+        result.save(out, overwrite=output.overwrite)
     if table is not None:
-        write_table(table, result.table(options.written_unit(arm).name), overwrite=overwrite)
-        console.written(table, options.written_unit(arm))
+        written = options.written_unit(arm)
+        write_table(table, result.table(written.name), overwrite=output.overwrite)
+        console.written(table, written)
     if report is not None:
-        result.report(arm.length_unit.name).save(report, overwrite=overwrite)
+        result.report(arm.length_unit.name).save(report, overwrite=output.overwrite)
 
 
 def _noise(text: str) -> float:
@@ -184,9 +183,7 @@ def plan_poses(
     seed: Whole = 0,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Choose the poses to measure for a calibration.
 
@@ -204,9 +201,9 @@ def plan_poses(
         seed: Seed of candidates and of their order.
         out: Write the poses as a CSV file to fill in.
     """
-    arm = design_from(design, changes, unit)
+    arm = design_from(design, changes, output.unit)
     width = _noise(noise)
-    options.check_output(out, TABLES, overwrite)
+    options.check_output(out, TABLES, output.overwrite)
     plan = sr.calibration.plan_poses(
         arm,
         free_names(arm, free),
@@ -216,7 +213,7 @@ def plan_poses(
         seed=seed,
     )
     found = plan.to_dataset(width)
-    if json:
+    if output.json:
         poses = {"inputs": found["input"].values, "poses": found["activation"].values}
         console.json({"noise_m": width, **poses, "numbers": _numbers(found)})
     else:
@@ -228,7 +225,7 @@ def plan_poses(
         for line in columns([("number", "to be known", "share"), *_rows(found, arm.length_unit)]):
             console.line(f"  {line}")
     if out is not None:
-        plan.save(out, overwrite=overwrite)
+        plan.save(out, overwrite=output.overwrite)
 
 
 def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:

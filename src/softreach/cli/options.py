@@ -60,6 +60,19 @@ View = Annotated[str | None, _output("View: oblique (if left out), front, side, 
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
+class Output:
+    """How results are written and printed."""
+
+    overwrite: Overwrite = False
+    unit: Unit = None
+    json: AsJson = False
+
+
+DEFAULT = Output()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
 class Sampling:
     """Options of the sampling of a cloud.
 

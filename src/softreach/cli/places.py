@@ -64,7 +64,7 @@ def solve(
         console.json([for_machines(fields_of(each, *lengths), arm.length) for each in known])
         return
     for solution in solutions:
-        console.line(solution)
+        console.line(solution.text(arm.length_unit.name))
         if 0 < len(solution) < count:
             known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
             console.line(f"  no others found: further searches end at {known}")
@@ -126,9 +126,7 @@ def equilibria(
     view: options.View = None,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Find every equilibrium of a loaded arm at given activations.
 
@@ -139,10 +137,10 @@ def equilibria(
     Args:
         out: Draw them: .png .pdf .svg, or .html to turn
     """
-    options.check_picture(out, overwrite, view=view, page=True)
-    arm = design_from(design, changes, unit)
+    options.check_picture(out, output.overwrite, view=view, page=True)
+    arm = design_from(design, changes, output.unit)
     result = sr.equilibria(arm, options.activation_of(activation, arm))
-    if json:
+    if output.json:
         status = [sr.rod.TipStatus(each) for each in result.status]
         fields = vars(result) | {"status": status, "degree": result.degree}
         del fields["rod"], fields["solver"]
@@ -158,4 +156,4 @@ def equilibria(
         figure = (
             sr.plot.plot_3d([result], **look) if page else sr.plot.plot_equilibria(result, **look)
         )
-        options.save_picture(figure, out, overwrite)
+        options.save_picture(figure, out, output.overwrite)

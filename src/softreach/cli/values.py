@@ -134,11 +134,11 @@ def for_machines(rows: Rows, length: float | None = None) -> dict[str, Any]:
 
 
 def shown(value: Any) -> str:
-    """A value in a table, to five digits; a dash where there is none."""
+    """A value in a table, with five digits that count; a dash where there is none."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "-"
     if isinstance(value, float):
-        return f"{value:.5g}"
+        return f"{float(f'{value:.5g}'):.6g}"  # without an exponent up to a million
     if isinstance(value, int) and not isinstance(value, bool):
         return f"{value:,}"
     if isinstance(value, list | tuple):

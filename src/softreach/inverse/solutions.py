@@ -21,6 +21,7 @@ from softreach.schema import (
 )
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
+from softreach.support.units import as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,23 +101,34 @@ class Solution:
         return f"<Solution for ({place}) m: {outcome}, {summary}>"
 
     def __str__(self) -> str:
-        """A line for each activation, or what is known of the nearest point."""
+        return self.text()
+
+    def text(self, unit: str | None = None) -> str:
+        """A line for each activation, or what is known of the nearest point.
+
+        Args:
+            unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
+
+        Raises:
+            InvalidInput: No such unit.
+        """
         arm, names = self.tip_maps[0].arm, self.tip_maps[0].box.names
-        unit, status = arm.length_unit, self.status.name.lower().replace("_", " ")
+        shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
+        status = self.status.name.lower().replace("_", " ")
         if len(self) and self.gap > _EXACT * arm.length:
-            status += f" within {unit.rounded(self.gap)}"
-        lines = [f"target {unit.place(self.target)}: {status}"]
+            status += f" within {shown.rounded(self.gap)}"
+        lines = [f"target {shown.place(self.target)}: {status}"]
         for k, gamma in enumerate(self.activations):
-            quality = f"residual {unit.rounded(self.residuals[k], digits='.1e')}"
+            quality = f"residual {shown.rounded(self.residuals[k], digits='.1e')}"
             if gamma.size:
                 quality += f", condition {self.conditions[k]:.3g}, margin {self.margins[k]:.3g}"
             if self.sheets[k]:
                 quality += ", in a posture that it does not take straight from rest"
             lines.append(f"{activation_text(arm, gamma, names)}  ({quality})")
         if not len(self):
-            least = unit.rounded(self.gap_bound)
+            least = shown.rounded(self.gap_bound)
             bound = f", proved to be at least {least}" if self.gap_bound else ""
-            nearest, gap = unit.place(self.nearest), unit.rounded(self.gap)
+            nearest, gap = shown.place(self.nearest), shown.rounded(self.gap)
             lines.append(f"nearest {nearest}, {gap} away{bound}")
             lines.append(f"reached by {activation_text(arm, self.nearest_activation, names)}")
         return "\n  ".join(lines)
