@@ -14,8 +14,7 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.values import Whole, pairs_in, read_as, rows_of
 from softreach.support.arguments import POSITIVE, as_integer
-from softreach.support.errors import InvalidInput, NotPossible, counted
-from softreach.support.files.formats import check_installed
+from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
 from softreach.support.files.text import read_text
 from softreach.support.quantity import read_number
 
@@ -219,7 +218,7 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
         options.refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:
         return None
-    check_installed(("distributed", "cluster"))
+    check_installed("distributed")
     from distributed import Client
 
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))

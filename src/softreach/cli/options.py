@@ -13,14 +13,13 @@ from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
 from softreach.cli.values import Whole, read_as
 from softreach.support.arguments import POSITIVE
-from softreach.support.errors import InvalidInput, NotPossible
+from softreach.support.errors import InvalidInput, NotPossible, check_installed
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import (
     PAGES,
     PICTURES,
     FileFormat,
     Formats,
-    check_installed,
     format_of,
 )
 from softreach.support.files.text import MEGABYTE, read_text
@@ -172,7 +171,7 @@ def radius_of(text: str, length: float) -> float | str:
 
 
 def check_output(
-    out: Path | list[Path] | None, formats: Formats, overwrite: bool, *libraries: tuple[str, str]
+    out: Path | list[Path] | None, formats: Formats, overwrite: bool, *libraries: str
 ) -> None:
     """Refuse files that could not be written in the end, before anything is computed.
 
@@ -182,8 +181,7 @@ def check_output(
     if not paths:
         refuse("without --out", overwrite=overwrite)
     known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
-    needed = [(name, each.extra) for each in known for name in each.libraries]
-    check_installed(*needed, *libraries)
+    check_installed(*(name for each in known for name in each.libraries), *libraries)
     for path in paths:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")

@@ -47,7 +47,7 @@ def reach(
 
     arm = design_from(design, changes, output.unit)
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
-    meshed = [("skimage", "surface")] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
+    meshed = ["skimage"] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
     options.check_output(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, output.overwrite, *meshed)
     free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:

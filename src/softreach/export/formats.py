@@ -20,7 +20,7 @@ _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
 def format_file(write: Callable[[Any, BufferedWriter], None], library: str = "") -> FileFormat:
     """A row of a table of formats: the writer, and the library that it needs."""
-    return FileFormat((library,) if library else (), "export", write)
+    return FileFormat((library,) if library else (), write)
 
 
 def write_by_suffix(

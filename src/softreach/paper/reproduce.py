@@ -21,9 +21,8 @@ from typing import Any, NamedTuple
 from softreach.paper.notebook import FULL, QUICK, Finding, Notebook, Numbers, Settings, Verdict
 from softreach.paper.sections import misprints, model, redundancy, sweep, uniqueness, volume
 from softreach.plot.style import pyplot
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, check_installed
 from softreach.support.files.atomic import MARK, check_place
-from softreach.support.files.formats import check_installed
 from softreach.support.files.text import write_text
 from softreach.support.report import Report, Section
 
@@ -90,7 +89,7 @@ def reproduce_paper(
         NotWritten: The folder cannot be written to.
     """
     # What is missing is reported now, not after a quarter of an hour.
-    check_installed(("matplotlib", "plot"), ("skimage", "surface"), ("jinja2", "report"))
+    check_installed("matplotlib", "skimage", "jinja2")
     pyplot()
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)

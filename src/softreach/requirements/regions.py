@@ -28,8 +28,7 @@ from softreach.support.arrays import (
     check_finite,
     read_only,
 )
-from softreach.support.errors import InvalidInput, NotPossible, counted
-from softreach.support.files.formats import check_installed
+from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
 from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
@@ -308,7 +307,7 @@ class Mesh(Region):
         size = as_unit(stated if unit is None else unit)
         if stated not in (None, size.name):
             raise InvalidInput("unit", size.name, f"{stated}, as {name} says")
-        check_installed(("trimesh", "export"))
+        check_installed("trimesh")
         trimesh = import_module("trimesh")
         try:
             scene: Any = trimesh.load(name, force="scene")

@@ -15,10 +15,10 @@ from typing import Any
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import counted
 from softreach.support.files.atomic import writing
-from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
+from softreach.support.files.formats import FileFormat, Formats, format_of
 from softreach.support.quantity import columns
 
-REPORT: Formats = {".html": FileFormat(("jinja2",), "report")}
+REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}
 """Formats of reports."""
 
 _DPI = 160
@@ -81,7 +81,6 @@ class Report:
         """
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         format_of(path, REPORT)
-        check_libraries()
         from jinja2 import Environment, StrictUndefined
 
         text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
@@ -105,15 +104,6 @@ class Reported(ABC):
 
     def _repr_html_(self) -> str:
         return self.report()._repr_html_()
-
-
-def check_libraries() -> None:
-    """Say which libraries of a report with pictures are missing.
-
-    Raises:
-        MissingExtra: matplotlib or Jinja2 is not installed.
-    """
-    check_installed(("matplotlib", "plot"), ("jinja2", "report"))
 
 
 def _source(figure: Any) -> str:
