@@ -86,12 +86,7 @@ def cloud_table(cloud: xr.Dataset) -> pd.DataFrame:
 
 
 def arrays_of(cloud: xr.Dataset, unit: LengthUnit = METER) -> CloudTable:
-    """The arrays and the description of a cloud.
-
-    Args:
-        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
-        unit: Of the tips in the table.
-    """
+    """The arrays and the description of a cloud, with its tips in a unit."""
     tip, activation = cloud["tip"], cloud["activation"]
     names = range(1, activation.sizes["bundle"] + 1)
     units, length = activation_units(activation), _length(cloud)

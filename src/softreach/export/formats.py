@@ -26,20 +26,7 @@ def format_file(write: Callable[[Any, BufferedWriter], None], library: str = "")
 def write_by_suffix(
     path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool
 ) -> None:
-    """Write the content whole, or leave what was there.
-
-    Args:
-        path: The file.
-        formats: What can be written, by suffix.
-        content: What their writers take.
-        overwrite: Whether it may replace a file.
-
-    Raises:
-        InvalidInput: No writer for the suffix (the error lists those there are), or something else
-            is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
+    """Write the content whole, or leave what was there."""
     write = format_of(path, formats).write
     assert write is not None
     with writing(path, overwrite=overwrite) as file:

@@ -29,7 +29,7 @@ from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import Formats
 from softreach.support.palette import BODY, Color, bundle_color
-from softreach.support.units import METER, LengthUnit, as_unit
+from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,26 +109,10 @@ def export_mesh(
     written = as_unit(unit)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
-    write_parts([Part("surface", vertices, faces)], path, written, overwrite=overwrite)
+    _write_parts([Part("surface", vertices, faces)], path, written, overwrite=overwrite)
 
 
-def write_parts(
-    parts: Sequence[Part],
-    path: str | PathLike[str],
-    unit: LengthUnit = METER,
-    *,
-    overwrite: bool = False,
-) -> None:
-    """Write surfaces [m] that belong together.
-
-    Names survive in OBJ (objects), GLB (nodes) and VTK (a number per triangle, in order); colors in
-    PLY, OBJ and GLB.
-
-    Raises:
-        InvalidInput: Unknown suffix, or something else is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
+def _write_parts(parts: Sequence[Part], path: str, unit: LengthUnit, *, overwrite: bool) -> None:
     scaled = []
     for part in parts:
         vertices, faces = parted(part.vertices, part.faces)
@@ -150,7 +134,8 @@ def export_arm(
     The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
     that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
     ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
-    the names of the bundles.
+    the names of the bundles in OBJ (objects), GLB (nodes) and 3MF, and numbered in VTU; their
+    colors are in all but STL and VTU.
 
     Args:
         arm: The design.
@@ -175,7 +160,7 @@ def export_arm(
         name, taken = arm.bundle_names[index], ("body", *arm.bundle_names[:index])
         name = name if name not in taken else f"{name} ({index + 1})"
         parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
-    write_parts(parts, path, written, overwrite=overwrite)
+    _write_parts(parts, path, written, overwrite=overwrite)
 
 
 def _write_ply(scene: Scene, file: BufferedWriter) -> None:

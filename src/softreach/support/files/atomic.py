@@ -61,8 +61,6 @@ def check_place(
         SoftreachWarning: The replacement of a folder was killed between two renames.
     """
     shown = os.fspath(path)
-    if not shown or "\0" in shown:
-        raise InvalidInput(name, repr(shown), "the name of a file")
     place = Path(os.path.realpath(shown))
     with _one_line(path):
         if foreign is not None and (whole := _rename_what_is_whole(place)):
