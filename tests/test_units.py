@@ -35,12 +35,6 @@ def cloud(lce):
     return sr.compute_cloud(lce, 2_000)
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.mark.parametrize(
     ("name", "lengths", "areas", "volumes", "liters"),
     [

@@ -354,22 +354,3 @@ def test_the_command_line_goes_there_and_back(folder, filament, capsys):
     np.testing.assert_array_equal(
         sr.open_cloud("back.zarr").activation, sr.open_cloud("cloud.zarr").activation
     )
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        (["import", "nothing.json", "a.toml"], "a file that exists"),
-        (["import", "filament.json.csv", "a.zarr"], "--design"),
-        (["import", "binary.csv", "a.zarr", "--design", "filament.json"], "no text"),
-        (["export", "cloud.zarr", "a.csv", "--format", "julia"], "activefilaments"),
-        (["export", "three_chamber_arm", "a.jl"], "FiberArchitecture"),
-    ],
-)
-def test_wrong_input_costs_one_line(arguments, told, folder, capsys):
-    (folder / "binary.csv").write_bytes(bytes(range(256)) * 100)
-    assert run(arguments) == 2
-    message = capsys.readouterr().err
-    assert message.count("\n") == 1
-    assert told in message
-    assert not (folder / arguments[2]).exists()
