@@ -106,12 +106,12 @@ class Console:
     def listening(self) -> Iterator[None]:
         """Print warnings and compilations during a block, with letters that can be printed."""
         compilations, log = _Compilations(), logging.getLogger("softreach")
-        streams = [s for s in (sys.stdout, sys.stderr) if isinstance(s, TextIOWrapper)]
-        before, level = [stream.errors for stream in streams], log.level
+        level = log.level
         log.addHandler(compilations)
         log.setLevel(logging.INFO)
-        for stream in streams:
-            stream.reconfigure(errors="backslashreplace")
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show_warning
@@ -120,9 +120,6 @@ class Console:
             self.set()
             log.removeHandler(compilations)
             log.setLevel(level)
-            for stream, errors in zip(streams, before, strict=True):
-                with suppress(ValueError, OSError):  # closed, or full
-                    stream.reconfigure(errors=errors)
 
     def flush(self) -> None:
         """Write what was printed, so that a full disk is found before the end.
