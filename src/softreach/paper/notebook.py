@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 from softreach.plot.style import pyplot, save_figure
 from softreach.support.files.text import write_text
 
-Numbers = SimpleNamespace  # Numbers that a section computed, by name
+Numbers = SimpleNamespace  # Numbers that a section computed, by name; lists of them are arrays
 
 
 class Verdict(StrEnum):

@@ -18,6 +18,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from softreach.paper.notebook import FULL, QUICK, Finding, Notebook, Numbers, Settings, Verdict
 from softreach.paper.sections import misprints, model, redundancy, sweep, uniqueness, volume
 from softreach.plot.style import pyplot
@@ -49,7 +51,8 @@ class Claim(NamedTuple):
 
     def check(self, numbers: Mapping[str, Any]) -> Finding:
         """Finding from the numbers of its part."""
-        return getattr(SECTIONS[self.part], self.judge)(Numbers(**numbers))
+        known = {k: np.asarray(x) if isinstance(x, list) else x for k, x in numbers.items()}
+        return getattr(SECTIONS[self.part], self.judge)(Numbers(**known))
 
 
 _TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")

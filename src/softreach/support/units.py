@@ -101,11 +101,7 @@ def in_lengths(length: float | None) -> LengthUnit:
 
 
 def as_unit(unit: object, length: float | None = None) -> LengthUnit:
-    """The unit of that name.
-
-    Args:
-        unit: One of `UNITS`, or a unit.
-        length: L [m] of the arm; None where it is not known, and L no unit.
+    """The unit of that name, of which L is one where the length [m] of the arm is known.
 
     Raises:
         InvalidInput: No such unit, or L where it is not known.
@@ -130,10 +126,8 @@ def handy_unit(length: float) -> str:
 def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, float]:
     """The unit that people read a number in, and its size.
 
-    Args:
-        unit: SI unit of the number; "1" for none.
-        value: The number, for a unit of pressure of its size.
-        length: Unit of lengths, areas and volumes.
+    Of an SI unit, "1" for none: that of length for lengths, areas and volumes; of pressures one of
+    the size of the number.
     """
     if power := POWERS.get(unit):
         return length.symbol(power), length.scale(power)
@@ -147,25 +141,16 @@ def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, flo
 def readable(
     value: float, unit: str, length: LengthUnit, error: float = math.nan, *, digits: int = 1
 ) -> str:
-    """A number as people read it, to the first digit of its error: "12.5 mm", "20.3°".
+    """A number in an SI unit as people read it, to some digits of its error: "12.5 mm", "20.3°".
 
-    Args:
-        value: The number.
-        unit: Its SI unit; "1" for none.
-        length: Unit of lengths, areas and volumes.
-        error: How far off it may be, same unit as the number.
-        digits: Number of digits of the error.
+    Lengths, areas and volumes are in the unit of length.
     """
     name, size = readable_unit(unit, value, length)
     return quantity(value / size, name, error / size, digits)
 
 
 def read_length(text: str, length: float | None = None) -> float:
-    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L".
-
-    Args:
-        text: A number and its unit.
-        length: L [m]; None where it is not known, and L no unit.
+    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L" where L is known [m].
 
     Raises:
         ValueError: No finite number, or another unit.
@@ -179,13 +164,7 @@ def read_length(text: str, length: float | None = None) -> float:
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
     """Comma-separated lengths [m], each with its unit or all without; a zero needs none.
 
-    Args:
-        text: What was typed.
-        count: How many there must be.
-        length: As in `read_length`.
-
-    Returns:
-        The lengths; None if the text is anything else.
+    None if the text is anything else than so many of what `read_length` takes.
     """
     parts = text.split(",")
     try:

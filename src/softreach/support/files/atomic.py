@@ -47,11 +47,7 @@ def check_place(
 ) -> Path:
     """The place, absolute and without links, where a file or a folder may be written.
 
-    Args:
-        path: The place.
-        overwrite: Whether what is there may be replaced.
-        foreign: Given for a folder, which is replaced only if it holds nothing foreign.
-        name: What errors call the path.
+    `foreign` is given for a folder, which is replaced only if it holds nothing foreign.
 
     Raises:
         InvalidInput: Something is there that may not be replaced.
@@ -120,13 +116,7 @@ def writing(path: StrPath, *, overwrite: bool = False) -> Iterator[io.BufferedWr
 
 @contextmanager
 def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False) -> Iterator[Path]:
-    """An empty folder beside `path`, which takes its place on success; as `writing`.
-
-    Args:
-        path: The place.
-        foreign: As for `check_place`.
-        overwrite: Whether what is there may be replaced.
-    """
+    """An empty folder beside `path`, which takes its place on success; as `writing`."""
     place = check_place(path, overwrite=overwrite, foreign=foreign)
     new, old = _siblings(place)
     with _one_line(path):

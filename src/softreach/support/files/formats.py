@@ -30,11 +30,6 @@ Formats = Mapping[str, FileFormat]
 def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -> FileFormat:
     """The format that a path names by its suffix.
 
-    Args:
-        path: The path.
-        formats: What can be written there.
-        name: What errors call the path.
-
     Raises:
         InvalidInput: Another suffix; the error lists those there are.
         MissingExtra: The format needs a library that is not installed.
