@@ -546,6 +546,12 @@ def test_numbers_without_an_error_have_five_digits_at_most(words, capsys):
     assert max(len(number.replace(".", "").strip("0")) for number in numbers) == 5
 
 
+def test_a_solution_prints_itself_as_the_command_does(capsys):
+    assert run(["solve", "lce_arm", "--target", "2cm,1cm,6cm"]) == 0
+    (solution,) = sr.solve_inverse(sr.designs.lce_arm(), [[0.02, 0.01, 0.06]])
+    assert capsys.readouterr().out == f"{solution}\n"
+
+
 def test_activations_are_told_in_their_units(capsys):
     assert run(["solve", "three_tendon_robot", "--target=0,0,1"]) == 0
     assert capsys.readouterr().out.count(" N") == 3

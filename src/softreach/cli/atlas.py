@@ -227,7 +227,7 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
 def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
     allowed = "a radius > 0 over the length of each design, like 0.05L"
-    bare = text.removesuffix("L") if text.endswith("L") else ""
+    bare = text[:-1] if text.endswith("L") else ""
     return read_as("alpha", text, lambda _: read_number(bare), allowed, POSITIVE)
 
 

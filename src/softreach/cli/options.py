@@ -24,7 +24,7 @@ from softreach.support.files.formats import (
 )
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in
-from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
+from softreach.support.units import METER, TYPED, LengthUnit, read_length
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -117,8 +117,6 @@ def cloud_of(
     source: str, sampling: Sampling, changes: Changes, unit: str | None
 ) -> tuple[xr.Dataset, sr.Manipulator]:
     """The stored cloud, or one of the design; its design."""
-    if unit is not None:
-        as_unit(unit, 1.0)  # before anything is computed
     if is_stored(source):
         refuse(STORED, **changes.given, **vars(sampling))
         cloud = sr.open_cloud(source)
