@@ -570,7 +570,7 @@ def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):
     np.savetxt(tmp_path / "path.csv", points, delimiter=",", header="x,y,z", comments="")
     out = tmp_path / "activations.csv"
     assert run(["track", "minimal_trunk", str(tmp_path / "path.csv"), "--out", str(out)]) == 0
-    assert "5 of 5 points followed" in capsys.readouterr().out
+    assert "All 5 points are followed: " in capsys.readouterr().out
     found = np.loadtxt(out, delimiter=",", skiprows=1)[:, :3]
     np.testing.assert_allclose(sr.tip_positions(trunk, found), points, atol=1e-8)
 

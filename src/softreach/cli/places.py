@@ -13,10 +13,9 @@ from softreach.cli.values import Whole, fields_of, for_machines
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
-from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 def solve(
@@ -93,29 +92,14 @@ def track(
         out: CSV file for the activations.
     """
     from softreach.export.clouds import path_csv
+    from softreach.inverse.path import end_text
 
     arm = design_from(design, changes, unit)
     options.check_output(out, TABLES, overwrite)
     first = None if start is None else options.activation_of(start, arm, "start")
     tracked = sr.track_path(arm, options.points_in("path", path, arm), first)
     write_text(out, path_csv(tracked), overwrite=overwrite)
-    followed = int((tracked.status == 0).sum())
-    share = f"{followed} of {tracked.sizes['point']} points followed"
-    console.line(f"{share}, up to {_end(tracked, arm.length_unit)}: {out}")
-
-
-def _end(tracked: xr.Dataset, unit: LengthUnit) -> str:
-    end = tracked.attrs["end"]
-    at = f"{unit.rounded(float(tracked.end_length), digits='.5g')} of path"
-    bundle, bound = tracked.attrs["end_bundle"], tracked.attrs["end_bound"]
-    error = unit.rounded(float(tracked.end_length_error), digits=".1g")
-    ends = {
-        "end": "the end of the path",
-        "fold": f"{at}, where the branch turns back (a fold)",
-        "no_start": "nowhere: the first point is not reached",
-        "snaps": f"{at} (± {error}), where the arm snaps",
-    }
-    return ends.get(end, f"{at}, where {bundle} is at its {bound} bound")
+    console.line(f"{out}: {end_text(tracked, arm.length_unit)}")
 
 
 def equilibria(
