@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import softreach as sr
 from softreach.cli import options
@@ -13,9 +13,6 @@ from softreach.cli.values import Whole, fields_of, for_machines
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
-
-if TYPE_CHECKING:
-    pass
 
 
 def solve(
