@@ -56,7 +56,10 @@ class Claim(NamedTuple):
 
 
 _TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
-CLAIMS = tuple(Claim(*name.split("."), **row) for name, row in tomllib.loads(_TEXT).items())
+CLAIMS = tuple(
+    Claim(name.partition(".")[0], name.partition(".")[2], **row)
+    for name, row in tomllib.loads(_TEXT).items()
+)
 """Every statement that is checked, in the paper's order."""
 
 _PAPER = (
