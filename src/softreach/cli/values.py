@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter, Token
 
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.quantity import quantity, read_number, read_whole_number
+from softreach.support.quantity import five_digits, quantity, read_number, read_whole_number
 from softreach.support.units import POWERS, LengthUnit
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def shown(value: Any) -> str:
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "-"
     if isinstance(value, float):
-        return f"{float(f'{value:.5g}'):.6g}"  # without an exponent up to a million
+        return five_digits(value)
     if isinstance(value, int) and not isinstance(value, bool):
         return f"{value:,}"
     if isinstance(value, list | tuple):

@@ -41,7 +41,12 @@ def quantity(value: float, unit: str = "", error: float = math.nan, digits: int 
     """
     if math.isfinite(value) and 0 < error < math.inf:
         return f"{_with_error(value, error, digits)} {unit}".rstrip()
-    return f"{value:.5g}{unit if unit == '°' else f' {unit}'}".rstrip()
+    return f"{five_digits(value)}{unit if unit == '°' else f' {unit}'}".rstrip()
+
+
+def five_digits(value: float) -> str:
+    """A number with five digits that count, and without an exponent up to a million."""
+    return f"{float(f'{value:.5g}'):.6g}"
 
 
 def _with_error(value: float, error: float, digits: int) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import quantity, read_number, read_quantity, unit_names
+from softreach.support.quantity import five_digits, quantity, read_number, read_quantity, unit_names
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -75,7 +75,7 @@ class LengthUnit(NamedTuple):
 
     def place(self, point: Iterable[float]) -> str:
         """A position [m] in words: "(200, 100, 600) mm"."""
-        return f"({', '.join(f'{x / self.size:.5g}' for x in point)}) {self.name}"
+        return f"({', '.join(f'{five_digits(x / self.size)}' for x in point)}) {self.name}"
 
     def scale(self, power: int = 1) -> float:
         """Size of the unit of lengths [m], of areas [m²] for power 2, of volumes [m³] for 3."""
