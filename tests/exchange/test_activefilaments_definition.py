@@ -289,7 +289,7 @@ def test_numbers_of_julia_are_read(tmp_path, filament):
 
 HOSTILE = {
     "words": (b"1,2,3\n1,2,three\n", "'three' in row 2, column 3"),
-    "binary": (b"\xff\xfe\x00\x01\n", "no text"),
+    "binary": (b"\xff\xfe\x00\x01\n", "text in UTF-8"),
     "not finite": (b"1,2,3\n1,nan,3\n", "row 2"),
     "long": (b"9" * 100_000 + b"x", "row 1, column 1"),
 }
