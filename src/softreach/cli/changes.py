@@ -12,6 +12,7 @@ from cyclopts import Group, Parameter
 
 import softreach as sr
 from softreach.cli.values import Number, pairs_in, read_as
+from softreach.support.arguments import as_one_of
 from softreach.support.errors import (
     InvalidDesign,
     InvalidInput,
@@ -71,9 +72,8 @@ class Changes:
         from softreach.arm.parameters import changed
 
         if self.base is not None:
-            points = _POSTURES.get(self.base, self.base)
-            if points not in POINTS:
-                raise InvalidInput("base", self.base, f"one of {', '.join([*_POSTURES, *POINTS])}")
+            words = _POSTURES | {points: points for points in POINTS}
+            points = words[as_one_of("base", self.base, words)]
             arm = arm.replace(base=arm.base.replace(points=points))
         texts, given = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg"), self.given
         of_loads = {name: texts.pop(name) for name in [*texts] if name.startswith("loads.")}

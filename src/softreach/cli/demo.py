@@ -17,8 +17,9 @@ from softreach.cli.options import DEFAULT, OUT, Output, Overwrite, check_output,
 from softreach.cli.values import Whole
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput
-from softreach.support.files.atomic import check_place, writing
+from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PICTURES
+from softreach.support.files.text import write_text
 
 _FILES = {
     "tentacle": ("tentacle.toml", "tentacle.csv"),
@@ -95,10 +96,8 @@ def example(
         raise InvalidInput("example", name, f"one of {', '.join(known)}")
     for file in known[name]:
         check_place(out / file.name, overwrite=overwrite)
-    out.mkdir(parents=True, exist_ok=True)
     for file in known[name]:
-        with writing(out / file.name, overwrite=overwrite) as stream:
-            stream.write(file.read_bytes())
+        write_text(out / file.name, file.read_text("utf-8"), overwrite=overwrite)
         console.line(out / file.name)
 
 

@@ -12,10 +12,10 @@ from importlib.resources import files
 from os import PathLike
 from typing import Any
 
-from softreach.support.arguments import as_flag, as_path
+from softreach.support.arguments import as_path
 from softreach.support.errors import counted
-from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, format_of
+from softreach.support.files.text import write_text
 from softreach.support.quantity import columns
 
 REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}
@@ -79,8 +79,7 @@ class Report:
             InvalidInput: Something is there, or another suffix.
             MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        format_of(path, REPORT)
+        format_of(as_path("path", path), REPORT)
         from jinja2 import Environment, StrictUndefined
 
         text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
@@ -88,8 +87,7 @@ class Report:
         pictures = [[(_source(f), c) for f, c in part.figures()] for part in self.sections]
         parts = list(zip(self.sections, pictures, strict=True))
         page = pages.from_string(text).render(report=self, parts=parts)
-        with writing(path, overwrite=overwrite) as file:
-            file.write(page.encode())
+        write_text(path, page, overwrite=overwrite)
 
 
 class Reported(ABC):
