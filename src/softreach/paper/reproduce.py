@@ -23,6 +23,7 @@ import numpy as np
 from softreach.paper.notebook import FULL, QUICK, Finding, Notebook, Numbers, Settings, Verdict
 from softreach.paper.sections import misprints, model, redundancy, sweep, uniqueness, volume
 from softreach.plot.style import pyplot
+from softreach.support.arguments import as_path
 from softreach.support.errors import InvalidInput, check_installed
 from softreach.support.files.atomic import MARK, check_place
 from softreach.support.files.text import write_text
@@ -98,7 +99,7 @@ def reproduce_paper(
     check_installed("matplotlib", "skimage", "jinja2")
     pyplot()
     settings = QUICK if quick else FULL
-    folder = Path(out) / "quick" if quick else Path(out)
+    folder = Path(as_path("out", out)) / ("quick" if quick else "")
     path, pages = folder / "report.html", folder / "figures"
     check_place(path, overwrite=overwrite, name="out")
     code = b"".join(p.read_bytes() for p in sorted(Path(__file__).parents[1].rglob("*.py")))
