@@ -26,13 +26,6 @@ COMMANDS = [name for name in app if not name.startswith("-")]
 HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    """An empty folder to work in."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory):
     """A cloud on disk."""
@@ -260,15 +253,6 @@ class TestExport:
         assert capsys.readouterr().out == "cloud.npz\n"
         with np.load("cloud.npz") as table:
             np.testing.assert_array_equal(table["tip"], sr.open_cloud(stored).tip)
-
-    def test_an_arm_goes_out_deformed(self, folder):
-        trimesh = pytest.importorskip("trimesh")
-        assert run(["export", "minimal_trunk", "arm.ply", "--activation=-1,0,-0.4"]) == 0
-        low, high = trimesh.load("arm.ply").bounds
-        tip = sr.tip_positions(sr.designs.minimal_trunk(), [[-1.0, 0.0, -0.4]])[0]
-        assert (low < tip).all()
-        assert (tip < high).all()
-        assert high[2] < 0.5  # curled: the arm at rest ends at 1
 
 
 @pytest.mark.parametrize("output", ["table", "json"])
@@ -523,3 +507,80 @@ def test_a_gradient_takes_parameters_as_list_prints_them(printed):
     assert printed(*command, "taper_deg", "--accuracy", "0.1") == printed(
         *command, "taper", "--accuracy", "0.1"
     )
+
+
+# Places and the exact reachable set
+
+
+@pytest.fixture(scope="module")
+def target(trunk):
+    return sr.tip_positions(trunk, [[-0.9, -0.3, -0.6]])[0]
+
+
+def test_a_target_is_solved_and_the_activations_lead_there(trunk, target, capsys):
+    text = ",".join(f"{x:.17g}" for x in target)
+    assert run(["solve", "minimal_trunk", f"--target={text}", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)[0]
+    assert found["status"] == "reached"
+    tips = sr.tip_positions(trunk, found["activations"])
+    np.testing.assert_allclose(tips, np.tile(target, (len(tips), 1)), atol=1e-9)
+
+
+def test_targets_come_from_a_file_with_or_without_a_header(tmp_path, target, capsys):
+    row = ",".join(f"{x:.17g}" for x in target)
+    for header in ("", "x,y,z\n"):
+        path = tmp_path / "targets.csv"
+        path.write_text(f"{header}{row}\n2,0,0\n")
+        assert run(["solve", "minimal_trunk", "--targets", str(path), "--json"]) == 0
+        found = json.loads(capsys.readouterr().out)
+        assert [one["status"] for one in found] == ["reached", "unreachable"]
+        assert found[1]["gap_m"] > 1
+
+
+@pytest.mark.parametrize(
+    "words", ["design lce_arm", "list parameters lce_arm", "solve lce_arm --target 2cm,1cm,6cm"]
+)
+def test_numbers_without_an_error_have_five_digits_at_most(words, capsys):
+    assert run(words.split()) == 0
+    numbers = re.findall(r"(?<![\w.])\d+(?:\.\d+)?", capsys.readouterr().out)
+    assert max(len(number.replace(".", "").strip("0")) for number in numbers) == 5
+
+
+def test_a_solution_prints_itself_as_the_command_does(capsys):
+    assert run(["solve", "lce_arm", "--target", "2cm,1cm,6cm"]) == 0
+    (solution,) = sr.solve_inverse(sr.designs.lce_arm(), [[0.02, 0.01, 0.06]])
+    assert capsys.readouterr().out == f"{solution}\n"
+
+
+def test_activations_are_told_in_their_units(capsys):
+    assert run(["solve", "three_tendon_robot", "--target=0,0,1"]) == 0
+    assert capsys.readouterr().out.count(" N") == 3
+
+
+def test_a_family_that_is_smaller_than_asked_says_so(capsys):
+    arm = sr.designs.redundant_trunk()
+    text = ",".join(f"{x:.17g}" for x in sr.tip_positions(arm, arm.bounds[:, 0])[0])
+    assert run(["solve", "redundant_trunk", f"--target={text}", "--family", "3"]) == 0
+    assert "no others found: further searches end at this one" in capsys.readouterr().out
+
+
+def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):
+    gamma = np.linspace([-0.9, -0.3, -0.6], [-0.5, -0.8, -0.7], 5)
+    points = sr.tip_positions(trunk, gamma)
+    np.savetxt(tmp_path / "path.csv", points, delimiter=",", header="x,y,z", comments="")
+    out = tmp_path / "activations.csv"
+    assert run(["track", "minimal_trunk", str(tmp_path / "path.csv"), "--out", str(out)]) == 0
+    assert "All 5 points are followed: " in capsys.readouterr().out
+    found = np.loadtxt(out, delimiter=",", skiprows=1)[:, :3]
+    np.testing.assert_allclose(sr.tip_positions(trunk, found), points, atol=1e-8)
+
+
+def test_the_reachable_set_is_reported_drawn_and_written(tmp_path, capsys):
+    surface, figure = tmp_path / "reach.ply", tmp_path / "reach.png"
+    arguments = ["reach", "minimal_trunk", "--accuracy", "0.02", "--json"]
+    assert run([*arguments, "-o", str(surface), "--out", str(figure)]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["volume_L3"] == pytest.approx(0.691, abs=0.002)
+    assert 0 < found["unreachability"] < 1
+    assert surface.stat().st_size > 10_000
+    assert figure.stat().st_size > 10_000

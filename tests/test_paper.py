@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from softreach.cli.app import run
 from softreach.paper import reproduce, reproduce_paper
 from softreach.paper.notebook import QUICK, Notebook, Verdict
 from softreach.paper.reproduce import CLAIMS
-from softreach.paper.sections import uniqueness
+from softreach.paper.sections import uniqueness, volume
 from softreach.paper.sections.misprints import printed_deltas
 from softreach.paper.sections.sweep import shapes
 from softreach.plot import atlas, axes, style
@@ -63,7 +64,7 @@ def checked(part, numbers, words):
 
 
 def test_every_figure_of_the_paper_is_there_as_png_and_pdf(folder):
-    pictures = [p for part in reproduce.PARTS for p in notebook(folder, part)["pictures"]]
+    pictures = [p for part in reproduce.SECTIONS for p in notebook(folder, part)["pictures"]]
     labels = {label for label, _, _ in pictures}
     assert labels == {"1b", "1c", "1d", "2a", "2b", "3a", "3b", "3c", "4a", "4b-d", ""}
     for _, name, _ in pictures:
@@ -165,11 +166,10 @@ def test_what_only_the_full_sizes_test_is_marked_so_in_a_quick_run(folder):
 
 def test_a_part_computed_by_itself_is_that_of_a_whole_run_to_the_last_bit(folder, tmp_path):
     """As when a run is killed and resumed; all but the seconds that it took."""
-    notes = Notebook(tmp_path, "volume", notebook(folder, "volume")["key"])
-    notes.numbers = reproduce.PARTS["volume"](TINY, notes)
-    notes.close(0.0)
-    whole = notebook(folder, "volume") | {"seconds": 0.0}
-    assert json.loads((tmp_path / "volume.json").read_text()) == whole
+    whole = notebook(folder, "volume")
+    Notebook(tmp_path, "volume", whole["key"]).fill(volume.computed, TINY)
+    again = json.loads((tmp_path / "volume.json").read_text())
+    assert again | {"seconds": 0.0} == whole | {"seconds": 0.0}
     figure = "alpha_dependence.pdf"
     before = (folder / "quick" / "figures" / figure).read_bytes()
     assert (tmp_path / figure).read_bytes() == before
@@ -189,7 +189,8 @@ def test_both_activations_of_the_example_reach_the_same_tip(folder):
 
 def test_a_finished_report_is_only_written_again(folder, small, monkeypatch):
     before = (folder / "quick" / "report.html").read_text()
-    monkeypatch.setattr(reproduce, "PARTS", dict.fromkeys(reproduce.PARTS))  # nothing to call
+    for section in reproduce.SECTIONS.values():
+        monkeypatch.setattr(section, "computed", None)  # nothing to call
     assert reproduce_paper(folder, quick=True, overwrite=True).read_text() == before
 
 
@@ -203,13 +204,13 @@ def test_an_interrupted_report_keeps_its_finished_parts(tmp_path, small, monkeyp
                 raise KeyboardInterrupt
             return {name: 1.0}
 
-        return compute
+        return SimpleNamespace(computed=compute)
 
     monkeypatch.setattr(reproduce, "CLAIMS", ())
-    monkeypatch.setattr(reproduce, "PARTS", {"a": part("a"), "b": part("b", fails=True)})
+    monkeypatch.setattr(reproduce, "SECTIONS", {"a": part("a"), "b": part("b", fails=True)})
     with pytest.raises(KeyboardInterrupt):
         reproduce_paper(tmp_path, quick=True)
-    monkeypatch.setattr(reproduce, "PARTS", {"a": part("a"), "b": part("b")})
+    monkeypatch.setattr(reproduce, "SECTIONS", {"a": part("a"), "b": part("b")})
     reproduce_paper(tmp_path, quick=True, overwrite=True)
     assert calls == ["a", "b", "b"]
     monkeypatch.setattr(reproduce, "QUICK", replace(TINY, seed=1))  # other sizes: all again

@@ -35,12 +35,6 @@ def cloud(lce):
     return sr.compute_cloud(lce, 2_000)
 
 
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.mark.parametrize(
     ("name", "lengths", "areas", "volumes", "liters"),
     [
@@ -371,8 +365,3 @@ def test_a_number_with_a_unit_is_read_to_the_last_bit(text, unit, value):
 def test_what_is_no_finite_number_with_a_unit_of_its_kind_is_refused(text, unit):
     with pytest.raises(ValueError, match=r"^"):
         read_quantity(text.format(*[unit_names(unit)[0]] * 2), unit)
-
-
-@given(value=st.floats(-1e200, 1e200))
-def test_a_number_in_its_si_unit_is_read_as_it_was_written(value):
-    assert read_quantity(f"{value!r}kg", "kg") == value

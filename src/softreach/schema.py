@@ -15,6 +15,7 @@ from softreach.arm.number import as_numbers
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.quantity import five_digits
 from softreach.support.versions import SCHEMA_VERSION, versions
 
 if TYPE_CHECKING:
@@ -259,6 +260,17 @@ def activation_units(activation: xr.DataArray) -> tuple[str, ...]:
     if "unit" in activation.coords:
         return tuple(str(unit) for unit in activation["unit"].values)
     return (str(activation.attrs.get("units", "1")),) * count
+
+
+def activation_text(
+    arm: Manipulator, values: Iterable[float], names: Sequence[str] | None = None
+) -> str:
+    """Activations with the names and units of their bundles: "left -1, right 0.5 N"."""
+    texts = []
+    for name, value, unit in zip(names or arm.input_names, values, _units(arm, names), strict=True):
+        text = five_digits(round(value, 6) + 0.0) if unit == "1" else f"{five_digits(value)} {unit}"
+        texts.append(f"{name} {text}")
+    return ", ".join(texts)
 
 
 def activation_attributes(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, str]:

@@ -51,7 +51,6 @@ CONVERTERS = {
     "as_points": (arrays.as_points, (), (*ROWS, *NOT_FINITE, *SHAPES)),
     "as_stations": (arrays.as_stations, (), (*ROWS, [math.nan], np.zeros((2, 2)))),
     "as_directions": (arrays.as_directions, (), (*ROWS, *NOT_FINITE, *SHAPES, [0.0, 0.0, 0.0])),
-    "as_shares": (arrays.as_shares, (), (*ROWS, [], 0.5, [-0.1], [1.1], [math.nan])),
     "as_indices": (arrays.as_indices, (3, "rows"), (*ROWS, [0.5], [-1], [3], [[1]])),
     "as_faces": (arrays.as_faces, (3,), (*ROWS, [[0.5, 1, 2]], [[0, 1, 3]], [0, 1, 2])),
 }

@@ -63,12 +63,6 @@ def test_letters_that_cannot_be_shown_are_escaped(streams):
     assert printed(out) == "L³ ± é \\u03b3\ncaf\\udce9.toml\n"
 
 
-def test_the_streams_are_as_they_were_afterwards(streams):
-    out, err = streams("ascii")
-    run(["--version"])
-    assert (out.errors, err.errors) == ("strict", "strict")
-
-
 class Gone(io.RawIOBase):
     """A pipe that nobody reads any more."""
 

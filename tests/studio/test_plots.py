@@ -11,12 +11,11 @@ import xarray as xr
 from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.inverse.path import PathStatus
+from softreach.inverse.path import PathStatus, end_text
 from softreach.studio.figures import swept_volumes
 from softreach.studio.reach import Quality
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import MOST_POINTS, StudioState, TipPath
-from softreach.studio.tabs.move import end_text
 from softreach.support.errors import InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
@@ -74,9 +73,13 @@ def test_a_path_that_cannot_be_followed_is_refused(points):
 
 @pytest.mark.parametrize("end", [status for status in PathStatus if status > 0])
 def test_every_end_of_a_path_is_said_in_words(end):
-    known = {"status": ("point", [PathStatus.FOLLOWED, end]), "end_length": 0.2}
+    known = {
+        "status": ("point", [PathStatus.FOLLOWED, end]),
+        "end_length": 0.2,
+        "end_length_error": 1e-3,
+    }
     about = {"end": end.name.lower(), "end_bundle": "left", "end_bound": "lower"}
-    text = end_text(xr.Dataset(known, attrs=about), STATE.design)
+    text = end_text(xr.Dataset(known, attrs=about), STATE.design.length_unit)
     assert text.endswith(".")
     assert "{" not in text
 

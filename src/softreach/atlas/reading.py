@@ -283,7 +283,7 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
 
     def read(name: str, place: Any = ...) -> NDArray[Any]:
         array = store.array(name)
-        with store.watch.noting() as noted:
+        with store.opened.noting() as noted:
             values = np.array(array[place])
         for chunk, error in noted.items():
             damaged.setdefault(store.number(chunk), str(error))
@@ -299,7 +299,7 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
         of_designs = explained if chunk.array == "message" else known
         return chunk.array != "status" and bool(of_designs[store.number(chunk)])
 
-    store.watch.required = required
+    store.opened.required = required
     names = ("metrics", "curvature") if command.profiles else ("metrics",)
     tables = {
         name: read(name) if known.any() else np.full(store.array(name).shape, np.nan)
@@ -361,7 +361,7 @@ def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, floa
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
-    for name in store.watch.digests.keys() - {*PER_DESIGN}:
+    for name in store.opened.digests.keys() - {*PER_DESIGN}:
         _ = store.array(name)[...]
     numbers = range(store.command.space.size) if tips else ()
     content = contents(store, tips_of=numbers)

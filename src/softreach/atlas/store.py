@@ -38,7 +38,6 @@ from softreach.support.files.stores import (
     DamagedStore,
     Opened,
     StoreFailed,
-    Watch,
     absolute,
     opened_store,
     place_of,
@@ -96,7 +95,7 @@ class AtlasStore:
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
         store = cls(location, command, opened)  # this command has all functions
-        with writing(location), opened.watch.noting():  # what is damaged counts as missing
+        with writing(location), opened.noting():  # what is damaged counts as missing
             _complete(store)
         return store
 
@@ -118,11 +117,6 @@ class AtlasStore:
         opened.check_arrays()
         return cls(location, command, opened)
 
-    @property
-    def watch(self) -> Watch:
-        """What notices damage."""
-        return self.opened.watch
-
     def array(self, name: str) -> Any:
         """One of the arrays, which writes also chunks that are empty."""
         if name not in self._arrays:
@@ -134,7 +128,7 @@ class AtlasStore:
 
     def status(self) -> NDArray[np.uint8]:
         """The status of every design, TODO to DAMAGED, in C order, shape (designs,)."""
-        with self.watch.noting() as noted:
+        with self.opened.noting() as noted:
             status = np.array(self.array("status")[...]).ravel()
         status[[self.number(chunk) for chunk in noted]] = DAMAGED
         return status
@@ -197,7 +191,7 @@ def _with_command(
     text = None if opened is None else opened.group.attrs.get("command")
     if opened is None or not isinstance(text, str):
         raise InvalidInput("store", location, allowed)
-    opened.watch.required = lambda chunk: chunk.array not in PER_DESIGN
+    opened.required = lambda chunk: chunk.array not in PER_DESIGN
     return opened, Command.from_json(text)
 
 
@@ -268,7 +262,7 @@ def _complete(store: AtlasStore) -> None:
     from zarr.errors import ContainsArrayError
 
     for plan in array_plans(store.command):
-        with store.watch.noting() as noted:
+        with store.opened.noting() as noted:
             there = plan.name in store.opened.group
             if there and plan.name not in PER_DESIGN:
                 _ = store.array(plan.name)[...]

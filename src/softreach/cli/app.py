@@ -73,16 +73,16 @@ Start with
     console=cast(Any, HelpConsole()),
     default_parameter=Parameter(negative=(), show_default=_shown_default),
 )
-_titles = {title: Group(title, sort_key=k - 9) for k, (title, _) in enumerate(_GROUPS)}
-for _title, _words in _GROUPS:
-    for _place, _name in enumerate(_word.partition(":")[2] for _word in _words.split()):
-        _function = f"{MODULES[_name]}:{_FUNCTIONS.get(_name, _name.replace('-', '_'))}"
-        _where = f"softreach.cli.{_function}"
-        app.command(_where, name=_name, group=_titles[_title], sort_key=_place)
+for _rank, (_title, _words) in enumerate(_GROUPS):
+    _group = Group(_title, sort_key=_rank - 9)
+    for _place, _word in enumerate(_words.split()):
+        _module, _name = _word.split(":")
+        _where = f"softreach.cli.{_module}:{_FUNCTIONS.get(_name, _name.replace('-', '_'))}"
+        app.command(_where, name=_name, group=_group, sort_key=_place)
 app.meta.suppress_keyboard_interrupt = False
 app.register_install_completion_command(add_to_startup=False)
 for _flag in ("--help", "--version", "--install-completion"):
-    app[_flag].group = _titles["More"]
+    app[_flag].group = _group  # the last
 
 
 def _always(*names: str, help: str) -> Parameter:

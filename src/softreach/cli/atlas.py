@@ -12,10 +12,9 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Whole, pairs_in, read_positive, rows_of
-from softreach.support.arguments import as_integer
-from softreach.support.errors import InvalidInput, NotPossible, counted
-from softreach.support.files.formats import check_installed
+from softreach.cli.values import Whole, pairs_in, read_as, rows_of
+from softreach.support.arguments import POSITIVE, as_integer
+from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
 from softreach.support.files.text import read_text
 from softreach.support.quantity import read_number
 
@@ -219,7 +218,7 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
         options.refuse("with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:
         return None
-    check_installed(("distributed", "cluster"))
+    check_installed("distributed")
     from distributed import Client
 
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
@@ -228,8 +227,8 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
 def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
     allowed = "a radius > 0 over the length of each design, like 0.05L"
-    bare = text.removesuffix("L") if text.endswith("L") else ""
-    return read_positive("alpha", text, lambda _: read_number(bare), allowed)
+    bare = text[:-1] if text.endswith("L") else ""
+    return read_as("alpha", text, lambda _: read_number(bare), allowed, POSITIVE)
 
 
 def _shard(text: str) -> tuple[int, int]:

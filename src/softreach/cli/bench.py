@@ -12,13 +12,14 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, pairs_in, read_positive
+from softreach.cli.values import Number, Whole, as_read, pairs_in, read_as
 from softreach.support import progress
+from softreach.support.arguments import POSITIVE
 from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_table
-from softreach.support.quantity import columns, quantity
-from softreach.support.units import TYPED, LengthUnit, read_length, readable_unit
+from softreach.support.quantity import columns
+from softreach.support.units import TYPED, LengthUnit, read_length, readable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,9 +57,7 @@ def calibrate(
     out: options.Out = None,
     report: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
     table: Annotated[Path | None, Parameter(group=options.OUTPUT)] = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Fit numbers of a design to measured poses, with honest errors.
 
@@ -90,10 +89,10 @@ def calibrate(
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.support.report import REPORT
 
-    arm = design_from(design, changes, unit)
+    arm = design_from(design, changes, output.unit)
     outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
     for path, formats in outputs or [(None, {})]:
-        options.check_output(path, formats, overwrite)
+        options.check_output(path, formats, output.overwrite)
     with progress.bar("fitting", None) as step:
         result = sr.calibrate(
             arm,
@@ -111,21 +110,22 @@ def calibrate(
             seed=seed,
             progress=step,
         )
-    if json:
+    if output.json:
         console.json(_record(result))
     else:
         console.line(f"calibration of {design}: {result.report(arm.length_unit.name)}")
     if out is not None:
-        result.save(out, overwrite=overwrite)
+        result.save(out, overwrite=output.overwrite)
     if table is not None:
-        write_table(table, result.table(options.written_unit(arm).name), overwrite=overwrite)
-        console.written(table, options.written_unit(arm))
+        written = options.written_unit(arm)
+        write_table(table, result.table(written.name), overwrite=output.overwrite)
+        console.written(table, written)
     if report is not None:
-        result.report(arm.length_unit.name).save(report, overwrite=overwrite)
+        result.report(arm.length_unit.name).save(report, overwrite=output.overwrite)
 
 
 def _noise(text: str) -> float:
-    return read_positive("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})")
+    return read_as("noise", text, read_length, f"a length > 0 such as 0.2mm ({TYPED})", POSITIVE)
 
 
 def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
@@ -183,9 +183,7 @@ def plan_poses(
     seed: Whole = 0,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Choose the poses to measure for a calibration.
 
@@ -203,9 +201,9 @@ def plan_poses(
         seed: Seed of candidates and of their order.
         out: Write the poses as a CSV file to fill in.
     """
-    arm = design_from(design, changes, unit)
+    arm = design_from(design, changes, output.unit)
     width = _noise(noise)
-    options.check_output(out, TABLES, overwrite)
+    options.check_output(out, TABLES, output.overwrite)
     plan = sr.calibration.plan_poses(
         arm,
         free_names(arm, free),
@@ -215,27 +213,26 @@ def plan_poses(
         seed=seed,
     )
     found = plan.to_dataset(width)
-    if json:
+    if output.json:
         poses = {"inputs": found["input"].values, "poses": found["activation"].values}
         console.json({"noise_m": width, **poses, "numbers": _numbers(found)})
     else:
         seen = ", ".join(plan.markers)
         console.line(
             f"{n} poses of {design} with {seen}, "
-            f"noise {arm.length_unit.rounded(width, digits='.6g')}"
+            f"noise {arm.length_unit.rounded(width, digits='.5g')}"
         )
         for line in columns([("number", "to be known", "share"), *_rows(found, arm.length_unit)]):
             console.line(f"  {line}")
     if out is not None:
-        plan.save(out, overwrite=overwrite)
+        plan.save(out, overwrite=output.overwrite)
 
 
 def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     names = ("number", "unit", "value", "sigma")
     for name, own, value, width in zip(*(found[k].values.tolist() for k in names), strict=True):
-        shown, size = readable_unit(own, value, unit)
         share = f"{100 * width / abs(value):.2g} %" if value else "-"
-        yield name, quantity(value / size, shown, width / size, digits=2), share
+        yield name, readable(value, own, unit, width, digits=2), share
 
 
 def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:

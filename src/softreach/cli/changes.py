@@ -12,7 +12,15 @@ from cyclopts import Group, Parameter
 
 import softreach as sr
 from softreach.cli.values import Number, pairs_in, read_as
-from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, did_you_mean, warn
+from softreach.support.arguments import as_one_of
+from softreach.support.errors import (
+    InvalidDesign,
+    InvalidInput,
+    NotPossible,
+    Range,
+    did_you_mean,
+    warn,
+)
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import as_unit
 
@@ -64,18 +72,14 @@ class Changes:
         from softreach.arm.parameters import changed
 
         if self.base is not None:
-            points = _POSTURES.get(self.base, self.base)
-            if points not in POINTS:
-                raise InvalidInput("base", self.base, f"one of {', '.join([*_POSTURES, *POINTS])}")
+            words = _POSTURES | {points: points for points in POINTS}
+            points = words[as_one_of("base", self.base, words)]
             arm = arm.replace(base=arm.base.replace(points=points))
-        texts: dict[str, object] = dict(
-            pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg")
-        )
+        texts, given = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg"), self.given
         of_loads = {name: texts.pop(name) for name in [*texts] if name.startswith("loads.")}
-        angles = {"revolution_deg": self.revolution_deg, "taper_deg": self.taper_deg}
-        given = {name: value for name, value in angles.items() if value is not None}
-        arm = changed(arm, _values(arm, [*given.items(), *texts.items()]))
-        if of_loads or {"payload", "gravity", "tip_force"} & self.given.keys():
+        angles = [(name, given[name]) for name in ("revolution_deg", "taper_deg") if name in given]
+        arm = changed(arm, _values(arm, [*angles, *texts.items()]))
+        if of_loads or {"payload", "gravity", "tip_force"} & given.keys():
             arm = self._loaded(arm, keep=bool(of_loads))
             arm = changed(arm, _values(arm, [*of_loads.items()]))
         return arm.at_point(self.point)
@@ -168,41 +172,31 @@ def _unchanged(text: str) -> sr.Manipulator:
 def read_mass(name: str, text: str) -> float:
     """A mass [kg] that was written with its unit."""
     allowed = f"a mass >= 0 with its unit ({', '.join(unit_names('kg'))}), such as 200g"
-    mass = read_as(name, text, lambda text: read_quantity(text, "kg"), allowed)
-    if mass < 0:
-        raise InvalidInput(name, text, allowed)
-    return mass
+    return read_as(name, text, lambda text: read_quantity(text, "kg"), allowed, Range(0.0))
 
 
 def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:
     """Three numbers x,y,z, in the SI unit if none follows the last."""
     names = unit_names(unit)
-    written = max((name for name in names if text.rstrip().endswith(name)), key=len, default="")
-    parts = text.rstrip().removesuffix(written).split(",")
-    try:
-        values = tuple(read_quantity(f"{part}{written or names[0]}", unit) for part in parts)
-    except ValueError:
-        values = ()
-    if len(values) != 3:
-        allowed = f"{others}three finite numbers x,y,z in {unit} ({', '.join(names)})"
-        raise InvalidInput(name, text, allowed)
-    return values
+
+    def read(text: str) -> tuple[float, ...]:
+        written = max((name for name in names if text.endswith(name)), key=len, default="")
+        x, y, z = text.removesuffix(written).split(",")
+        return tuple(read_quantity(f"{part}{written or names[0]}", unit) for part in (x, y, z))
+
+    allowed = f"{others}three finite numbers x,y,z in {unit} ({', '.join(names)})"
+    return read_as(name, text.rstrip(), read, allowed)
 
 
 def _values(arm: sr.Manipulator, written: Sequence[tuple[str, object]]) -> dict[str, float]:
-    """Name of a parameter -> value in its unit, from what was written under any of its names."""
     from softreach.arm.parameters import Written, find_parameter
 
     values: dict[str, float] = {}
-    if not written:
-        return values
-    names = Written.of(arm)
+    names = Written.of(arm) if written else Written({})
     for key, value in written:
         name = key if key in names.by_key else find_parameter(arm, key).name
-        parameter = names.by_key[name]
-        if parameter.name in values:
+        own = names.by_key[name].name
+        if own in values:
             raise InvalidInput("set", key, "given once, under one of its names")
-        values[parameter.name] = read_as(
-            key, value, partial(names.number, name), names.allowed(name)
-        )
+        values[own] = read_as(key, value, partial(names.number, name), names.allowed(name))
     return values

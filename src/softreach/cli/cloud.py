@@ -28,9 +28,7 @@ def cloud(
     tol: Number = 1e-6,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Sample the reachability cloud of a design and store it as Zarr.
 
@@ -42,14 +40,14 @@ def cloud(
     """
     from softreach.cloud.clouds import CLOUD_STORE
 
-    arm = design_from(design, changes, unit)
+    arm = design_from(design, changes, output.unit)
     out = out or Path(f"{Path(design).stem}.zarr")
-    options.check_output(out, CLOUD_STORE, overwrite)
+    options.check_output(out, CLOUD_STORE, output.overwrite)
     arguments = sampling.arguments
     start = perf_counter()
     dataset = sr.compute_cloud(arm, **arguments, tol=tol)
     seconds = perf_counter() - start
-    sr.save_cloud(dataset, out, overwrite=overwrite)
+    sr.save_cloud(dataset, out, overwrite=output.overwrite)
     rows: Rows = {
         "samples": (sampling.count, ""),
         "sampler": (arguments["sampler"], ""),
@@ -65,7 +63,7 @@ def cloud(
         "lowest tip": (float(dataset.tip[:, 2].min()), "m"),
         "cloud": (str(out), ""),
     }
-    console.rows(f"cloud of {design}", rows, json, arm)
+    console.rows(f"cloud of {design}", rows, output.json, arm)
 
 
 def volume(
@@ -76,9 +74,7 @@ def volume(
     sampling: options.Sampling = options.SAMPLING,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Estimate volumes and unreachability from a cloud.
 
@@ -94,9 +90,11 @@ def volume(
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.schema import is_stable
 
-    options.check_output(out, SURFACE_FILES, overwrite)
+    options.check_output(out, SURFACE_FILES, output.overwrite)
     options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
-    cloud, arm = options.cloud_of(source, sampling, changes, unit, check_hull_memory)
+    if not options.is_stored(source):
+        check_hull_memory(sampling.count)
+    cloud, arm = options.cloud_of(source, sampling, changes, output.unit)
     bias = cloud.attrs["sampler"] == "uniform"
     concave = sr.concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
     rows = volume_rows(concave, sr.convex_hull(cloud.tip))
@@ -106,10 +104,11 @@ def volume(
         rows = {name: rows[name] for name in ("points", "alpha")}
         rows |= {"area (in one plane)": (areas[0], "m²"), "convex area": (areas[1], "m²")}
         rows["unreachability"] = (share, "")
-    console.rows(f"volume of {source}", rows, json, arm)
+    console.rows(f"volume of {source}", rows, output.json, arm)
     if out is not None:
-        sr.export.export_mesh(concave, out, unit=options.written_unit(arm), overwrite=overwrite)
-        console.written(out, options.written_unit(arm))
+        written = options.written_unit(arm)
+        sr.export.export_mesh(concave, out, unit=written, overwrite=output.overwrite)
+        console.written(out, written)
 
 
 _BYTES = 700  # of memory that a sample and its share of the triangulation take at most

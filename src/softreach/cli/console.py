@@ -15,7 +15,7 @@ from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 import softreach as sr
-from softreach.cli.values import Rows, key, plain, rows_for_machines, rows_for_people, shown
+from softreach.cli.values import Rows, for_machines, for_people, plain, shown
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
 from softreach.support.quantity import columns
@@ -34,7 +34,6 @@ _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]"
 
 
 def _printable(text: object) -> str:
-    """The text with such characters as backslash escapes."""
     return _COMMANDS.sub(lambda match: ascii(match[0])[1:-1], str(text))
 
 
@@ -74,12 +73,11 @@ class Console:
             arm: The design whose unit people see, and whose length is the unit L for machines.
         """
         if as_json:
-            each = rows_for_machines(rows, None if arm is None else arm.length)
-            self.json({key(name, unit): value for name, value, unit in each})
+            self.json(for_machines(rows, None if arm is None else arm.length))
             return
         self.line(title)
-        texts = rows_for_people(rows, METER if arm is None else arm.length_unit)
-        for line in columns([(name, text) for name, text in texts.items()]):
+        unit = METER if arm is None else arm.length_unit
+        for line in columns([*for_people(rows, unit)]):
             self.line(f"  {line}")
 
     def table(self, records: Sequence[Mapping[str, Any]], as_json: bool) -> None:
@@ -108,12 +106,12 @@ class Console:
     def listening(self) -> Iterator[None]:
         """Print warnings and compilations during a block, with letters that can be printed."""
         compilations, log = _Compilations(), logging.getLogger("softreach")
-        streams = [s for s in (sys.stdout, sys.stderr) if isinstance(s, TextIOWrapper)]
-        before, level = [stream.errors for stream in streams], log.level
+        level = log.level
         log.addHandler(compilations)
         log.setLevel(logging.INFO)
-        for stream in streams:
-            stream.reconfigure(errors="backslashreplace")
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show_warning
@@ -122,9 +120,6 @@ class Console:
             self.set()
             log.removeHandler(compilations)
             log.setLevel(level)
-            for stream, errors in zip(streams, before, strict=True):
-                with suppress(ValueError, OSError):  # closed, or full
-                    stream.reconfigure(errors=errors)
 
     def flush(self) -> None:
         """Write what was printed, so that a full disk is found before the end.

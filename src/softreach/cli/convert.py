@@ -47,7 +47,7 @@ def export(
         raise InvalidInput("format", format, "activefilaments, or left out")
     if options.is_stored(source):
         options.refuse("on a cloud, which has many", activation=activation)
-        options.refuse("on a stored cloud: give the design instead", **changes.given)
+        options.refuse(options.STORED, **changes.given)
         write = _export_pair if format else _export_cloud
         write(source, out, overwrite, unit)
     elif format is not None and out.suffix != ".jl":
@@ -108,9 +108,7 @@ def import_file(
     *,
     design: str | None = None,
     tol: Number | None = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Convert a filament or a cloud of ActiveFilaments.jl.
 
@@ -129,13 +127,13 @@ def import_file(
     from softreach.cloud.clouds import CLOUD_STORE
     from softreach.exchange.activefilaments import read_cloud, read_design
 
-    rows: Rows
+    kind = "filament" if source.suffix == ".json" else "cloud"
     if source.suffix == ".json":
         options.refuse("on a filament, only on a cloud", design=design, tol=tol)
-        options.check_output(out, DESIGN_FILE, overwrite)
-        arm = shown_in(unit, read_design(source))
-        arm.save(out, overwrite=overwrite)
-        rows = {
+        options.check_output(out, DESIGN_FILE, output.overwrite)
+        arm = shown_in(output.unit, read_design(source))
+        arm.save(out, overwrite=output.overwrite)
+        rows: Rows = {
             "length": (arm.length, "m"),
             "rings": (len(arm.section.rings), ""),
             "bundle names": (list(arm.bundle_names), ""),
@@ -147,15 +145,13 @@ def import_file(
         raise NotPossible("a cloud needs the design that it was computed for: --design NAME.toml")
     else:
         given = read_design(design) if design.endswith(".json") else design_from(design)
-        arm = shown_in(unit, given)
-        options.check_output(out, CLOUD_STORE, overwrite)
+        arm = shown_in(output.unit, given)
+        options.check_output(out, CLOUD_STORE, output.overwrite)
         cloud = read_cloud(arm, source, tol=1e-6 if tol is None else tol)
-        sr.save_cloud(cloud, out, overwrite=overwrite)
+        sr.save_cloud(cloud, out, overwrite=output.overwrite)
         rows = {
             "samples": (cloud.sizes["sample"], ""),
             "largest difference of tips": (float(cloud.attrs["largest_tip_difference"]), "m"),
             "cloud": (str(out), ""),
         }
-    console.rows(
-        f"{'filament' if source.suffix == '.json' else 'cloud'} of {source}", rows, json, arm
-    )
+    console.rows(f"{kind} of {source}", rows, output.json, arm)

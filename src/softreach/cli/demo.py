@@ -13,12 +13,13 @@ import softreach as sr
 from softreach.cli.changes import design_from
 from softreach.cli.cloud import check_hull_memory, volume_rows
 from softreach.cli.console import console
-from softreach.cli.options import OUT, AsJson, Overwrite, Unit, check_output, written_unit
+from softreach.cli.options import DEFAULT, OUT, Output, Overwrite, check_output, written_unit
 from softreach.cli.values import Whole
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput
-from softreach.support.files.atomic import check_place, writing
+from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PICTURES
+from softreach.support.files.text import write_text
 
 _FILES = {
     "tentacle": ("tentacle.toml", "tentacle.csv"),
@@ -32,9 +33,7 @@ def demo(
     *,
     n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 400_000,
     out: Annotated[Path, OUT] = Path("out"),
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    output: Output = DEFAULT,
 ) -> None:
     """Start here: cloud, volumes and picture of the paper's design.
 
@@ -51,32 +50,32 @@ def demo(
     from softreach.export.clouds import CLOUD_FILES
 
     start = perf_counter()
-    arm = design_from("minimal_trunk", unit=unit)
+    arm = design_from("minimal_trunk", unit=output.unit)
     formats = {"design.toml": DESIGN_FILE, "cloud.zarr": CLOUD_STORE, "cloud.png": PICTURES}
     formats |= {"cloud.ply": CLOUD_FILES, "hull.ply": CLOUD_FILES}
     for name, kinds in formats.items():
-        check_output(out / name, kinds, overwrite)
+        check_output(out / name, kinds, output.overwrite)
     check_hull_memory(n)
     cloud = sr.compute_cloud(arm, n)
     computed = perf_counter() - start
     written = written_unit(arm)
     hulls = partial(sr.concave_hull, cloud.tip, bias=True), partial(sr.convex_hull, cloud.tip)
     with parallel.meanwhile(lambda: [make() for make in hulls]) as made:
-        arm.save(out / "design.toml", overwrite=overwrite)
-        sr.save_cloud(cloud, out / "cloud.zarr", overwrite=overwrite)
-        sr.export.export_cloud(cloud, out / "cloud.ply", unit=written, overwrite=overwrite)
+        arm.save(out / "design.toml", overwrite=output.overwrite)
+        sr.save_cloud(cloud, out / "cloud.zarr", overwrite=output.overwrite)
+        sr.export.export_cloud(cloud, out / "cloud.ply", unit=written, overwrite=output.overwrite)
         shape = sr.configuration(arm, [-1.0, 0.0, -0.4])
         figure = sr.plot.plot_views(cloud, arm, shape, unit=arm.length_unit)
-        sr.plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
+        sr.plot.save_figure(figure, out / "cloud.png", overwrite=output.overwrite)
         concave, convex = made()
-    sr.export.export_mesh(concave, out / "hull.ply", unit=written, overwrite=overwrite)
+    sr.export.export_mesh(concave, out / "hull.ply", unit=written, overwrite=output.overwrite)
     for name in ("cloud.ply", "hull.ply"):
         console.written(out / name, written)
     rows = volume_rows(concave, convex)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
     rows["written"] = ([str(out / name) for name in formats], "")
-    console.rows("minimal trunk, revolution 108°, taper 2°", rows, json, arm)
+    console.rows("minimal trunk, revolution 108°, taper 2°", rows, output.json, arm)
 
 
 def example(
@@ -97,10 +96,8 @@ def example(
         raise InvalidInput("example", name, f"one of {', '.join(known)}")
     for file in known[name]:
         check_place(out / file.name, overwrite=overwrite)
-    out.mkdir(parents=True, exist_ok=True)
     for file in known[name]:
-        with writing(out / file.name, overwrite=overwrite) as stream:
-            stream.write(file.read_bytes())
+        write_text(out / file.name, file.read_text("utf-8"), overwrite=overwrite)
         console.line(out / file.name)
 
 

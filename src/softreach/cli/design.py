@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import softreach as sr
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.options import AsJson, Design, Out, Overwrite, Unit, check_output, refuse
+from softreach.cli.options import DEFAULT, Design, Out, Output, check_output, refuse
 from softreach.cli.values import Rows, to_degrees
-from softreach.support.errors import InvalidInput, NotPossible, no_warnings
+from softreach.support.errors import NotPossible, no_warnings
 
 if TYPE_CHECKING:
     from softreach.rest import Rest
@@ -25,9 +25,7 @@ def design(
     schema: bool = False,
     changes: Changes = UNCHANGED,
     out: Out = None,
-    overwrite: Overwrite = False,
-    unit: Unit = None,
-    json: AsJson = False,
+    output: Output = DEFAULT,
 ) -> None:
     """Describe a design: angles, radii, stiffness, weight, warnings.
 
@@ -43,7 +41,7 @@ def design(
     from softreach.arm.design_file import DESIGN_FILE
 
     if schema:
-        given = {"out": out, "overwrite": overwrite, "unit": unit}
+        given = {"out": out, "overwrite": output.overwrite, "unit": output.unit}
         refuse("with --schema", **given, **changes.given)
         from softreach.arm.design_file.schema import json_schema
 
@@ -52,14 +50,14 @@ def design(
     if design is None:
         raise NotPossible("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
-        arm = design_from(design, changes, unit)
-    check_output(out, DESIGN_FILE, overwrite)
+        arm = design_from(design, changes, output.unit)
+    check_output(out, DESIGN_FILE, output.overwrite)
     facts = sr.describe(arm)
     if out is not None:
-        arm.save(out, overwrite=overwrite)
-    details = _for_machines(arm, facts) if json else _bundle_rows(arm, facts)
-    console.rows(f"design {design}", _rows(arm, facts) | details, json, arm)
-    if not json:
+        arm.save(out, overwrite=output.overwrite)
+    details = _for_machines(arm, facts) if output.json else _bundle_rows(arm, facts)
+    console.rows(f"design {design}", _rows(arm, facts) | details, output.json, arm)
+    if not output.json:
         for note in (*facts.lacking, *(facts.validity if console.verbose else ())):
             console.line(f"  {note}")
         for warning in facts.warnings:
@@ -197,9 +195,9 @@ def _rest_rows(arm: sr.Manipulator) -> Rows:
 
 def _rest(arm: sr.Manipulator) -> Rest | None:
     """The arm at rest; None under loads too large to compute it."""
+    from softreach.rod.tip_map import InvalidLoads
+
     try:
         return sr.rest.rest(arm)
-    except InvalidInput as error:
-        if error.name != "loads":
-            raise
+    except InvalidLoads:
         return None

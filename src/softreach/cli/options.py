@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,20 +11,20 @@ from cyclopts import Group, Parameter
 import softreach as sr
 from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
-from softreach.cli.values import Whole, read_positive
-from softreach.support.errors import InvalidInput, NotPossible
+from softreach.cli.values import Whole, read_as
+from softreach.support.arguments import POSITIVE
+from softreach.support.errors import InvalidInput, NotPossible, check_installed
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import (
     PAGES,
     PICTURES,
     FileFormat,
     Formats,
-    check_installed,
     format_of,
 )
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in
-from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
+from softreach.support.units import METER, TYPED, LengthUnit, read_length
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +34,8 @@ OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
 """The one name of the file or folder that a command writes."""
 
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
-_STORED = "on a stored cloud: give the design instead"
+STORED = "on a stored cloud: give the design instead"
+"""Where changes of a design and options of sampling have no effect."""
 
 
 def _output(help: str, name: str | None = None) -> Parameter:
@@ -55,6 +55,19 @@ Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
 View = Annotated[str | None, _output("View: oblique (if left out), front, side, top.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """How results are written and printed."""
+
+    overwrite: Overwrite = False
+    unit: Unit = None
+    json: AsJson = False
+
+
+DEFAULT = Output()
 
 
 @Parameter(name="*")
@@ -101,22 +114,14 @@ def is_stored(source: str) -> bool:
 
 
 def cloud_of(
-    source: str,
-    sampling: Sampling,
-    changes: Changes,
-    unit: str | None,
-    check: Callable[[int], None] | None = None,
+    source: str, sampling: Sampling, changes: Changes, unit: str | None
 ) -> tuple[xr.Dataset, sr.Manipulator]:
-    """The stored cloud, or one of the design once its number of samples is checked; its design."""
-    if unit is not None:
-        as_unit(unit, 1.0)  # before anything is computed
+    """The stored cloud, or one of the design; its design."""
     if is_stored(source):
-        refuse(_STORED, **changes.given, **vars(sampling))
+        refuse(STORED, **changes.given, **vars(sampling))
         cloud = sr.open_cloud(source)
         say_limits(arm := shown_in(unit, sr.cloud.design_of(cloud)))
         return cloud, arm
-    if check is not None:
-        check(sampling.count)
     arm = design_from(source, changes, unit)
     return sr.compute_cloud(arm, **sampling.arguments), arm
 
@@ -130,11 +135,10 @@ def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.input_bounds[:, 0].tolist()
-    values = numbers_in(text, arm.inputs)
-    if values is None:
-        allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
-        raise InvalidInput(name, text, allowed)
-    return values
+    if (values := numbers_in(text, arm.inputs)) is not None:
+        return values
+    allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
+    raise InvalidInput(name, text, allowed)
 
 
 def shape_of(text: str | None, arm: sr.Manipulator) -> xr.Dataset:
@@ -161,23 +165,21 @@ def radius_of(text: str, length: float) -> float | str:
     if text == "critical":
         return text
     allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
-    return read_positive("alpha", text, lambda text: read_length(text, length), allowed)
+    return read_as("alpha", text, lambda text: read_length(text, length), allowed, POSITIVE)
 
 
-def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
-    """Refuse a file that could not be written in the end, before anything is computed."""
-    check_outputs([] if path is None else [path], formats, overwrite)
-
-
-def check_outputs(
-    paths: list[Path], formats: Formats, overwrite: bool, *libraries: tuple[str, str]
+def check_output(
+    out: Path | list[Path] | None, formats: Formats, overwrite: bool, *libraries: str
 ) -> None:
-    """As `check_output`, of several files; all libraries that are missing are named at once."""
+    """Refuse files that could not be written in the end, before anything is computed.
+
+    All libraries that are missing are named at once.
+    """
+    paths = out if isinstance(out, list) else [] if out is None else [out]
     if not paths:
         refuse("without --out", overwrite=overwrite)
     known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
-    needed = [(name, each.extra) for each in known for name in each.libraries]
-    check_installed(*needed, *libraries)
+    check_installed(*(name for each in known for name in each.libraries), *libraries)
     for path in paths:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")

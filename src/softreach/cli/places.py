@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
 from softreach.cli.console import console
-from softreach.cli.values import Whole, activation_text, record
+from softreach.cli.values import Whole, fields_of, for_machines
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
-from softreach.support.units import LengthUnit
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-_EXACT = 1e-6  # of L, the error of tips
 
 
 def solve(
@@ -63,35 +57,13 @@ def solve(
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
         known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]
-        console.json([record(each, arm.length, *lengths) for each in known])
+        console.json([for_machines(fields_of(each, *lengths), arm.length) for each in known])
         return
     for solution in solutions:
-        _print(solution, arm, count)
-
-
-def _print(solution: sr.inverse.Solution, arm: sr.Manipulator, family: int) -> None:
-    unit = arm.length_unit
-    status = solution.status.name.lower().replace("_", " ")
-    if len(solution) and solution.gap > _EXACT * arm.length:
-        status += f" within {unit.rounded(solution.gap)}"
-    console.line(f"target {unit.place(solution.target)}: {status}")
-    numbers = solution.residuals, solution.conditions, solution.margins, solution.sheets
-    for gamma, residual, condition, margin, sheet in zip(
-        solution.activations, *numbers, strict=True
-    ):
-        quality = f"residual {unit.rounded(residual, digits='.1e')}"
-        quality += f", condition {condition:.3g}, margin {margin:.3g}" if gamma.size else ""
-        quality += ", in a posture that it does not take straight from rest" if sheet else ""
-        console.line(f"  {activation_text(arm, gamma)}  ({quality})")
-    if not len(solution):
-        least = unit.rounded(solution.gap_bound)
-        bound = f", proved to be at least {least}" if solution.gap_bound else ""
-        gap = unit.rounded(solution.gap)
-        console.line(f"  nearest {unit.place(solution.nearest)}, {gap} away{bound}")
-        console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
-    elif len(solution) < family:
-        known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
-        console.line(f"  no others found: further searches end at {known}")
+        console.line(solution.text(arm.length_unit.name))
+        if 0 < len(solution) < count:
+            known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
+            console.line(f"  no others found: further searches end at {known}")
 
 
 def track(
@@ -117,29 +89,14 @@ def track(
         out: CSV file for the activations.
     """
     from softreach.export.clouds import path_csv
+    from softreach.inverse.path import end_text
 
     arm = design_from(design, changes, unit)
     options.check_output(out, TABLES, overwrite)
     first = None if start is None else options.activation_of(start, arm, "start")
     tracked = sr.track_path(arm, options.points_in("path", path, arm), first)
     write_text(out, path_csv(tracked), overwrite=overwrite)
-    followed = int((tracked.status == 0).sum())
-    share = f"{followed} of {tracked.sizes['point']} points followed"
-    console.line(f"{share}, up to {_end(tracked, arm.length_unit)}: {out}")
-
-
-def _end(tracked: xr.Dataset, unit: LengthUnit) -> str:
-    end = tracked.attrs["end"]
-    at = f"{unit.rounded(float(tracked.end_length), digits='.7g')} of path"
-    bundle, bound = tracked.attrs["end_bundle"], tracked.attrs["end_bound"]
-    error = unit.rounded(float(tracked.end_length_error), digits=".1g")
-    ends = {
-        "end": "the end of the path",
-        "fold": f"{at}, where the branch turns back (a fold)",
-        "no_start": "nowhere: the first point is not reached",
-        "snaps": f"{at} (± {error}), where the arm snaps",
-    }
-    return ends.get(end, f"{at}, where {bundle} is at its {bound} bound")
+    console.line(f"{out}: {end_text(tracked, arm.length_unit)}")
 
 
 def equilibria(
@@ -150,9 +107,7 @@ def equilibria(
     view: options.View = None,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Find every equilibrium of a loaded arm at given activations.
 
@@ -163,15 +118,17 @@ def equilibria(
     Args:
         out: Draw them: .png .pdf .svg, or .html to turn
     """
-    options.check_picture(out, overwrite, view=view, page=True)
-    arm = design_from(design, changes, unit)
+    options.check_picture(out, output.overwrite, view=view, page=True)
+    arm = design_from(design, changes, output.unit)
     result = sr.equilibria(arm, options.activation_of(activation, arm))
-    if json:
+    if output.json:
         status = [sr.rod.TipStatus(each) for each in result.status]
         fields = vars(result) | {"status": status, "degree": result.degree}
         del fields["rod"], fields["solver"]
-        console.json(record(fields, arm.length, "tips"))
+        console.json(for_machines(fields_of(fields, "tips"), arm.length))
     else:
+        from softreach.schema import activation_text
+
         at = activation_text(arm, result.activation)
         console.line(f"equilibria{f' at {at}' if at else ''}: {result}")
     if out is not None:
@@ -180,4 +137,4 @@ def equilibria(
         figure = (
             sr.plot.plot_3d([result], **look) if page else sr.plot.plot_equilibria(result, **look)
         )
-        options.save_picture(figure, out, overwrite)
+        options.save_picture(figure, out, output.overwrite)

@@ -27,9 +27,7 @@ def reach(
     changes: Changes = UNCHANGED,
     out: Annotated[list[Path] | None, options.OUT] = None,
     at: Annotated[str | None, Parameter(group=options.OUTPUT, allow_leading_hyphen=True)] = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Compute the exact reachable set: volume, multiplicity, folds.
 
@@ -47,10 +45,10 @@ def reach(
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.inverse.request import position_in
 
-    arm = design_from(design, changes, unit)
+    arm = design_from(design, changes, output.unit)
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
-    meshed = [("skimage", "surface")] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
-    options.check_outputs(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite, *meshed)
+    meshed = ["skimage"] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
+    options.check_output(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, output.overwrite, *meshed)
     free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:
         if not options.is_page(path) and free < (3 if _is_drawn(path) else 2):
@@ -61,10 +59,10 @@ def reach(
     with progress.bar("mapping the activation box", None) as step:
         reached = sr.reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | rows_of(reached.to_dataset())
-    rows = rows if json else _by_activations(rows)
-    console.rows(f"reachable set of {design}", rows, json, arm)
+    rows = rows if output.json else _by_activations(rows)
+    console.rows(f"reachable set of {design}", rows, output.json, arm)
     for path in outs:
-        _write(reached, arm, path, point, overwrite)
+        _write(reached, arm, path, point, output.overwrite)
 
 
 def _by_activations(rows: Rows) -> Rows:
@@ -118,9 +116,7 @@ def payload(
     accuracy: Number = 0.01,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Compute how much of its reach a payload costs an arm.
 
@@ -135,9 +131,9 @@ def payload(
         accuracy: Relative error allowed in each volume.
         out: Draw the curve: .png .pdf .svg
     """
-    arm = design_from(design, changes, unit)
+    arm = design_from(design, changes, output.unit)
     as_number("share", share, Range(0.0, 1.0, open_low=True, open_high=True))
-    options.check_picture(out, overwrite)
+    options.check_picture(out, output.overwrite)
     if arm.loads is None:
         raise NotPossible("this design has no loads; add --gravity down")
     masses = None if payloads is None else [read_mass("payloads", m) for m in payloads.split(",")]
@@ -150,11 +146,12 @@ def payload(
         "largest payload": (largest.payload, "kg"),
         f"largest payload{ERROR}": (largest.payload_error, "kg"),
     }
-    console.rows(f"payload of {design}", rows, json, arm)
-    if arm.loads.payload and not json:
+    console.rows(f"payload of {design}", rows, output.json, arm)
+    if arm.loads.payload and not output.json:
         console.line(f"  they take the place of the design's own payload, {arm.loads.payload:g} kg")
     if out is not None:
-        options.save_picture(sr.plot.plot_payload_curve(curve, largest=[largest]), out, overwrite)
+        figure = sr.plot.plot_payload_curve(curve, largest=[largest])
+        options.save_picture(figure, out, output.overwrite)
 
 
 def gradient(

@@ -14,7 +14,7 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
 from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, pairs_in, record
+from softreach.cli.values import Number, Whole, as_read, fields_of, for_machines, pairs_in
 from softreach.support import progress
 from softreach.support.files.text import read_text
 
@@ -32,9 +32,7 @@ def check(
     changes: Changes = UNCHANGED,
     out: options.Out = None,
     view: options.View = None,
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> int:
     """Check a design against requirements: met or missed, and by how much.
 
@@ -50,27 +48,26 @@ def check(
         accuracy: Accuracy of coverages and volumes.
         out: Draw the arm at the places (.png .pdf .svg).
     """
-    arm = design_from(design, changes, unit)
-    options.check_picture(out, overwrite, view=view)
+    arm = design_from(design, changes, output.unit)
+    options.check_picture(out, output.overwrite, view=view)
     requirements = sr.Requirements.load(needs, length=arm.length)
     with progress.bar("checking", None) as step:
         result = sr.check(arm, requirements, accuracy=accuracy, progress=step)
-    if json:
+    if output.json:
         console.json(_checked(result))
     else:
         console.line(result)
     if out is not None:
         axes: Any = sr.plot.plot_check(result, view=view or "oblique", unit=arm.length_unit)
-        options.save_picture(axes.figure, out, overwrite)
+        options.save_picture(axes.figure, out, output.overwrite)
     return _EXIT[result.verdict]
 
 
 def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
+    fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
     return {
-        **record(
-            {name: getattr(result, name) for name in names}, result.arm.length, "places", "gaps"
-        ),
+        **for_machines(fields, result.arm.length),
         "findings": [_finding(finding) for finding in result.findings],
         "payloads_kg": result.payloads,
         "coverages": [coverage._asdict() for coverage in result.coverages],
@@ -98,9 +95,7 @@ def search(
     polish: Annotated[bool | None, Parameter(negative="--no-polish", group=_ASKED)] = None,
     storage: Path | None = None,
     out: Annotated[Path, options.OUT] = Path("best"),
-    overwrite: options.Overwrite = False,
-    unit: options.Unit = None,
-    json: options.AsJson = False,
+    output: options.Output = options.DEFAULT,
 ) -> int:
     """Search the designs that meet requirements and are best.
 
@@ -149,17 +144,17 @@ def search(
     designs_from = partial(design_from, changes=Changes(point=point))
     asked = read_search(text, needs.parent, designs_from, source=str(needs), given=given)
     base = asked["base"]
-    arm = shown_in(unit, next(iter(base.values())) if isinstance(base, Mapping) else base)
-    check_folder(out, overwrite=overwrite)
+    arm = shown_in(output.unit, next(iter(base.values())) if isinstance(base, Mapping) else base)
+    check_folder(out, overwrite=output.overwrite)
     if storage is None:
         out.mkdir(parents=True, exist_ok=True)
         storage = out / "search.journal"
     result = _searched(asked, storage)
-    if json:
+    if output.json:
         console.json(_found(result, out))
     else:
         console.line(result.report(arm.length_unit.name))
-    result.save(out, unit=arm.display_unit, overwrite=overwrite)
+    result.save(out, unit=arm.display_unit, overwrite=output.overwrite)
     return _EXIT[result.verdict]
 
 
@@ -170,8 +165,6 @@ def _searched(asked: dict[str, Any], storage: Path) -> sr.optimization.Search:
 
 
 class _Watch:
-    """How far a search is, in a few words."""
-
     def __init__(self) -> None:
         self._met, self._excess = 0, math.inf
 

@@ -17,7 +17,6 @@ from softreach.cli.values import Whole
 from softreach.support import progress
 from softreach.support.errors import NotPossible, counted
 from softreach.support.interruption import wait_for_signal
-from softreach.support.units import as_unit
 
 if TYPE_CHECKING:
     from softreach.studio import Start
@@ -91,7 +90,6 @@ def _write_static(
 
     if not vary:
         raise NotPossible("give a slider of the page with --vary, such as --vary taper_deg=0:3:8")
-    as_unit(unit or "m", 1.0)
     space = grid_of(design_from(source), vary)
     with progress.bar("computing designs", space.size) as step:
         title = Path(source).stem
@@ -112,7 +110,6 @@ def _warning(*, with_token: bool) -> str:
 
 
 def _begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
-    """What is shown first, and the work that is kept; a state or a cloud is shown as it is."""
     from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 
     if is_stored(source):

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
-from itertools import repeat
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter, Token
 
-import softreach as sr
-from softreach.support.errors import InvalidInput
-from softreach.support.quantity import quantity, read_number, read_whole_number
-from softreach.support.units import LengthUnit
+from softreach.support.errors import InvalidInput, Range
+from softreach.support.quantity import five_digits, quantity, read_number, read_whole_number
+from softreach.support.units import POWERS, LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,28 +21,24 @@ Rows = dict[str, tuple[Any, str]]
 
 ERROR = " error"
 """Behind the name of a row with the error of another."""
-_POWERS = {"m": 1, "m²": 2, "m³": 3}
 _READ_AS = {"m2": "m²", "m3": "m³", "1": ""}
+_PLAIN = str.maketrans({"³": "3", "²": "2", "/": "_per_", " ": "_", "(": "", ")": ""})
 
 
-def read_as(name: str, text: Any, read: Callable[[Any], Any], allowed: str) -> Any:
-    """What a reader makes of a text; where it raises ValueError, the option is refused."""
+def read_as(
+    name: str, text: Any, read: Callable[[Any], Any], allowed: str, limits: Range | None = None
+) -> Any:
+    """What a reader makes of a text; refused where it raises ValueError or leaves the limits."""
     try:
-        return read(text)
+        value = read(text)
+        if limits is None or limits.admits(value):
+            return value
     except ValueError:
-        raise InvalidInput(name, text or "''", allowed) from None
-
-
-def read_positive(name: str, text: str, read: Callable[[str], float], allowed: str) -> float:
-    """As `read_as`, of numbers above 0."""
-    if (value := read_as(name, text, read, allowed)) > 0:
-        return value
-    raise InvalidInput(name, text, allowed)
+        pass
+    raise InvalidInput(name, text or "''", allowed)
 
 
 def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
-    """Options that are read by a function from text."""
-
     def convert(kind: Any, tokens: Sequence[Token]) -> float:
         del kind
         name = (tokens[0].keyword or "number").lstrip("-").replace("-", "_")
@@ -94,76 +88,57 @@ def rows_of(dataset: xr.Dataset) -> Rows:
     return rows | ({"route": (dataset.attrs["route"], "")} if "route" in dataset.attrs else {})
 
 
-def rows_for_people(rows: Rows, unit: LengthUnit) -> dict[str, str]:
+def fields_of(values: Mapping[str, Any], *lengths: str) -> Rows:
+    """The fields of a result as rows; those that are lengths [m] by name."""
+    return {name: (value, "m" if name in lengths else "") for name, value in values.items()}
+
+
+def for_people(rows: Rows, unit: LengthUnit) -> Iterable[tuple[str, str]]:
     """The rows as text: lengths, areas and volumes in the unit, and errors beside their values."""
-    texts: dict[str, str] = {}
     for name, (value, symbol) in rows.items():
-        if name.endswith(ERROR) and _are_alike(value, rows.get(name.removesuffix(ERROR))):
+        if name.endswith(ERROR) and name.removesuffix(ERROR) in rows:
             continue  # it stands beside the value
-        size, power = 1.0, _POWERS.get(symbol)
+        size, power = 1.0, POWERS.get(symbol)
         if power is not None:
             size, symbol = unit.scale(power), unit.symbol(power)
-        error = rows.get(f"{name}{ERROR}")
-        if error is not None and _are_alike(value, error):
-            text = _with_errors(value, error[0], size)
-        else:
-            text = shown(value if size == 1.0 else _over(value, size))
-        texts[name] = f"{text} {'' if text == '-' else symbol}".rstrip()
-    return texts
+        text = _shown_in(value, rows.get(f"{name}{ERROR}", (None, ""))[0], size)
+        yield name, f"{text} {'' if text == '-' else symbol}".rstrip()
 
 
-def _are_alike(value: Any, row: tuple[Any, str] | None) -> bool:
-    """True if a row has one number for each of a value, such as an error."""
-    return row is not None and isinstance(value, list) == isinstance(row[0], list)
-
-
-def _with_errors(value: Any, error: Any, size: float) -> str:
+def _shown_in(value: Any, error: Any, size: float) -> str:
+    """Numbers in a unit of this size, each to the first digit of its error if that is known."""
     if isinstance(value, list):
-        return ", ".join(map(_with_errors, value, error, repeat(size)))
-    return shown(None) if value is None else quantity(value / size, "", error / size)
+        errors = error if isinstance(error, list) else [error] * len(value)
+        return ", ".join(_shown_in(*pair, size) for pair in zip(value, errors, strict=True))
+    if value is None or error is None:
+        return shown(value if value is None or size == 1.0 else value / size)
+    return quantity(value / size, "", error / size)
 
 
-def rows_for_machines(rows: Rows, length: float | None) -> Iterator[tuple[str, Any, str]]:
-    """Name, value and unit of every row; lengths, areas and volumes in SI units and in L."""
-    for name, (value, unit) in rows.items():
-        yield name, value, unit
-        if length is not None and (power := _POWERS.get(unit)):
-            relative = LengthUnit("L", length)
-            yield name, _over(value, relative.scale(power)), relative.symbol(power)
+def for_machines(rows: Rows, length: float | None = None) -> dict[str, Any]:
+    """The rows by names with their units; lengths, areas and volumes in SI units and in L."""
+    from softreach.arm.parameters import written_name
 
-
-def record(values: Mapping[str, Any], length: float, *names: str) -> dict[str, Any]:
-    """The fields of a result for machines; those that are lengths [m] by name, in m and in L."""
     fields: dict[str, Any] = {}
-    for name, value in plain(values).items():
-        if name in names:
-            fields |= {f"{name}_m": value, f"{name}_L": _over(value, length)}
-        else:
-            fields[name] = value
+    for name, (value, unit) in rows.items():
+        values = {unit: value}
+        if length is not None and (power := POWERS.get(unit)):
+            import numpy as np
+
+            relative = LengthUnit("L", length)
+            values[relative.symbol(power)] = np.asarray(plain(value), float) / relative.scale(power)
+        for own, number in values.items():
+            key = written_name(name.translate(_PLAIN), own or "1").translate(_PLAIN)
+            fields[key] = plain(number)
     return fields
 
 
-def _over(value: Any, scale: float) -> Any:
-    if isinstance(value, list | tuple):
-        return [_over(item, scale) for item in value]
-    return None if value is None else value / scale
-
-
-def activation_text(arm: sr.Manipulator, values: Iterable[float]) -> str:
-    """Activations with the names and units of their bundles: "left -1, right 0.5 N"."""
-    named = zip(arm.input_names, values, arm.input_units, strict=True)
-    return ", ".join(
-        f"{name} {round(value, 6) + 0.0:.6g}" if unit == "1" else f"{name} {value:.6g} {unit}"
-        for name, value, unit in named
-    )
-
-
 def shown(value: Any) -> str:
-    """A value in a table; a dash where there is none."""
+    """A value in a table, with five digits that count; a dash where there is none."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "-"
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return five_digits(value)
     if isinstance(value, int) and not isinstance(value, bool):
         return f"{value:,}"
     if isinstance(value, list | tuple):
@@ -182,15 +157,3 @@ def plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return plain(value.tolist()) if hasattr(value, "tolist") else value
-
-
-_SUFFIX = {"": "1", "%": "percent", "N m²": "n_m2"}
-_PLAIN = str.maketrans({"³": "3", "²": "2", "/": "_per_", " ": "_"})
-
-
-def key(name: str, unit: str) -> str:
-    """The key of a value in JSON: its name with its unit, as in `convex_volume_L3`."""
-    from softreach.arm.parameters import written_name
-
-    bare = name.replace(" ", "_").replace("/", "_per_").replace("(", "").replace(")", "")
-    return written_name(bare, _SUFFIX.get(unit, unit)).translate(_PLAIN)

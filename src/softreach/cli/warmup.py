@@ -146,7 +146,6 @@ def doctor(*, json: AsJson = False) -> None:
 
 
 def _kernel_cache() -> str:
-    """Folder of compiled kernels, which is asked of the kernels themselves."""
     from softreach.kernels.compiler import not_kept
     from softreach.kernels.rod import tips
 

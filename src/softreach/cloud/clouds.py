@@ -142,11 +142,11 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     if opened is None or "command" in opened.group.attrs:
         hint = f"it does not exist, or has no {ROOT}" if opened is None else "this is an atlas"
         raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
-    opened.watch.required = lambda _: True
+    opened.required = lambda _: True
     with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
         try:
             opened.check_arrays()
-            with opened.watch.raising(), xr.open_zarr(opened.place, **READING) as stored:
+            with opened.noting(raising=True), xr.open_zarr(opened.place, **READING) as stored:
                 cloud = schema.stored_names(stored.load())
         finally:
             opened.check_root()

@@ -24,7 +24,7 @@ from softreach.rod.tip_map import Strains, TipMap, no_equilibrium
 from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer
-from softreach.support.arrays import Array, Index, as_floats, as_shares
+from softreach.support.arrays import Array, Index, as_floats
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -111,7 +111,10 @@ def stream_statistics(
         InvalidInput: As for `curvature_statistics`; also no activations at all.
     """
     bins = as_integer("bins", bins, 1, _MOST)
-    shares = as_shares("quantiles", quantiles)
+    shares = as_floats("quantiles", quantiles)
+    if shares.ndim != 1 or not shares.size or not ((shares >= 0) & (shares <= 1)).all():
+        allowed = "one number from 0 to 1 or more of them, shape (k,)"
+        raise InvalidInput("quantiles", quantiles, allowed)
     allowed = "an iterable of arrays of shape (n, bundles)"
     activations = as_instance("activations", activations, Iterable, allowed)
     tip_map = as_tip_map(arm)

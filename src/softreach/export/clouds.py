@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from io import BufferedWriter
 from itertools import chain, count
 from os import PathLike
@@ -15,7 +17,6 @@ from numpy.typing import NDArray
 
 from softreach.export.formats import (
     format_file,
-    load_library,
     write_by_suffix,
     write_ply,
     write_vtu,
@@ -23,7 +24,7 @@ from softreach.export.formats import (
 from softreach.schema import a_cloud, activation_units
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput, MissingExtra
+from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import Formats
 from softreach.support.palette import activation_colors
 from softreach.support.units import METER, LengthUnit, as_unit
@@ -85,19 +86,7 @@ def cloud_table(cloud: xr.Dataset) -> pd.DataFrame:
 
 
 def arrays_of(cloud: xr.Dataset, unit: LengthUnit = METER) -> CloudTable:
-    """The arrays and the description of a cloud.
-
-    Args:
-        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
-        unit: Of the tips in the table.
-
-    Raises:
-        InvalidInput: The dataset is not a cloud.
-    """
-    missing = {"tip", "activation"} - set(map(str, cloud.data_vars))
-    if missing:
-        names = ", ".join(map(str, cloud.data_vars)) or "nothing"
-        raise InvalidInput("cloud", names, "a dataset with tip and activation")
+    """The arrays and the description of a cloud, with its tips in a unit."""
     tip, activation = cloud["tip"], cloud["activation"]
     names = range(1, activation.sizes["bundle"] + 1)
     units, length = activation_units(activation), _length(cloud)
@@ -194,16 +183,15 @@ def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
 
 def _write_csv(table: CloudTable, file: BufferedWriter) -> None:
     suffix = {"m": "", "L": "_over_length"}.get(table.unit.name, f"_{table.unit.name}")
-    try:
-        writer = load_library("pyarrow.csv").CSVWriter
-    except MissingExtra:  # the same bytes, six times as slowly
-        names = ",".join(f'"{name}"' for name in table.columns(slice(0), suffix))
-        file.write(f"{names}\n".encode())
-        for rows in table.blocks():
-            columns = (map(_shortest, column.tolist()) for column in table.columns(rows).values())
-            file.writelines(f"{','.join(row)}\n".encode() for row in zip(*columns, strict=True))
-    else:
-        _write_batches(partial(writer, file), table, suffix)
+    if find_spec("pyarrow"):
+        _write_batches(partial(import_module("pyarrow.csv").CSVWriter, file), table, suffix)
+        return
+    # the same bytes, six times as slowly
+    names = ",".join(f'"{name}"' for name in table.columns(slice(0), suffix))
+    file.write(f"{names}\n".encode())
+    for rows in table.blocks():
+        columns = (map(_shortest, column.tolist()) for column in table.columns(rows).values())
+        file.writelines(f"{','.join(row)}\n".encode() for row in zip(*columns, strict=True))
 
 
 def _shortest(x: float) -> str:
@@ -216,12 +204,12 @@ def _shortest(x: float) -> str:
 
 
 def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
-    writer = load_library("pyarrow.parquet").ParquetWriter
+    writer = import_module("pyarrow.parquet").ParquetWriter
     _write_batches(partial(writer, file, compression="zstd"), table)
 
 
 def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str = "") -> None:
-    pa, units = load_library("pyarrow"), [table.unit.name] * 3 + [*table.units, "1"]
+    pa, units = import_module("pyarrow"), [table.unit.name] * 3 + [*table.units, "1"]
     kinds = zip(table.columns(slice(0), suffix).items(), units, strict=False)
     fields = [
         pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"units": unit})

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from io import BufferedWriter
 from os import PathLike
 from typing import Any, BinaryIO
@@ -12,7 +12,6 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import FileFormat, Formats, format_of
 
@@ -21,26 +20,13 @@ _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
 def format_file(write: Callable[[Any, BufferedWriter], None], library: str = "") -> FileFormat:
     """A row of a table of formats: the writer, and the library that it needs."""
-    return FileFormat((library,) if library else (), "export", write)
+    return FileFormat((library,) if library else (), write)
 
 
 def write_by_suffix(
     path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool
 ) -> None:
-    """Write the content whole, or leave what was there.
-
-    Args:
-        path: The file.
-        formats: What can be written, by suffix.
-        content: What their writers take.
-        overwrite: Whether it may replace a file.
-
-    Raises:
-        InvalidInput: No writer for the suffix (the error lists those there are), or something else
-            is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
+    """Write the content whole, or leave what was there."""
     write = format_of(path, formats).write
     assert write is not None
     with writing(path, overwrite=overwrite) as file:
@@ -51,7 +37,7 @@ def write_vtu(
     file: BufferedWriter, points: Any, cells: Any, *, compression: str | None = "zlib", **data: Any
 ) -> None:
     """Write a mesh as meshio has it, which for this format opens what it is given itself."""
-    meshio = load_library("meshio")
+    meshio = import_module("meshio")
     options = {"compression": compression, "header_type": "UInt64"}
     meshio.vtu.write(os.fspath(file.name), meshio.Mesh(points, cells, **data), **options)
 
@@ -91,21 +77,6 @@ def write_ply(
         triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
         triangles["count"], triangles["corners"] = 3, faces
         file.write(triangles.data)
-
-
-def load_library(module: str) -> Any:
-    """An optional library, loaded at first use.
-
-    Raises:
-        MissingExtra: It is not installed.
-    """
-    try:
-        return importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        library = module.partition(".")[0]
-        if error.name is None or error.name.partition(".")[0] != library:
-            raise
-        raise MissingExtra((library, "export")) from error
 
 
 def _ascii(text: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Sequence
+from importlib import import_module
 from io import BufferedWriter
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,7 +17,6 @@ from softreach.arm.manipulator import a_manipulator
 from softreach.arm.skin import arm_surface, bundle_surfaces, inside
 from softreach.export.formats import (
     format_file,
-    load_library,
     write_by_suffix,
     write_ply,
     write_vtu,
@@ -29,7 +29,7 @@ from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import Formats
 from softreach.support.palette import BODY, Color, bundle_color
-from softreach.support.units import METER, LengthUnit, as_unit
+from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,26 +109,10 @@ def export_mesh(
     written = as_unit(unit)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
-    write_parts([Part("surface", vertices, faces)], path, written, overwrite=overwrite)
+    _write_parts([Part("surface", vertices, faces)], path, written, overwrite=overwrite)
 
 
-def write_parts(
-    parts: Sequence[Part],
-    path: str | PathLike[str],
-    unit: LengthUnit = METER,
-    *,
-    overwrite: bool = False,
-) -> None:
-    """Write surfaces [m] that belong together.
-
-    Names survive in OBJ (objects), GLB (nodes) and VTK (a number per triangle, in order); colors in
-    PLY, OBJ and GLB.
-
-    Raises:
-        InvalidInput: Unknown suffix, or something else is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
+def _write_parts(parts: Sequence[Part], path: str, unit: LengthUnit, *, overwrite: bool) -> None:
     scaled = []
     for part in parts:
         vertices, faces = parted(part.vertices, part.faces)
@@ -150,7 +134,8 @@ def export_arm(
     The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
     that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
     ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
-    the names of the bundles.
+    the names of the bundles in OBJ (objects), GLB (nodes) and 3MF, and numbered in VTU; their
+    colors are in all but STL and VTU.
 
     Args:
         arm: The design.
@@ -175,7 +160,7 @@ def export_arm(
         name, taken = arm.bundle_names[index], ("body", *arm.bundle_names[:index])
         name = name if name not in taken else f"{name} ({index + 1})"
         parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
-    write_parts(parts, path, written, overwrite=overwrite)
+    _write_parts(parts, path, written, overwrite=overwrite)
 
 
 def _write_ply(scene: Scene, file: BufferedWriter) -> None:
@@ -189,12 +174,12 @@ def _write_ply(scene: Scene, file: BufferedWriter) -> None:
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
     meshes = [_colored(part) for part in scene.parts]
-    binary = load_library("trimesh").util.concatenate(meshes).export(file_type="stl")
+    binary = import_module("trimesh").util.concatenate(meshes).export(file_type="stl")
     file.write(_said_unit(scene).encode().ljust(80) + binary[80:])
 
 
 def _write_obj(scene: Scene, file: BufferedWriter) -> None:
-    trimesh = load_library("trimesh")
+    trimesh = import_module("trimesh")
     meshes = trimesh.Scene([_colored(part) for part in scene.parts])
     # exact enough for an arm of a millimeter; a name of ours, not an address, in the first line
     options = {"include_normals": False, "digits": 12, "header": _said_unit(scene)}
@@ -202,7 +187,7 @@ def _write_obj(scene: Scene, file: BufferedWriter) -> None:
 
 
 def _write_glb(scene: Scene, file: BufferedWriter) -> None:
-    trimesh = load_library("trimesh")
+    trimesh = import_module("trimesh")
     meshes = trimesh.Scene(base_frame="world", metadata={"about": _said_unit(scene)})
     # as a node and not in the numbers, so that a reader gets back the vertices we have
     meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
@@ -264,11 +249,10 @@ def _said_unit(scene: Scene) -> str:
 
 def _colored(part: Part) -> Any:
     look = {"vertex_colors": _colors(part), "metadata": {"name": part.name}, "process": False}
-    return load_library("trimesh").Trimesh(part.vertices, part.faces, **look)
+    return import_module("trimesh").Trimesh(part.vertices, part.faces, **look)
 
 
 def _colors(part: Part) -> NDArray[np.uint8]:
-    """RGBA of each vertex."""
     color = np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
     return np.tile(color, (len(part.vertices), 1))
 

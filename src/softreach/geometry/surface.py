@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.kernels.points.triangles import distances_to_faces
 from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
-from softreach.support.errors import MissingExtra
+from softreach.support.errors import check_installed
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
@@ -92,10 +92,9 @@ def level_set(field: Array, level: float) -> tuple[Points, Faces]:
     Raises:
         MissingExtra: scikit-image is not installed.
     """
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as error:
-        raise MissingExtra(("scikit-image", "surface")) from error
+    check_installed("skimage")
+    from skimage.measure import marching_cubes
+
     places, faces, _, _ = marching_cubes(field, level, allow_degenerate=False)
     return places.astype(float), faces
 

@@ -18,6 +18,7 @@ from softreach.schema import AXES, activation_attributes, bundle_coordinates, pr
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import InvalidInput
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -112,6 +113,24 @@ class PathStatus(IntEnum):
     """The first point cannot be reached, or not from the start given."""
     SNAPS = 4
     """Beyond a loss of stability: there the arm under loads snaps to another posture."""
+
+
+def end_text(track: xr.Dataset, unit: LengthUnit) -> str:
+    """Where a path that `track_path` followed ends, and why there, in words."""
+    count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
+    end, way = track.attrs["end"], unit.rounded(float(track.end_length))
+    if end == "no_start":
+        return "The first point is not reached: out of reach, or not from this activation."
+    if end == "end":
+        return f"All {points} points are followed: {way} of path."
+    error = unit.rounded(float(track.end_length_error), digits=".1g")
+    reasons = {
+        "fold": "the branch turns back (a fold)",
+        "snaps": f"the arm snaps to another posture (± {error})",
+        "bound": "{end_bundle} is at its {end_bound} bound",
+    }
+    reason = reasons[end].format(**track.attrs)
+    return f"{count} of {points} points are followed, {way} of path: there {reason}."
 
 
 _MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathStatus)

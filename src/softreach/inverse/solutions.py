@@ -12,12 +12,22 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import Frame, TipMap
-from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.schema import (
+    AXES,
+    activation_attributes,
+    activation_text,
+    bundle_coordinates,
+    provenance,
+)
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
+from softreach.support.units import as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+_EXACT = 1e-6  # of L, the error of tips
 
 
 class Status(IntEnum):
@@ -89,6 +99,39 @@ class Solution:
         count, worst = counted(len(self), "activation"), self.residuals.max()
         summary = f"{count}, largest residual {worst:.1e} m"
         return f"<Solution for ({place}) m: {outcome}, {summary}>"
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, unit: str | None = None) -> str:
+        """A line for each activation, or what is known of the nearest point.
+
+        Args:
+            unit: Of lengths: m, cm, mm or L; None for that of the design, or one that is handy.
+
+        Raises:
+            InvalidInput: No such unit.
+        """
+        arm, names = self.tip_maps[0].arm, self.tip_maps[0].box.names
+        shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
+        status = self.status.name.lower().replace("_", " ")
+        if len(self) and self.gap > _EXACT * arm.length:
+            status += f" within {shown.rounded(self.gap)}"
+        lines = [f"target {shown.place(self.target)}: {status}"]
+        for k, gamma in enumerate(self.activations):
+            quality = f"residual {shown.rounded(self.residuals[k], digits='.1e')}"
+            if gamma.size:
+                quality += f", condition {self.conditions[k]:.3g}, margin {self.margins[k]:.3g}"
+            if self.sheets[k]:
+                quality += ", in a posture that it does not take straight from rest"
+            lines.append(f"{activation_text(arm, gamma, names)}  ({quality})")
+        if not len(self):
+            least = shown.rounded(self.gap_bound)
+            bound = f", proved to be at least {least}" if self.gap_bound else ""
+            nearest, gap = shown.place(self.nearest), shown.rounded(self.gap)
+            lines.append(f"nearest {nearest}, {gap} away{bound}")
+            lines.append(f"reached by {activation_text(arm, self.nearest_activation, names)}")
+        return "\n  ".join(lines)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -23,10 +23,10 @@ from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
-from softreach.support.errors import SoftreachError, counted
+from softreach.support.errors import SoftreachError, check_installed, counted
 from softreach.support.files.atomic import check_place
 from softreach.support.files.text import write_table, write_text
-from softreach.support.report import Report, Reported, Section, check_libraries
+from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit, as_unit, readable, readable_unit
 from softreach.support.versions import versions
 from softreach.workspace.measure import Estimate
@@ -352,7 +352,7 @@ class Search(Reported):
 
 def check_folder(folder: Path, *, overwrite: bool) -> None:
     """Refuse a folder that the files of a search could not be written to."""
-    check_libraries()
+    check_installed("matplotlib", "jinja2")
     for name in _FILES:
         check_place(folder / name, overwrite=overwrite, name="out")
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
-from softreach.support.errors import InvalidInput, MissingExtra, in_short
+from softreach.support.errors import InvalidInput, check_installed, in_short
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
@@ -263,11 +263,9 @@ def _is_own_journal(path: Path) -> bool:
 
 
 def _library() -> Any:
-    try:
-        import cmaes  # pyright: ignore[reportUnusedImport]  # noqa: F401
-        import optuna
-    except ImportError as error:
-        raise MissingExtra(("optuna", "search"), ("cmaes", "search")) from error
+    check_installed("optuna", "cmaes")
+    import optuna
+
     return optuna
 
 

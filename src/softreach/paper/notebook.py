@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from time import perf_counter
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Self
 
 from softreach.plot.style import pyplot, save_figure
-from softreach.support.files.atomic import writing
+from softreach.support.files.text import write_text
 
-Numbers = SimpleNamespace  # Numbers that a section computed, by name
+Numbers = SimpleNamespace  # Numbers that a section computed, by name; lists of them are arrays
 
 
 class Verdict(StrEnum):
@@ -60,17 +61,9 @@ FULL = Settings(16, 400_000, 0.05, 7, 3e-3, 2_000_000, 10_000)
 QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)  # Coarse numbers in under a minute
 
 
-class Picture(NamedTuple):
-    """A figure of the report."""
-
-    label: str  # Number of the figure in the paper, such as "2a"; empty for one of our own
-    name: str  # Of its files, without suffix
-    caption: str
-
-
 @dataclass
 class Notebook:
-    """Numbers and figures of one part; `close` writes its file last, so a rerun skips the part."""
+    """Numbers and figures of one part; its file is written last, so that a rerun skips the part."""
 
     folder: Path
     """Of the figures, within that of all results."""
@@ -79,7 +72,9 @@ class Notebook:
     """Everything that the results depend on; a notebook of another key is stale."""
     numbers: dict[str, Any] = field(default_factory=dict)
     """What JSON can hold."""
-    pictures: list[Picture] = field(default_factory=list)
+    pictures: list[tuple[str, str, str]] = field(default_factory=list)
+    """Number of each figure in the paper, such as "2a", or empty for one of our own; name of its
+    files, without suffix; caption."""
     seconds: float = 0.0
 
     def draw(self, label: str, name: str, caption: str, figure: Any) -> None:
@@ -87,26 +82,23 @@ class Notebook:
         for suffix in ("png", "pdf"):
             save_figure(figure, self.folder / f"{name}.{suffix}", overwrite=True)
         pyplot().close(figure.get_figure(root=True))
-        self.pictures.append(Picture(label, name, caption))
+        self.pictures.append((label, name, caption))
 
-    def close(self, seconds: float) -> None:
-        """Write what was found."""
-        self.seconds = seconds
+    def fill(self, compute: Callable[[Settings, Notebook], Any], settings: Settings) -> Self:
+        """Compute the part, and write what was found."""
+        start = perf_counter()
+        self.numbers = json.loads(json.dumps(compute(settings, self)))
+        self.seconds = perf_counter() - start
         content = {name: value for name, value in vars(self).items() if name != "folder"}
-        with writing(self.folder / f"{self.part}.json", overwrite=True) as file:
-            file.write(json.dumps(content, indent=1).encode())
+        write_text(self.folder / f"{self.part}.json", json.dumps(content, indent=1), overwrite=True)
+        return self
 
     @classmethod
     def opened(cls, folder: Path, part: str, key: Mapping[str, Any]) -> Self | None:
         """The finished notebook of a part, or None if there is none of that key."""
         try:
             book = cls(folder, **json.loads((folder / f"{part}.json").read_text(encoding="utf-8")))
-            book.pictures = [Picture(*picture) for picture in book.pictures]
         except (OSError, ValueError, TypeError):
             return None
-        whole = all(book.png(picture).is_file() for picture in book.pictures)
-        return book if whole and book.key == json.loads(json.dumps(dict(key))) else None
-
-    def png(self, picture: Picture) -> Path:
-        """The file of a picture."""
-        return self.folder / f"{picture.name}.png"
+        whole = all((folder / f"{name}.png").is_file() for _, name, _ in book.pictures)
+        return book if whole and book.key == key else None

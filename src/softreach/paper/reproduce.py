@@ -16,18 +16,20 @@ from importlib.metadata import version
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
-from time import perf_counter
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from softreach.paper.notebook import FULL, QUICK, Finding, Notebook, Numbers, Settings, Verdict
 from softreach.paper.sections import misprints, model, redundancy, sweep, uniqueness, volume
 from softreach.plot.style import pyplot
-from softreach.support.errors import InvalidInput
-from softreach.support.files.atomic import MARK, check_place, writing
-from softreach.support.files.formats import check_installed
+from softreach.support.arguments import as_path
+from softreach.support.errors import InvalidInput, check_installed
+from softreach.support.files.atomic import MARK, check_place
+from softreach.support.files.text import write_text
 from softreach.support.report import Report, Section
 
-_SECTIONS = {
+SECTIONS: dict[str, Any] = {
     "model": model,
     "misprints": misprints,
     "redundancy": redundancy,
@@ -35,11 +37,7 @@ _SECTIONS = {
     "sweep": sweep,
     "uniqueness": uniqueness,
 }
-
-PARTS: dict[str, Callable[[Settings, Notebook], dict[str, Any]]] = {
-    name: section.computed for name, section in _SECTIONS.items()
-}
-"""Name -> what draws its figures and returns its numbers; short ones first."""
+"""Name of a part -> module that computes its numbers and judges them; short ones first."""
 
 
 class Claim(NamedTuple):
@@ -54,14 +52,14 @@ class Claim(NamedTuple):
 
     def check(self, numbers: Mapping[str, Any]) -> Finding:
         """Finding from the numbers of its part."""
-        return getattr(_SECTIONS[self.part], self.judge)(Numbers(**numbers))
+        known = {k: np.asarray(x) if isinstance(x, list) else x for k, x in numbers.items()}
+        return getattr(SECTIONS[self.part], self.judge)(Numbers(**known))
 
 
 _TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
 CLAIMS = tuple(
-    Claim(part, judge, **row)
+    Claim(name.partition(".")[0], name.partition(".")[2], **row)
     for name, row in tomllib.loads(_TEXT).items()
-    for part, _, judge in [name.partition(".")]
 )
 """Every statement that is checked, in the paper's order."""
 
@@ -98,10 +96,10 @@ def reproduce_paper(
         NotWritten: The folder cannot be written to.
     """
     # What is missing is reported now, not after a quarter of an hour.
-    check_installed(("matplotlib", "plot"), ("skimage", "surface"), ("jinja2", "report"))
+    check_installed("matplotlib", "skimage", "jinja2")
     pyplot()
     settings = QUICK if quick else FULL
-    folder = Path(out) / "quick" if quick else Path(out)
+    folder = Path(as_path("out", out)) / ("quick" if quick else "")
     path, pages = folder / "report.html", folder / "figures"
     check_place(path, overwrite=overwrite, name="out")
     code = b"".join(p.read_bytes() for p in sorted(Path(__file__).parents[1].rglob("*.py")))
@@ -109,12 +107,10 @@ def reproduce_paper(
     key = {**asdict(settings), "softreach": version("softreach"), "source": source}
     _claim(pages, key, overwrite=overwrite)
     notebooks: dict[str, Notebook] = {}
-    for number, (name, compute) in enumerate(PARTS.items(), 1):
-        say(f"[{number}/{len(PARTS)}] {name}")
-        if (notes := Notebook.opened(pages, name, key)) is None:
-            notes, start = Notebook(pages, name, key), perf_counter()
-            notes.numbers = json.loads(json.dumps(compute(settings, notes)))
-            notes.close(perf_counter() - start)
+    for number, (name, section) in enumerate(SECTIONS.items(), 1):
+        say(f"[{number}/{len(SECTIONS)}] {name}")
+        notes = Notebook.opened(pages, name, key)
+        notes = notes or Notebook(pages, name, key).fill(section.computed, settings)
         notebooks[name] = notes
         say(f"      {notes.seconds:.1f} s")
     _report(notebooks, settings, quick).save(path, overwrite=overwrite)
@@ -129,8 +125,7 @@ def _claim(pages: Path, key: Mapping[str, Any], *, overwrite: bool) -> None:
         if found and not begun.exists() and not overwrite:
             hint = "choose another folder, or pass --overwrite (in Python overwrite=True)"
             raise InvalidInput("out", f"{pages}", "a folder without other figures", hint)
-    with writing(begun, overwrite=True) as file:
-        file.write(json.dumps(dict(key), indent=1).encode())
+    write_text(begun, json.dumps(key, indent=1), overwrite=True)
 
 
 def _report(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) -> Report:
@@ -171,7 +166,7 @@ def _report(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) 
 
 def _figures(notebooks: Mapping[str, Notebook]) -> Iterator[tuple[bytes, str]]:
     """PNG and caption: figures in the paper's order, our own after them."""
-    pages = [(picture, notes) for notes in notebooks.values() for picture in notes.pictures]
-    for picture, notes in sorted(pages, key=lambda page: page[0].label or "9"):
-        title = f"Figure {picture.label}" if picture.label else "Beyond the paper"
-        yield notes.png(picture).read_bytes(), f"{title}. {picture.caption}"
+    pages = [(*page, notes.folder) for notes in notebooks.values() for page in notes.pictures]
+    for label, name, caption, folder in sorted(pages, key=lambda page: page[0] or "9"):
+        title = f"Figure {label}" if label else "Beyond the paper"
+        yield (folder / f"{name}.png").read_bytes(), f"{title}. {caption}"

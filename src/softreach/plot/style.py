@@ -73,7 +73,7 @@ def pyplot() -> Any:
 
         _load_backend()
     except ModuleNotFoundError as error:
-        raise MissingExtra(("matplotlib", "plot")) from error
+        raise MissingExtra("matplotlib") from error
     except ValueError as error:  # of a backend that does not exist
         backend = os.environ.get("MPLBACKEND", "")
         allowed = "a backend of matplotlib"

@@ -6,6 +6,7 @@ import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -13,7 +14,6 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.export.formats import load_library
 from softreach.geometry.surface import enclosed_volume
 from softreach.kernels.points.triangles import nearest_faces
 from softreach.support import parallel
@@ -28,7 +28,7 @@ from softreach.support.arrays import (
     check_finite,
     read_only,
 )
-from softreach.support.errors import InvalidInput, NotPossible, counted
+from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
 from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
@@ -307,7 +307,8 @@ class Mesh(Region):
         size = as_unit(stated if unit is None else unit)
         if stated not in (None, size.name):
             raise InvalidInput("unit", size.name, f"{stated}, as {name} says")
-        trimesh = load_library("trimesh")
+        check_installed("trimesh")
+        trimesh = import_module("trimesh")
         try:
             scene: Any = trimesh.load(name, force="scene")
             parts = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
@@ -315,7 +316,7 @@ class Mesh(Region):
                 raise ValueError(f"{count:,} triangles are more than {_MOST_FACES:,}")
             mesh: Any = scene.to_mesh()
             mesh.merge_vertices()
-            load_library("trimesh.repair").fix_winding(mesh)
+            import_module("trimesh.repair").fix_winding(mesh)
             vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
         except Exception as error:  # of readers of many formats
             raise InvalidInput("path", repr(name), f"a mesh that can be read: {error}") from None

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from softreach.studio.scene.camera import FOV
-from softreach.support.errors import InvalidInput, MissingExtra
+from softreach.support.errors import InvalidInput, check_installed
 
 if TYPE_CHECKING:
     from viser import GuiApi, ViserServer
@@ -68,10 +68,8 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
             is a version whose requests cannot be checked.
         MissingExtra: viser is not installed.
     """
-    try:
-        import viser
-    except ModuleNotFoundError as error:
-        raise MissingExtra(("viser", "studio")) from error
+    check_installed("viser")
+    import viser
 
     _check_address(host, port or 0)
     # viser prints a banner; we print our own line.

@@ -14,8 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.studio.reach import Quality, Reach, reached
 from softreach.studio.state import LARGEST, StudioState
 from softreach.support.errors import SoftreachError
-from softreach.support.files.atomic import replacing
-from softreach.support.files.text import read_text
+from softreach.support.files.text import read_text, write_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,8 +88,8 @@ class KeptWork:
         """Keep the latest state; a disk that is full or read-only costs the memory of the work."""
         self.latest = state
         try:
-            with self._writing, replacing(self._path, overwrite=True) as partial:
-                partial.write_text(state.to_json(), encoding="utf-8")
+            with self._writing:
+                write_text(self._path, state.to_json(), overwrite=True)
         except (SoftreachError, OSError) as error:
             self._complain(error)
 

@@ -31,10 +31,10 @@ from softreach.support.errors import (
     MissingExtra,
     NotWritten,
     SoftreachError,
+    check_installed,
     no_warnings,
 )
 from softreach.support.files.atomic import check_place, writing
-from softreach.support.files.formats import check_installed
 from softreach.support.progress import Progress, silent
 from softreach.support.quantity import quantity
 from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
@@ -86,7 +86,7 @@ def write_static(
         NotWritten: Nothing can be written there.
         MissingExtra: matplotlib or scikit-image is not installed.
     """
-    check_installed(("matplotlib", "plot"), ("skimage", "surface"))
+    check_installed("matplotlib", "skimage")
     place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)
     if space.layout != "grid" or space.size > _MOST:
         raise InvalidInput("designs", f"{space.size:,}", f"a grid of {_MOST:,} at most")

@@ -155,14 +155,6 @@ def as_directions(name: str, values: object, count: int | None = None) -> Array:
     return units if count is None else np.ascontiguousarray(np.broadcast_to(units, (count, 3)))
 
 
-def as_shares(name: str, values: object) -> Array:
-    """Numbers from 0 to 1, shape (k,), one at least."""
-    shares = as_floats(name, values)
-    if shares.ndim == 1 and shares.size and ((shares >= 0) & (shares <= 1)).all():
-        return shares
-    raise InvalidInput(name, values, "one number from 0 to 1 or more of them, shape (k,)")
-
-
 def as_indices(name: str, values: object, count: int, what: str) -> Index:
     """Indices from 0 to count - 1 of things such as "samples of the cloud", shape (k,)."""
     allowed = f"one-dimensional, of whole numbers from 0 to {count - 1:,}, {what}"

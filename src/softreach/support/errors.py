@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import sys
 import warnings
@@ -144,18 +145,41 @@ class InvalidDesign(SoftreachError, ValueError):
             super().__init__("\n".join(lines))
 
 
+_EXTRAS = {
+    "matplotlib": "plot",
+    "pyarrow": "export",
+    "trimesh": "export",
+    "meshio": "export",
+    "skimage": "surface",
+    "distributed": "cluster",
+    "viser": "studio",
+    "jinja2": "report",
+    "optuna": "search",
+    "cmaes": "search",
+}
+"""Module -> extra of softreach that brings it."""
+
+
 class MissingExtra(SoftreachError, ImportError):
     """Optional libraries are needed but not installed."""
 
-    def __init__(self, *missing: tuple[str, str]) -> None:
-        """Each of `missing` is a library and the extra of softreach that brings it."""
-        libraries = " and ".join(dict.fromkeys(library for library, _ in missing))
-        extras = ",".join(dict.fromkeys(extra for _, extra in missing))
-        them = "it" if len({library for library, _ in missing}) == 1 else "them"
+    def __init__(self, *modules: str) -> None:
+        names = dict.fromkeys(name.replace("skimage", "scikit-image") for name in modules)
+        extras = ",".join(dict.fromkeys(_EXTRAS[name] for name in modules))
         super().__init__(
-            f"this needs {libraries}; install {them} with: pip install 'softreach[{extras}]', "
-            "or in a clone with: make setup"
+            f"this needs {' and '.join(names)}; install {'them' if len(names) > 1 else 'it'} with: "
+            f"pip install 'softreach[{extras}]', or in a clone with: make setup"
         )
+
+
+def check_installed(*modules: str) -> None:
+    """Name the modules that are missing, all at once, without the time that importing them takes.
+
+    Raises:
+        MissingExtra: Some are not installed.
+    """
+    if missing := [name for name in modules if importlib.util.find_spec(name) is None]:
+        raise MissingExtra(*missing)
 
 
 class NotWritten(SoftreachError, OSError):

@@ -13,6 +13,7 @@ _FINEST = 1e-9  # of the value: what follows is rounding
 _DECIMAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(rf"\s*({_DECIMAL})\s*(.*?)\s*", re.ASCII)
 _WHOLE = re.compile(r"\s*[+-]?\d+(?:_\d+)*\s*", re.ASCII)
+_DEGREE = str(Decimal(math.radians(1.0)))
 _UNITS = {
     "kg": {"kg": "1", "g": "1e-3", "mg": "1e-6"},
     "m": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "µm": "1e-6"},
@@ -24,9 +25,9 @@ _UNITS = {
     "kg/m": {"kg/m": "1", "g/m": "1e-3"},
     "kg/m³": {"kg/m3": "1", "kg/m³": "1", "g/cm3": "1e3", "g/cm³": "1e3"},
     "m/s²": {"m/s2": "1", "m/s²": "1"},
+    "rad": {"deg": _DEGREE, "°": _DEGREE, "rad": "1"},
 }
 """SI unit -> units that may be written in its place, with their size in it."""
-_ANGLES = ("deg", "°", "rad")
 
 
 def quantity(value: float, unit: str = "", error: float = math.nan, digits: int = 1) -> str:
@@ -40,7 +41,12 @@ def quantity(value: float, unit: str = "", error: float = math.nan, digits: int 
     """
     if math.isfinite(value) and 0 < error < math.inf:
         return f"{_with_error(value, error, digits)} {unit}".rstrip()
-    return f"{value:.5g}{unit if unit == '°' else f' {unit}'}".rstrip()
+    return f"{five_digits(value)}{unit if unit == '°' else f' {unit}'}".rstrip()
+
+
+def five_digits(value: float) -> str:
+    """A number with five digits that count, and without an exponent up to a million."""
+    return f"{float(f'{value:.5g}'):.6g}"
 
 
 def _with_error(value: float, error: float, digits: int) -> str:
@@ -99,18 +105,11 @@ def numbers_in(text: str, count: int | None = None) -> list[float] | None:
 
 def unit_names(unit: str) -> tuple[str, ...]:
     """The units that a quantity of this SI unit may be written in; none for a plain number."""
-    if unit == "rad":
-        return _ANGLES
     return () if unit == "1" else tuple(_UNITS.get(unit, (unit,)))
 
 
 def sizes_in(unit: str) -> dict[str, float]:
     """The units that may be written in place of one, such as "mm", with their sizes in it."""
-    if unit in _ANGLES:
-        sizes = {name: 1.0 if name == "rad" else math.radians(1.0) for name in _ANGLES}
-        return {
-            name: 1.0 if size == sizes[unit] else size / sizes[unit] for name, size in sizes.items()
-        }
     known = next((units for units in _UNITS.values() if unit in units), {unit: "1"})
     return {name: float(Decimal(size) / Decimal(known[unit])) for name, size in known.items()}
 
@@ -134,8 +133,8 @@ def read_quantity(text: str, unit: str) -> float:
     value = float(number)
     if symbol not in (unit_names(unit) or ("",)) and (symbol or value):
         raise ValueError(text)
-    if symbol in _ANGLES:
-        value = value if symbol == "rad" else math.radians(value)
+    if symbol in ("deg", "°"):
+        value = math.radians(value)
     elif abs(value) < math.inf:  # decimals, so that 200 g are 0.2 kg to the last bit
         value = float(Decimal(number) * Decimal(_UNITS.get(unit, {}).get(symbol, "1")))
     if not math.isfinite(value):

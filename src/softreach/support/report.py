@@ -12,13 +12,13 @@ from importlib.resources import files
 from os import PathLike
 from typing import Any
 
-from softreach.support.arguments import as_flag, as_path
+from softreach.support.arguments import as_path
 from softreach.support.errors import counted
-from softreach.support.files.atomic import writing
-from softreach.support.files.formats import FileFormat, Formats, check_installed, format_of
+from softreach.support.files.formats import FileFormat, Formats, format_of
+from softreach.support.files.text import write_text
 from softreach.support.quantity import columns
 
-REPORT: Formats = {".html": FileFormat(("jinja2",), "report")}
+REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}
 """Formats of reports."""
 
 _DPI = 160
@@ -79,9 +79,7 @@ class Report:
             InvalidInput: Something is there, or another suffix.
             MissingExtra: matplotlib or Jinja2 is not installed.
         """
-        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        format_of(path, REPORT)
-        check_libraries()
+        format_of(as_path("path", path), REPORT)
         from jinja2 import Environment, StrictUndefined
 
         text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
@@ -89,8 +87,7 @@ class Report:
         pictures = [[(_source(f), c) for f, c in part.figures()] for part in self.sections]
         parts = list(zip(self.sections, pictures, strict=True))
         page = pages.from_string(text).render(report=self, parts=parts)
-        with writing(path, overwrite=overwrite) as file:
-            file.write(page.encode())
+        write_text(path, page, overwrite=overwrite)
 
 
 class Reported(ABC):
@@ -107,17 +104,7 @@ class Reported(ABC):
         return self.report()._repr_html_()
 
 
-def check_libraries() -> None:
-    """Say which libraries of a report with pictures are missing.
-
-    Raises:
-        MissingExtra: matplotlib or Jinja2 is not installed.
-    """
-    check_installed(("matplotlib", "plot"), ("jinja2", "report"))
-
-
 def _source(figure: Any) -> str:
-    """Source of a picture inside the page."""
     if not isinstance(figure, bytes):
         from matplotlib import pyplot as plt
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import quantity, read_number, read_quantity, unit_names
+from softreach.support.quantity import five_digits, quantity, read_number, read_quantity, unit_names
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -25,7 +25,8 @@ _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6)}
 """Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
 
-_POWERS = {"m": 1, "m2": 2, "m3": 3}
+POWERS = {"m": 1, "m2": 2, "m²": 2, "m3": 3, "m³": 3}
+"""SI unit of lengths, areas and volumes -> power of the length."""
 
 _PRESSURES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}
 
@@ -74,7 +75,7 @@ class LengthUnit(NamedTuple):
 
     def place(self, point: Iterable[float]) -> str:
         """A position [m] in words: "(200, 100, 600) mm"."""
-        return f"({', '.join(f'{x / self.size:.6g}' for x in point)}) {self.name}"
+        return f"({', '.join(f'{five_digits(x / self.size)}' for x in point)}) {self.name}"
 
     def scale(self, power: int = 1) -> float:
         """Size of the unit of lengths [m], of areas [m²] for power 2, of volumes [m³] for 3."""
@@ -100,11 +101,7 @@ def in_lengths(length: float | None) -> LengthUnit:
 
 
 def as_unit(unit: object, length: float | None = None) -> LengthUnit:
-    """The unit of that name.
-
-    Args:
-        unit: One of `UNITS`, or a unit.
-        length: L [m] of the arm; None where it is not known, and L no unit.
+    """The unit of that name, of which L is one where the length [m] of the arm is known.
 
     Raises:
         InvalidInput: No such unit, or L where it is not known.
@@ -129,13 +126,10 @@ def handy_unit(length: float) -> str:
 def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, float]:
     """The unit that people read a number in, and its size.
 
-    Args:
-        unit: SI unit of the number; "1" for none.
-        value: The number, for a unit of pressure of its size.
-        length: Unit of lengths, areas and volumes.
+    Of an SI unit, "1" for none: that of length for lengths, areas and volumes; of pressures one of
+    the size of the number.
     """
-    if unit in _POWERS:
-        power = _POWERS[unit]
+    if power := POWERS.get(unit):
         return length.symbol(power), length.scale(power)
     if unit == "rad":
         return "°", math.pi / 180.0
@@ -144,25 +138,19 @@ def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, flo
     return ("" if unit == "1" else unit), 1.0
 
 
-def readable(value: float, unit: str, length: LengthUnit, error: float = math.nan) -> str:
-    """A number as people read it, to the first digit of its error: "12.5 mm", "20.3°".
+def readable(
+    value: float, unit: str, length: LengthUnit, error: float = math.nan, *, digits: int = 1
+) -> str:
+    """A number in an SI unit as people read it, to some digits of its error: "12.5 mm", "20.3°".
 
-    Args:
-        value: The number.
-        unit: Its SI unit; "1" for none.
-        length: Unit of lengths, areas and volumes.
-        error: How far off it may be, same unit as the number.
+    Lengths, areas and volumes are in the unit of length.
     """
     name, size = readable_unit(unit, value, length)
-    return quantity(value / size, name, error / size)
+    return quantity(value / size, name, error / size, digits)
 
 
 def read_length(text: str, length: float | None = None) -> float:
-    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L".
-
-    Args:
-        text: A number and its unit.
-        length: L [m]; None where it is not known, and L no unit.
+    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L" where L is known [m].
 
     Raises:
         ValueError: No finite number, or another unit.
@@ -176,13 +164,7 @@ def read_length(text: str, length: float | None = None) -> float:
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
     """Comma-separated lengths [m], each with its unit or all without; a zero needs none.
 
-    Args:
-        text: What was typed.
-        count: How many there must be.
-        length: As in `read_length`.
-
-    Returns:
-        The lengths; None if the text is anything else.
+    None if the text is anything else than so many of what `read_length` takes.
     """
     parts = text.split(",")
     try:

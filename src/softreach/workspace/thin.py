@@ -15,7 +15,7 @@ from softreach.rod.rods import ArmMap, refined
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array, Index
-from softreach.support.errors import MissingExtra
+from softreach.support.errors import check_installed
 from softreach.support.progress import Progress
 from softreach.workspace.cells import CLIMBERS, drawn_tight, lost_share, shifted_lattice
 from softreach.workspace.grid import (
@@ -182,10 +182,9 @@ class _Outline(NamedTuple):
     @classmethod
     def of(cls, grid: ReachedGrid) -> _Outline:
         """The level set of the distances, drawn tight."""
-        try:
-            from skimage.measure import find_contours
-        except ImportError as error:
-            raise MissingExtra(("scikit-image", "surface")) from error
+        check_installed("skimage")
+        from skimage.measure import find_contours
+
         curves = find_contours(grid.distances[:, :, 2], DISTANCE, positive_orientation="low")
         at = np.insert(np.concatenate([np.empty((0, 2)), *curves]), 2, 2.0, axis=1)
         first = np.delete(np.arange(len(at)), np.cumsum([len(curve) for curve in curves]) - 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from io import BufferedWriter
-from itertools import chain
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,12 +20,14 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.text import MEGABYTE, read_text
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
+_LARGEST = 500 * MEGABYTE  # eight million samples
 _ENDING = "_gamma"
 _NO_NUMBER = re.compile(r"could not convert string (.*) to float64 at row (\d+), column (\d+)")
 
@@ -62,13 +63,13 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     """
     arm, path = a_manipulator("arm", arm), as_path("path", path)
     filament = filament_of(arm)
-    activations = gamma_path(path)
-    tip = _table(Path(path), 3, "x, y, z")
+    activations = fspath(gamma_path(path))
+    tip = _table(path, 3, "x, y, z")
     sectors = ", ".join(ring.name or "no fibers" for ring in filament.rings)
-    columns = _table(activations, filament.columns, f"the sectors of {sectors}")
+    columns = _table(activations, len(filament.columns[0]), f"the sectors of {sectors}")
     if len(tip) != len(columns):
         rows = counted(len(columns), "row")
-        raise InvalidInput(fspath(activations), rows, f"{len(tip)}, as {fspath(path)} has")
+        raise InvalidInput(activations, rows, f"{len(tip)}, as {path} has")
     activation = filament.from_columns(columns)
     difference = float(np.linalg.norm(tip - tip_positions(arm, activation, tol), axis=1).max())
     low, high = arm.bounds.T
@@ -119,28 +120,21 @@ def _write(file: BufferedWriter, values: Array) -> None:
 CLOUD_PAIR: Formats = {".csv": FileFormat()}  # Format of `write_cloud`
 
 
-def _table(path: Path, columns: int, meaning: str) -> Array:
-    name, allowed = fspath(path), "rows of comma-separated numbers"
-    if not path.is_file():
-        raise InvalidInput("file", name, "a file that exists")
+def _table(path: str, columns: int, meaning: str) -> Array:
+    text, allowed = read_text("file", path, _LARGEST), "rows of comma-separated numbers"
+    if not text.strip():
+        raise InvalidInput(path, "no rows", allowed)  # of which NumPy would warn
     try:
-        # NumPy would unpack or fetch what it is given by name.
-        with path.open(encoding="utf-8-sig") as file:
-            if not (first := next((line for line in file if line.strip()), "")):
-                raise InvalidInput(name, "no rows", allowed)  # of which NumPy would warn
-            table = np.loadtxt(chain([first], file), delimiter=",", comments=None, ndmin=2)
-    except InvalidInput:
-        raise
-    except (ValueError, OverflowError, MemoryError) as error:
-        text = str(error).partition(";")[0] or type(error).__name__
-        if match := _NO_NUMBER.search(text):
-            text = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
-        text = "no text" if isinstance(error, UnicodeDecodeError) else text
-        raise InvalidInput(name, text, allowed) from None
+        table = np.loadtxt(text.split("\n"), delimiter=",", comments=None, ndmin=2)
+    except ValueError as error:
+        cause = str(error).partition(";")[0]
+        if match := _NO_NUMBER.search(cause):
+            cause = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
+        raise InvalidInput(path, cause, allowed) from None
     if table.shape[1] != columns:
         size = counted(table.shape[1], "column")
-        raise InvalidInput(name, size, f"{columns}: {meaning}")
+        raise InvalidInput(path, size, f"{columns}: {meaning}")
     if not (good := np.isfinite(table).all(axis=1)).all():
         row = int(np.argmin(good)) + 1
-        raise InvalidInput(f"{name}, row {row}", table[row - 1].tolist(), "finite numbers")
+        raise InvalidInput(f"{path}, row {row}", table[row - 1].tolist(), "finite numbers")
     return table

@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from os import PathLike
 
@@ -16,7 +17,7 @@ from softreach.arm.along import AlongArm, Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.text import write_text
@@ -62,33 +63,23 @@ class Filament:
     core_modulus: float  # E inside of the first ring [Pa]
     core_poisson_ratio: float  # ν inside of the first ring [-]
 
-    @property
-    def columns(self) -> int:
-        """Number of its activations: sectors of all rings."""
-        return sum(len(ring.bounds) for ring in self.rings)
+    @cached_property
+    def columns(self) -> tuple[Index, Array]:
+        """The bundle of the arm in each of its sectors, -1 where there is none; their scales."""
+        pairs = [(k, ring.scale) for ring in self.rings for k in ring.bundles or (-1,)]
+        bundles, scales = zip(*pairs, strict=True)
+        return np.array(bundles), np.array(scales)
 
     def to_columns(self, activation: Array) -> Array:
         """Their activations from those of the arm, shape (sample, bundle) to (sample, column)."""
-        columns = np.zeros((len(activation), self.columns))
-        for ring, places in self._places():
-            columns[:, places] = activation[:, list(ring.bundles)] * ring.scale
-        return columns
+        bundles, scales = self.columns
+        return np.where(bundles < 0, 0.0, activation[:, bundles] * scales)
 
     def from_columns(self, columns: Array) -> Array:
         """Activations of the arm from theirs, shape (sample, column) to (sample, bundle)."""
-        activation = np.zeros((len(columns), sum(len(ring.bundles) for ring in self.rings)))
-        for ring, places in self._places():
-            activation[:, list(ring.bundles)] = columns[:, places] / ring.scale
-        return activation
-
-    def _places(self) -> Iterator[tuple[FilamentRing, slice]]:
-        """Rings with fibers, and the columns of each."""
-        first = 0
-        for ring in self.rings:
-            last = first + len(ring.bounds)
-            if ring.bundles:
-                yield ring, slice(first, last)
-            first = last
+        bundles, scales = self.columns
+        own = np.argsort(bundles)[np.count_nonzero(bundles < 0) :]
+        return columns[:, own] / scales[own]
 
 
 def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:

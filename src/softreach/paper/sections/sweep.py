@@ -85,7 +85,7 @@ def size(n: Numbers) -> Finding:
 
 
 def widening(n: Numbers) -> Finding:
-    aside, helicity, taper = np.array(n.aside), _share(n, "aside", 0), _share(n, "aside", 1)
+    aside, helicity, taper = n.aside, _share(n, "aside", 0), _share(n, "aside", 1)
     words = (
         f"the volume beyond {n.aside_from:g} L from that plane grows in {_rises(n, 'aside', 0)} "
         f"steps of Ω and {_rises(n, 'aside', 1)} of φ: without helicity from {aside[0, 0]:.3f} to "
@@ -97,7 +97,7 @@ def widening(n: Numbers) -> Finding:
 
 
 def thickness(n: Numbers) -> Finding:
-    thick = np.array(n.thickness)
+    thick = n.thickness
     words = (
         f"the mean thickness 2 V/A of the reachable set is {thick[0].min():.3f} to "
         f"{thick[0].max():.3f} L at Ω = {n.revolution_deg[0]:.3g}° and {thick[-1].min():.3f} to "
@@ -108,7 +108,7 @@ def thickness(n: Numbers) -> Finding:
 
 
 def behind(n: Numbers) -> Finding:
-    volume = np.array(n.behind)
+    volume = n.behind
     words = (
         f"the volume behind the arm (y > 0) grows in {_rises(n, 'behind', 1)} steps of φ; at "
         f"the largest Ω from {volume[-1, 0]:.3f} to {volume[-1].max():.3f} L³ at φ = "
@@ -120,7 +120,7 @@ def behind(n: Numbers) -> Finding:
 
 
 def hulls(n: Numbers) -> Finding:
-    off = np.array(n.volume) / n.exact_volume - 1
+    off = n.volume / n.exact_volume - 1
     words = f"α-shapes are {off.min():+.1%} to {off.max():+.1%} off the exact volume"
     return judged(words, np.abs(off).max() < 0.1, np.abs(np.median(off)) < 0.1)
 
@@ -135,7 +135,7 @@ def growth(n: Numbers) -> Finding:
 
 
 def maximum(n: Numbers) -> Finding:
-    cloud, exact = np.array(n.volume), np.array(n.exact_volume)
+    cloud, exact = n.volume, n.exact_volume
     at_two = np.interp(2.0, n.taper_deg, exact[-1])
     places = ", ".join(f"{taper:.2g}° for {ratio}" for ratio, taper in n.best_taper_deg.items())
     words = (
@@ -151,8 +151,7 @@ def maximum(n: Numbers) -> Finding:
 
 
 def optimum(n: Numbers) -> Finding:
-    both = (np.argmax(volumes, axis=1) for volumes in (n.volume, n.exact_volume))
-    best, exact = (np.array(n.taper_deg)[places] for places in both)
+    best, exact = (n.taper_deg[v.argmax(axis=1)] for v in (n.volume, n.exact_volume))
     words = (
         f"the best φ lies between {best.min():.3g}° and {best.max():.3g}°, depending on Ω; by "
         f"exact volumes between {exact.min():.3g}° and {exact.max():.3g}°"
@@ -161,8 +160,7 @@ def optimum(n: Numbers) -> Finding:
 
 
 def overtapered(n: Numbers) -> Finding:
-    both = (np.array(volumes) for volumes in (n.volume, n.exact_volume))
-    lost, exact = (1 - volumes[:, -1] / volumes.max(axis=1) for volumes in both)
+    lost, exact = (1 - v[:, -1] / v.max(axis=1) for v in (n.volume, n.exact_volume))
     words = (
         f"φ = {n.taper_deg[-1]:g}° has {lost.min():.0%} to {lost.max():.0%} less volume "
         f"than the best φ (exact volumes: {exact.min():.0%} to {exact.max():.0%})"
@@ -171,7 +169,7 @@ def overtapered(n: Numbers) -> Finding:
 
 
 def decline(n: Numbers) -> Finding:
-    exact = np.array(n.exact_unreachability)
+    exact = n.exact_unreachability
     rise = max(0.0, *(np.diff(exact, axis=k).max() for k in (0, 1)))
     cloud, own = ("unreachability", "exact_unreachability")
     words = (
@@ -218,8 +216,8 @@ def cover(n: Numbers) -> Finding:
 
 def _steps(n: Numbers, name: str, axis: int) -> tuple[int, int, int]:
     """Steps along an axis that go up and down by more than the errors, and all."""
-    values = np.array(getattr(n, name))
-    error = np.array(getattr(n, f"{name}_error", 0.0 * values))
+    values = getattr(n, name)
+    error = getattr(n, f"{name}_error", 0.0 * values)
     if name == "exact_unreachability":  # as much from either of its volumes
         error = 2.0 * (1.0 - values) * n.exact_volume_error / n.exact_volume
     step, error = np.diff(values, axis=axis), np.swapaxes(error, 0, axis)
@@ -246,7 +244,7 @@ def _place_of_max(n: Numbers, values: Array) -> str:
 
 def _curvatures(n: Numbers, quantile: float) -> Array:
     """Without and with taper, at each station."""
-    return np.array(n.curvature)[..., n.quantiles.index(quantile)]
+    return n.curvature[..., n.quantiles.tolist().index(quantile)]
 
 
 def _best_tapers(turn: float, tapers: Array, accuracy: float) -> dict[float, float]:

@@ -49,7 +49,7 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
 
 
 def unique(n: Numbers) -> Finding:
-    share, example = np.array(n.share, float), "No place with two activations was found"
+    example = "No place with two activations was found"
     if len(n.activations) > 1:
         rows = [", ".join(f"{g:.3f}" for g in row) for row in n.activations]
         tip = ", ".join(f"{x:.3f}" for x in n.tip)
@@ -57,8 +57,8 @@ def unique(n: Numbers) -> Finding:
     words = (
         f"{n.paper_share:.2%} of the volume is reached by more than one activation at Ω = 108°, "
         f"φ = 2°, up to {n.worst:.1%} at Ω = {n.revolution_deg:.4g}°, "
-        f"φ = {n.taper_deg:.3g}°; less than 0.1 % in {int((share < 1e-3).sum())} of "
-        f"{share.size} designs. {example}"
+        f"φ = {n.taper_deg:.3g}°; less than 0.1 % in {int((n.share < 1e-3).sum())} of "
+        f"{n.share.size} designs. {example}"
     )
     return judged(words, len(n.activations) < 2, n.worst < 0.1)
 

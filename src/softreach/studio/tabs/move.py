@@ -14,7 +14,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.export.clouds import path_csv
 from softreach.inverse.drag import Drag
-from softreach.inverse.path import PathStatus, track_path
+from softreach.inverse.path import PathStatus, end_text, track_path
 from softreach.inverse.request import positions_in
 from softreach.schema import input_symbols
 from softreach.studio.captions import place_text, tip_text
@@ -264,24 +264,7 @@ def _path_text(state: StudioState, found: Found) -> list[str]:
     if state.path is None:
         return []
     track = _track(state, found)
-    return ["following ..." if track is None else end_text(track, state.design)]
-
-
-def end_text(track: xr.Dataset, arm: Manipulator) -> str:
-    """End of a path that `track_path` followed, and the reason for it, in words."""
-    count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
-    end, way = track.attrs["end"], arm.length_unit.rounded(float(track.end_length))
-    if end == "no_start":
-        return "The first point is not reached: out of reach, or not from this activation."
-    if end == "end":
-        return f"All {points} points are followed: {way} of path."
-    reasons = {
-        "fold": "the branch turns back (a fold)",
-        "snaps": "the arm snaps to another posture",
-        "bound": "{end_bundle} is at its {end_bound} bound",
-    }
-    reason = reasons[end].format(**track.attrs)
-    return f"{count} of {points} points are followed, {way} of path: there {reason}."
+    return ["following ..." if track is None else end_text(track, state.design.length_unit)]
 
 
 def extend_path(session: Session, point: np.ndarray) -> None:

@@ -47,26 +47,20 @@ def check_place(
 ) -> Path:
     """The place, absolute and without links, where a file or a folder may be written.
 
-    Args:
-        path: The place.
-        overwrite: Whether what is there may be replaced.
-        foreign: Given for a folder, which is replaced only if it holds nothing foreign.
-        name: What errors call the path.
+    `foreign` is given for a folder, which is replaced only if it holds nothing foreign.
 
     Raises:
         InvalidInput: Something is there that may not be replaced.
         NotWritten: Nothing can be written there.
 
     Warns:
-        SoftreachWarning: The replacement of a folder was killed; see `mend`.
+        SoftreachWarning: The replacement of a folder was killed between two renames.
     """
     shown = os.fspath(path)
-    if not shown or "\0" in shown:
-        raise InvalidInput(name, repr(shown), "the name of a file")
     place = Path(os.path.realpath(shown))
     with _one_line(path):
-        if foreign is not None:
-            mend(path)
+        if foreign is not None and (whole := _rename_what_is_whole(place)):
+            warn(f"{path}: its replacement was killed; {whole.name} was renamed to it")
         try:
             mode = place.stat().st_mode
         except FileNotFoundError:
@@ -93,10 +87,12 @@ def _refusal(place: Path, mode: int, foreign: Foreign | None, overwrite: bool) -
 
 
 @contextmanager
-def replacing(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
-    """A name beside `path`, with its suffix, for a file that takes its place on success.
+def writing(path: StrPath, *, overwrite: bool = False) -> Iterator[io.BufferedWriter]:
+    """A file beside `path` to write to, which takes its place on success.
 
-    After an error or Ctrl-C an older file is as it was.
+    After an error or Ctrl-C an older file is as it was. The file is ours and not the library's that
+    fills it, so that no error of writing, flushing or closing can get lost; its name keeps the
+    suffix of `path`.
 
     Raises:
         InvalidInput: Something is there that may not be replaced; see `check_place`.
@@ -106,7 +102,10 @@ def replacing(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
     with _one_line(path):
         partial = _beside(place)
         try:
-            yield partial
+            with _WatchedFile(io.FileIO(partial, "xb")) as file:
+                yield file
+                if file.failure is not None:
+                    raise file.failure
             sync(partial)
             check_place(path, overwrite=overwrite)  # hours may have passed
             os.replace(partial, place)
@@ -116,30 +115,8 @@ def replacing(path: StrPath, *, overwrite: bool = False) -> Iterator[Path]:
 
 
 @contextmanager
-def writing(path: StrPath, *, overwrite: bool = False) -> Iterator[io.BufferedWriter]:
-    """A file to write to, which takes the place of `path` on success; as `replacing`.
-
-    The file is ours and not the library's that fills it, so that no error of writing, flushing or
-    closing can get lost.
-    """
-    with (
-        replacing(path, overwrite=overwrite) as partial,
-        _WatchedFile(io.FileIO(partial, "xb")) as file,
-    ):
-        yield file
-        if file.failure is not None:
-            raise file.failure
-
-
-@contextmanager
 def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False) -> Iterator[Path]:
-    """An empty folder beside `path`, which takes its place on success; as `replacing`.
-
-    Args:
-        path: The place.
-        foreign: As for `check_place`.
-        overwrite: Whether what is there may be replaced.
-    """
+    """An empty folder beside `path`, which takes its place on success; as `writing`."""
     place = check_place(path, overwrite=overwrite, foreign=foreign)
     new, old = _siblings(place)
     with _one_line(path):
@@ -166,27 +143,15 @@ def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False
             _rename_what_is_whole(place)  # after Ctrl-C between two renames
 
 
-def mend(path: StrPath) -> None:
-    """Bring a folder to its name if a process was killed between two renames; for writers.
-
-    Warns:
-        SoftreachWarning: That was so.
-    """
-    if whole := _rename_what_is_whole(Path(os.path.realpath(path))):
-        warn(f"{path}: its replacement was killed; {whole.name} was renamed to it")
-
-
 def place_to_read(path: StrPath) -> str:
     """The place of a folder to be read: its name, or where a killed process left it.
 
     Warns:
         SoftreachWarning: It is read from there.
     """
-    place = Path(os.path.realpath(path))
-    for whole in () if os.path.lexists(place) else _siblings(place):
-        if whole.is_dir():
-            warn(f"{path}: its replacement was killed; {whole.name} is read")
-            return os.fspath(whole)
+    if whole := _whole(Path(os.path.realpath(path))):
+        warn(f"{path}: its replacement was killed; {whole.name} is read")
+        return os.fspath(whole)
     return os.fspath(path)
 
 
@@ -211,12 +176,15 @@ def _siblings(place: Path) -> tuple[Path, Path]:
     return place.with_name(f"{place.name}{MARK}new"), place.with_name(f"{place.name}{MARK}old")
 
 
+def _whole(place: Path) -> Path | None:
+    """What a killed process left whole of a folder that is missing."""
+    return next(filter(Path.is_dir, () if os.path.lexists(place) else _siblings(place)), None)
+
+
 def _rename_what_is_whole(place: Path) -> Path | None:
-    for whole in () if os.path.lexists(place) else _siblings(place):
-        if whole.is_dir():
-            os.rename(whole, place)
-            return whole
-    return None
+    if whole := _whole(place):
+        os.rename(whole, place)
+    return whole
 
 
 def _discard(whole: Path) -> None:

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable, Mapping
 from io import BufferedWriter
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from softreach.support.errors import InvalidInput, MissingExtra
+from softreach.support.errors import InvalidInput, check_installed
 from softreach.support.files.atomic import Foreign
-
-_PACKAGES = {"skimage": "scikit-image"}
-"""Packages by the name of their module, where that is another."""
 
 
 class FileFormat(NamedTuple):
     """A format of files, or of folders, that is written."""
 
     libraries: tuple[str, ...] = ()
-    """Libraries that are imported to write it."""
-    extra: str = ""
-    """The extra of softreach that brings these."""
+    """Modules that are imported to write it."""
     write: Callable[[Any, BufferedWriter], None] | None = None
     """Writes a content to a file, where several formats take the same content."""
     foreign: Foreign | None = None
@@ -36,11 +30,6 @@ Formats = Mapping[str, FileFormat]
 def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -> FileFormat:
     """The format that a path names by its suffix.
 
-    Args:
-        path: The path.
-        formats: What can be written there.
-        name: What errors call the path.
-
     Raises:
         InvalidInput: Another suffix; the error lists those there are.
         MissingExtra: The format needs a library that is not installed.
@@ -48,26 +37,13 @@ def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -
     known = formats.get(Path(path).suffix.lower())
     if known is None:
         raise InvalidInput(name, fspath(path), "a file name ending in " + ", ".join(formats))
-    check_installed(*((library, known.extra) for library in known.libraries))
+    check_installed(*known.libraries)
     return known
-
-
-def check_installed(*needed: tuple[str, str]) -> None:
-    """Say which libraries are missing, all at once, without the time that importing them takes.
-
-    Args:
-        needed: The name under which a library is imported, and the extra that brings it.
-
-    Raises:
-        MissingExtra: Some are not installed.
-    """
-    if missing := [pair for pair in needed if importlib.util.find_spec(pair[0]) is None]:
-        raise MissingExtra(*((_PACKAGES.get(name, name), extra) for name, extra in missing))
 
 
 PICTURES: Formats = dict.fromkeys(
     (".png", ".pdf", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"),
-    FileFormat(("matplotlib",), "plot"),
+    FileFormat(("matplotlib",)),
 )
 """Formats of figures."""
 

@@ -97,15 +97,20 @@ class Chunk(NamedTuple):
 
 
 @dataclass(eq=False)
-class Watch:
-    """What is known of the files of a store that is read, and what becomes of damaged ones."""
+class Opened:
+    """A store that is open, what is known of its files, and what becomes of damaged ones."""
 
     location: object
     kind: Kind
+    durable: bool
+    """Whether a file is on the disk, not only on its way there, when it counts as written."""
     required: Callable[[Chunk], bool] = lambda _: False
     """True for chunks that must exist; others that are missing hold fill values."""
     digests: dict[str, str] = field(default_factory=dict)
     """Digest of what describes each array, as the root lists it."""
+    place: StorePath = field(init=False)
+    """For xarray."""
+    group: zarr.Group = field(init=False)
     _noted: dict[Chunk, DamagedStore] | None = None
 
     def report(self, chunk: Chunk, found: str) -> None:
@@ -116,36 +121,21 @@ class Watch:
         self._noted[chunk] = error
 
     @contextmanager
-    def noting(self) -> Iterator[dict[Chunk, DamagedStore]]:
-        """Read damaged files as missing ones, and collect what is wrong with each."""
-        before, self._noted = self._noted, {}
+    def noting(self, *, raising: bool = False) -> Iterator[dict[Chunk, DamagedStore]]:
+        """Read damaged files as missing ones, and collect what is wrong with each.
+
+        Args:
+            raising: Whether the first is raised in the end, and not before: Zarr reads chunks at
+                once, would lose all errors but the first, and print them at exit.
+        """
+        before, noted = self._noted, dict[Chunk, DamagedStore]()
+        self._noted = noted
         try:
-            yield self._noted
+            yield noted
         finally:
             self._noted = before
-
-    @contextmanager
-    def raising(self) -> Iterator[None]:
-        """Read to the end before the first damage is raised.
-
-        Zarr reads chunks at once: it would lose all errors but the first, and print them at exit.
-        """
-        with self.noting() as noted:
-            try:
-                yield
-            finally:
-                if noted:
-                    raise next(iter(noted.values())) from None
-
-
-class Opened(NamedTuple):
-    """A store that is open."""
-
-    group: zarr.Group
-    place: StorePath
-    """For xarray."""
-    watch: Watch
-    durable: bool
+            if raising and noted:
+                raise next(iter(noted.values())) from None
 
     def check_arrays(self) -> None:
         """Check what describes each array.
@@ -153,7 +143,7 @@ class Opened(NamedTuple):
         Raises:
             DamagedStore: It is missing, or changed.
         """
-        for name in self.watch.digests:
+        for name in self.digests:
             _ = self.group[name]
 
     def check_root(self) -> None:
@@ -166,9 +156,7 @@ class Opened(NamedTuple):
 
         again = zarr.open_group(self.place, mode="r", zarr_format=3)
         if again.attrs[DIGEST] != self.group.attrs[DIGEST]:
-            raise StoreFailed(
-                f"{self.watch.location} was replaced while it was read: open it again"
-            )
+            raise StoreFailed(f"{self.location} was replaced while it was read: open it again")
 
 
 def opened_store(
@@ -189,12 +177,13 @@ def opened_store(
             raise InvalidInput("store", location, _ALLOWED[kind], "it is a file")
         if not Path(location).is_dir():
             return None
-    watch = Watch(location, kind)
+    opened = Opened(location, kind, durable)
     with storage_errors(f"{location} cannot be opened"):
         try:
-            store, path = (place := place_of(location, mode)).store, place.path
-            place = StorePath(CheckedStore(store, watch, path, durable=durable), path)
-            return Opened(zarr.open_group(place, mode=mode, zarr_format=3), place, watch, durable)
+            place = place_of(location, mode)
+            opened.place = StorePath(CheckedStore(place.store, opened, place.path), place.path)
+            opened.group = zarr.open_group(opened.place, mode=mode, zarr_format=3)
+            return opened
         except FileNotFoundError:
             return None
         except DamagedStore:
@@ -236,15 +225,13 @@ class CheckedStore(WrapperStore[Any]):
 
     Args:
         store: The store.
-        watch: What becomes of damage.
+        opened: What becomes of damage.
         root: Where in it the root of the arrays is.
-        durable: Whether a file is on the disk, not only on its way there, when it counts as
-            written.
     """
 
-    def __init__(self, store: Store, watch: Watch, root: str, *, durable: bool = False) -> None:
+    def __init__(self, store: Store, opened: Opened, root: str) -> None:
         super().__init__(store)
-        self.watch, self.durable = watch, durable
+        self._opened = opened
         self._root = f"{root}/" if root else ""
 
     def _with_store(self, store: Store) -> Self:
@@ -264,7 +251,7 @@ class CheckedStore(WrapperStore[Any]):
         chunk = self._chunk(key)
         fault = self._fault(chunk, content) if chunk else ""
         if chunk and fault:
-            self.watch.report(chunk, fault)
+            self._opened.report(chunk, fault)
         return None if fault else content
 
     async def set(self, key: str, value: Buffer) -> None:
@@ -274,34 +261,35 @@ class CheckedStore(WrapperStore[Any]):
             StoreFailed: It describes an array otherwise than the root lists.
         """
         chunk = self._chunk(key)
-        listed = self.watch.digests.get(chunk.array) if chunk and chunk.place is None else None
+        opened = self._opened
+        listed = opened.digests.get(chunk.array) if chunk and chunk.place is None else None
         if listed and listed != sha256(value.to_bytes()):
-            raise StoreFailed(f"{key} of {self.watch.location} was written by another Zarr release")
+            raise StoreFailed(f"{key} of {opened.location} was written by another Zarr release")
         await super().set(key, value)
-        if self.durable and isinstance(self._store, LocalStore):
+        if opened.durable and isinstance(self._store, LocalStore):
             await asyncio.to_thread(_sync_in, self._store.root / key, self._store.root)
 
     async def list_dir(self, prefix: str) -> AsyncIterator[str]:
         """The arrays of the root, without what killed writers or others left beside them."""
         async for name in super().list_dir(prefix):
-            if name in self.watch.digests:
+            if name in self._opened.digests:
                 yield name
 
     def _chunk(self, key: str) -> Chunk | None:
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
 
     def _fault(self, chunk: Chunk, content: Buffer | None) -> str:
-        watch = self.watch
+        opened, described = self._opened, chunk.place is None
         if content is None:
-            needed = chunk.array in watch.digests if chunk.place is None else watch.required(chunk)
+            needed = chunk.array in opened.digests if described else opened.required(chunk)
             return "missing" if needed else ""
-        if chunk.place is None:
+        if described:
             text = content.to_bytes()
             if chunk.array:
-                same = watch.digests.get(chunk.array) == sha256(text)
+                same = opened.digests.get(chunk.array) == sha256(text)
                 return "" if same else "changed since it was written"
             try:
-                watch.digests = unsealed(text)[ARRAYS]
+                opened.digests = unsealed(text)[ARRAYS]
             except ValueError as error:
                 return str(error)
             return ""

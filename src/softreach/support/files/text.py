@@ -19,12 +19,7 @@ MEGABYTE = 1_000_000
 
 
 def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
-    """The text of a file in UTF-8, with a line feed at the end of each line.
-
-    Args:
-        name: What errors call the file.
-        path: Where it is.
-        most: Bytes that it may have.
+    """The text of a file of at most so many bytes in UTF-8; its lines end with a line feed.
 
     Raises:
         InvalidInput: No such file, another kind of file, too large a one, or no text in UTF-8.

@@ -15,11 +15,7 @@ WRONG: Any = object()
 
 
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
-    """The tables of TOML text.
-
-    Args:
-        text: TOML.
-        number: Maker of the value of a number with a point or an exponent.
+    """The tables of TOML text; `number` makes values of numbers with a point or an exponent.
 
     Raises:
         ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
@@ -46,13 +42,7 @@ def _fit_64_bits(value: Any) -> bool:
 def document_of(
     text: str, most: int, source: str, number: Callable[[str], Any] = float
 ) -> dict[str, Any]:
-    """The tables of TOML text of at most so many characters.
-
-    Args:
-        text: TOML.
-        most: Characters that it may have.
-        source: Its name in errors.
-        number: Maker of the value of a number with a point or an exponent.
+    """The tables of TOML text of at most so many characters, called `source` in errors.
 
     Raises:
         InvalidDesign: Text that is no TOML, or too long.
@@ -116,12 +106,7 @@ class FaultReader:
 
 
 def unknown_key(name: str, keys: Mapping[str, str]) -> str:
-    """Message for a key that a table does not have.
-
-    Args:
-        name: The key.
-        keys: Field -> key of the table.
-    """
+    """Message for a key that a table does not have; `keys` are those that it has, by field."""
     hint = did_you_mean(keys.get(name, name), keys.values())
     return f"unknown key; {hint or 'known keys: ' + ', '.join(keys.values())}"
 
