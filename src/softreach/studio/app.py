@@ -103,20 +103,13 @@ class Studio:
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    def _compiling(self, running: bool) -> None:
+    def _compiling(self) -> None:
         """Notify every tab, on another thread: this one holds the compiler's lock."""
-
-        def notify(_: object) -> None:
-            for session in list(self.sessions.values()):
-                session.compiling, session.compiled = running, self._compilation.done
-                session.show()
-
-        self._notice.submit(notify)
+        self._notice.submit(lambda _: [session.show() for session in [*self.sessions.values()]])
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start, JOBS, work=self.work)
-        session.compiling = self._compilation.running
-        session.compiled = self._compilation.done
+        watch = self._compilation
+        session = Session(client, self.start, JOBS, work=self.work, compilation=watch)
         self._libraries.join()
         left = None if self.work is None else self.work.latest
         with self._lock:

@@ -14,7 +14,7 @@ import numpy as np
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
 from softreach.studio.found import Found, Known, in_session
-from softreach.studio.reach import Reach, count_activations, shown_samples, stages, uncounted
+from softreach.studio.reach import Reach, count_activations, shown_samples, stages
 from softreach.studio.scene.camera import is_behind
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import shows_cloud
@@ -67,7 +67,7 @@ class Job:
     depends_on: str = ""
     """Attributes that decide the result: "design appearance.arm found.reach", the last of what is
     known; without any the work is done when it is asked for."""
-    compute: Callable[[Given], Iterable[Learned]] = lambda _: ()
+    compute: Callable[[Given], Iterable[Learned]] = lambda _: (Learned(),)
     """Results, each better than the one before."""
     draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
     """Draws what is known after each result, and takes away what is not; returns what follows only
@@ -115,14 +115,16 @@ def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job
 
 
 def _compute_reach(given: Given) -> Results:
-    state, check, level = given.state, given.check, given.state.appearance.level
+    state, level = given.state, given.state.appearance.level
     if (known := given.found.complete_reach(state.design)) is not None:
         enough = max(known.samples, known.wanted) >= 1 << level
         if enough or known.cloud.attrs.get("sampler") != "sobol":
+            same_unit = known.arm.length_unit == state.design.length_unit
+            yield Learned({} if same_unit else {"reach": replace(known, arm=state.design)})
             return
     try:
-        for reach in stages(state.design, level, given.quality, check, given.report):
-            _count_shown(reach, given)
+        for reach in stages(state.design, level, given.quality, given.check, given.report):
+            _count_cloud(given, reach)
             yield Learned({"reach": reach, "refusal": ""})
         return
     except InvalidInput as error:
@@ -135,9 +137,21 @@ def _compute_reach(given: Given) -> Results:
 
 
 def _color_cloud(given: Given) -> Results:
-    if given.found.reach is not None:
-        _count_shown(given.found.reach, given)
+    _count_cloud(given, given.found.reach)
     yield Learned()
+
+
+def _count_cloud(given: Given, reach: Reach | None) -> None:
+    if reach is not None and shows_cloud(reach, given.state.appearance):
+        _count(reach, given)
+
+
+def _count(reach: Reach, given: Given) -> None:
+    """Count the activations of what is shown, where its colors say them."""
+    look = given.state.appearance
+    if reach.fine and shown_color(reach.arm, look.color) == "multiplicity":
+        rows = shown_samples(reach, look.level)
+        count_activations(reach, rows, given.check, given.report)
 
 
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
@@ -146,14 +160,8 @@ def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
         given.scene.remove(*_CLOUD.split())
         return None
     key = given.scene.draw_cloud(reach, look)
-    draw_axes(given)
+    given.scene.draw_axes(reach, given.found.free)
     return {"key": key} if shows_cloud(reach, look) or not look.surface else None
-
-
-def draw_axes(given: Given) -> None:
-    """The box with numbers around what is drawn."""
-    if given.found.reach is not None:
-        given.scene.draw_axes(given.found.reach, given.found.free)
 
 
 _SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
@@ -177,26 +185,6 @@ def _draw_surface(given: Given) -> Mapping[str, Any] | None:
         return None
     key = given.scene.draw_surface(given.found.reach, given.state.appearance)
     return None if key is None else {"key": key}
-
-
-def _count_shown(reach: Reach, given: Given) -> None:
-    if shows_cloud(reach, given.state.appearance):
-        _count(reach, given)
-
-
-def _count(reach: Reach, given: Given) -> None:
-    """Count the activations of what is shown, where its colors say them."""
-    look = given.state.appearance
-    if not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
-        return
-    missing, done = uncounted(reach, shown_samples(reach, look.level)), 0
-
-    def progress(more: int) -> None:
-        nonlocal done
-        done += more
-        given.report(f"counting activations: {done:,} of {len(missing):,} points")
-
-    count_activations(reach, missing, given.check, progress)
 
 
 def _differentiate(given: Given) -> Results:
@@ -277,9 +265,8 @@ def _look(given: Given) -> None:
 def _compute_beside(given: Given, name: str) -> Results:
     """Its reach, unless that is known; where the designs agree it is that of the present one."""
     design, known = getattr(given.state, name), getattr(given.found, name)
-    if known is not None and known.fine and known.arm == design:
-        return
-    present = None if design is None else given.found.complete_reach(design)
+    is_known = known is not None and known.fine and known.arm == design
+    present = known if is_known else given.found.complete_reach(design)
     if design is None or present is not None:
         yield Learned({name: present})
         return
@@ -291,7 +278,8 @@ def _compute_beside(given: Given, name: str) -> Results:
 
 def _draw_beside(given: Given, name: str) -> None:
     given.scene.draw_beside(f"/{name}", getattr(given.found, name), given.state.appearance.slice)
-    draw_axes(given)
+    if given.found.reach is not None:
+        given.scene.draw_axes(given.found.reach, given.found.free)
 
 
 def _beside(name: str) -> Job:
@@ -306,7 +294,7 @@ SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
     Job(
         "reach",
-        "design appearance.level",
+        "design appearance.level appearance.unit",
         _compute_reach,
         _draw_cloud,
         makes="reach key slopes",
@@ -342,7 +330,13 @@ SCENE_JOBS = (
         wanted="appearance.section",
         makes="section",
     ),
-    Job("sweep", "design appearance.swept", _sweep, wanted="appearance.sweep", makes="sweep"),
+    Job(
+        "sweep",
+        "design appearance.swept appearance.unit",
+        _sweep,
+        wanted="appearance.sweep",
+        makes="sweep",
+    ),
     Job(
         "arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture", draws="/arm"
     ),

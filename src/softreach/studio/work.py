@@ -248,15 +248,11 @@ _KIND = "numba:compile"
 class CompilationWatch(event.Listener):
     """Calls back when compilation begins and when all of it has ended, on a compiling thread."""
 
-    def __init__(self, changed: Callable[[bool], None]) -> None:
-        self._changed, self._running, self._lock = changed, 0, threading.Lock()
+    def __init__(self, changed: Callable[[], object]) -> None:
+        self._changed, self._lock = changed, threading.Lock()
+        self.running = 0  # compilations under way, one within another
         self.done = 0  # times that all of it has ended: of the kernels of a studio, each once
         event.register(_KIND, self)
-
-    @property
-    def running(self) -> bool:
-        """True while anything is being compiled."""
-        return self._running > 0
 
     def close(self) -> None:
         """Watch no longer."""
@@ -272,8 +268,8 @@ class CompilationWatch(event.Listener):
 
     def _count(self, change: int) -> None:
         with self._lock:
-            before, self._running = self._running, self._running + change
-            now = self._running
-            self.done += not now
-        if bool(before) != bool(now):
-            self._changed(bool(now))
+            before, self.running = self.running, self.running + change
+            is_turn = bool(before) != bool(self.running)
+            self.done += not self.running
+        if is_turn:
+            self._changed()

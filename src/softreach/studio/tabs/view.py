@@ -30,7 +30,7 @@ _HISTORY_HINT = (
 _NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
 _ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
-_WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.compiled", "tab.canceled"
+_WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.canceled"
 
 
 def status(panel: Fields) -> None:
@@ -100,8 +100,7 @@ def _reach_line(session: Session) -> list[Part]:
 
 def _work(session: Session) -> str:
     if session.compiling:
-        done = f", {session.compiled} kernels so far" if session.compiled else ""
-        return f"compiling, once on this machine{done} ..."
+        return session.compiling
     if session.doing:
         return f"{session.doing} ..."
     if not is_behind(session):
