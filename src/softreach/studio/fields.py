@@ -134,24 +134,27 @@ class Fields:
 
     def anew(
         self,
-        container: Any,
+        label: str,
         *paths: str,
         key: Shown = lambda *_: object(),
         build: Callable[[Fields, Any], object],
         words: Callable[[SoftreachError], str] = str,
+        **looks: Any,
     ) -> None:
-        """Fields at the end of a folder that are made anew where their key differs.
+        """A folder whose fields are made anew where their key differs.
 
         By default that is whenever what stands at one of the paths is another object.
         """
         fields, known = Fields(self.session), object()
+        with self.folder(label, **looks) as folder:
+            pass
 
         def fit(state: StudioState, found: Found) -> None:
             nonlocal fields, known
             if (now := key(state, found)) != known:
                 fields.remove()
                 fields, known = Fields(self.session, words), now
-                with container:
+                with folder:
                     build(fields, now)
 
         self.follow(*paths, show=fit)

@@ -26,11 +26,13 @@ from softreach.studio.shown_parameters import (
     parts,
     refusal,
     slider_parameters,
+    typed_unit,
 )
 from softreach.studio.slopes import NO_BAR, slope_bars
 from softreach.studio.state import StudioState, rod_of, vector
 from softreach.studio.widgets import Line, SliderField, TextKind, number_kind, vector_kind
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
+from softreach.support.units import LengthUnit
 
 # Sliders, numbers that have none, and named designs to start from
 
@@ -40,13 +42,8 @@ _ABOUT_START = "Replaces the whole design by an arm of the literature or an exam
 
 def design(panel: Fields) -> None:
     """Sliders of a design, each with the change of the volume by it."""
-    with panel.folder("design") as folder:
-        about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
-        panel.text("design", "found.slopes", content=about)
-    _numbers(panel, folder, slider_parameters, _sliders)
-    with panel.folder("body") as folder:
-        pass
-    _numbers(panel, folder, body_numbers, _typed)
+    _numbers(panel, "design", slider_parameters, _sliders)
+    _numbers(panel, "body", body_numbers, _typed)
     names = {"": "this design"} | {name: name for name in designs.__all__}
     named = Attribute(
         lambda state: next((name for name, arm in _designs().items() if arm == state.design), ""),
@@ -57,7 +54,7 @@ def design(panel: Fields) -> None:
 
 def _numbers(
     panel: Fields,
-    folder: Any,
+    label: str,
     shown: Callable[[Manipulator], Sequence[ShownParameter]],
     build: Callable[[Fields, Sequence[ShownParameter]], object],
 ) -> None:
@@ -72,7 +69,7 @@ def _numbers(
 
     key = lambda state, _: [each[:2] for each in shown(state.design)]
     remake = lambda fields, _: build(fields, shown(arm()))
-    panel.anew(folder, "design", key=key, build=remake, words=words)
+    panel.anew(label, "design", key=key, build=remake, words=words)
 
 
 def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
@@ -81,6 +78,8 @@ def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
 
 
 def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
+    about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
+    panel.text("design", "found.slopes", content=about)
     rows, bars = dict[str, SliderField](), dict[str, Line]()
     before = panel.session.found.ends  # of a design with other sliders
     for each in shown:
@@ -160,9 +159,6 @@ def arm_parts(panel: Fields) -> None:
 
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
         offer = Line(panel.gui)
-    with panel.folder("part") as folder:
-        pass
-    message = panel.kept(Line(panel.gui))
 
     def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
         fields.message = message
@@ -172,8 +168,9 @@ def arm_parts(panel: Fields) -> None:
         arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
         return refusal(error, part_parameters(arm, known[label]), arm)
 
+    panel.anew("part", "design", "found.part", key=_chosen, build=build, words=words)
+    message = panel.kept(Line(panel.gui))
     panel.message, panel.words = message, words
-    panel.anew(folder, "design", "found.part", key=_chosen, build=build, words=words)
 
 
 def _with_part(arm: Manipulator, kind: str, matter: str = "") -> Manipulator:
@@ -243,11 +240,10 @@ def _add_matter(panel: Fields, part: Part) -> None:
         _material(panel, "core", _AS_INNERMOST, of_design(core, edits.with_core))
     if part.home is not None and len(arm.section.rings) > 1:
         rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}
-        name = part.actuator
-        homes = lambda arm: {one.actuator: one.home or 0 for one in parts(arm).values()}
+        home = lambda arm: next(p.home for p in parts(arm).values() if p.actuator == part.actuator)
         at = of_design(
-            lambda arm: arm.section.rings.index(arm.section.ring(homes(arm)[name])),
-            lambda arm, ring: edits.with_changed_actuator(arm, name, ring=ring),
+            lambda arm: arm.section.rings.index(arm.section.ring(home(arm) or 0)),
+            lambda arm, ring: edits.with_changed_actuator(arm, part.actuator, ring=ring),
         )
         panel.dropdown("in ring", rings, at, "The ring that it lies in")
 
@@ -273,58 +269,52 @@ _LOADS = {
     "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
     "payload_arm": (
         "lever arm",
-        "mm",
-        1e-3,
+        "",
+        0.0,
         "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
     ),
     "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
 }
-"""Loads that are typed: field -> label, unit, SI units per unit, and meaning."""
+"""Loads that are typed: field -> label, unit ("" for that of lengths), its size, and meaning."""
 
 
 def loads(panel: Fields) -> None:
     """Base, gravity, a payload and a force on the tip, as they are typed."""
     loaded = panel.session.state.design.loads is not None
-    with panel.folder("base and loads", expanded=loaded):
-        _base(panel)
-        names = {name: name for name in GRAVITIES} | {"": "as typed"}
-        gravity = load_field("gravity")
-        fall = Attribute(
-            gravity_name,
-            lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
-        )
-        falls = "Which way things fall in the world; the base says how the arm stands in it"
-        panel.dropdown("gravity", names, fall, falls)
-        for name, (label, unit, _, hint) in _LOADS.items():
-            kind = number_kind if name == "payload" else vector_kind
-            panel.typed(f"{label} [{unit}]", load_field(name), hint, kind)
-        panel.message = panel.kept(Line(panel.gui))
-        about, off = (
-            "Gravity, payload and all forces",
-            lambda s: s.replace(design=s.free or s.design),
-        )
-        panel.change("Take all loads off", off, about, "design.loads", **GRAY)
-        follows = "design", "found.tip", "found.pointing", "found.posture"
-        rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
-        panel.text(*follows, content=rests)
-        more = lambda s, _: ", ".join(other_loads(s.design))
-        panel.text(
-            "design",
-            content=lambda *k: [f"From the design file act too: {more(*k)}."] * bool(more(*k)),
-        )
+    unit = lambda state, _: typed_unit(state.design)
+    panel.anew("base and loads", "design", key=unit, build=_base_and_loads, expanded=loaded)
 
 
-def _base(panel: Fields) -> None:
-    way = "Which way the straight arm points from its base, in the world"
+def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     points = of_design(
         lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
         lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
     )
+    way = "Which way the straight arm points from its base, in the world"
     panel.dropdown("base", _WAYS, points, way)
     where = "r(0): where the arm is clamped, as x, y, z in the world"
-    panel.typed("base at [mm]", base_field("position"), where, vector_kind)
+    panel.typed(unit.label("base at"), base_field("position"), where, vector_kind)
     turn = "ψ: turn of the base about the way the arm points"
     panel.typed("turn [deg]", base_field("turn"), turn)
+    gravity, names = load_field("gravity"), {name: name for name in GRAVITIES} | {"": "as typed"}
+    fall = Attribute(
+        gravity_name,
+        lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
+    )
+    falls = "Which way things fall in the world; the base says how the arm stands in it"
+    panel.dropdown("gravity", names, fall, falls)
+    for name, (label, symbol, _, hint) in _LOADS.items():
+        kind = number_kind if name == "payload" else vector_kind
+        panel.typed(f"{label} [{symbol or unit.name}]", load_field(name), hint, kind)
+    panel.message = panel.kept(Line(panel.gui))
+    off, about = lambda s: s.replace(design=s.free or s.design), "Gravity, payload and all forces"
+    panel.change("Take all loads off", off, about, "design.loads", **GRAY)
+    follows = "design", "found.tip", "found.pointing", "found.posture"
+    rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+    panel.text(*follows, content=rests)
+    more = lambda s, _: ", ".join(other_loads(s.design))
+    act = lambda *known: [f"From the design file act too: {more(*known)}."] * bool(more(*known))
+    panel.text("design", content=act)
 
 
 def other_loads(arm: Manipulator) -> list[str]:
@@ -343,11 +333,11 @@ def gravity_name(state: StudioState) -> str:
 
 
 def base_field(name: str) -> Attribute:
-    """Position in mm, or turn in degrees."""
-    scale = math.radians(1.0) if name == "turn" else 1e-3
+    """Position in the unit of lengths that are typed, or turn in degrees."""
+    scale = lambda arm: math.radians(1.0) if name == "turn" else typed_unit(arm).size
     return of_design(
-        lambda arm: _over(getattr(arm.base, name), scale),
-        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale)})),
+        lambda arm: _over(getattr(arm.base, name), scale(arm)),
+        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale(arm))})),
     )
 
 
@@ -358,21 +348,23 @@ def load_field(name: str) -> Attribute:
         InvalidInput: A number that no load can have.
         InvalidDesign: Matter that lacks what loads need, and where to give it.
     """
-    label, unit, scale, _ = _LOADS[name]
+    label, symbol, size, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
+    scale = lambda arm: size or typed_unit(arm).size
 
     def write(arm: Manipulator, value: Any) -> Manipulator:
+        unit = symbol or typed_unit(arm).name
         for number in value if isinstance(value, tuple) else (value,):
             if not low <= number <= _MOST:
                 allowed = f"{low:,.0f} to {_MOST:,.0f} {unit}"
                 raise InvalidInput(label, f"{number:g} {unit}", allowed)
-        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale)})
+        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale(arm))})
         try:
             return arm.replace(loads=None if loads == _NONE else loads)
         except InvalidDesign as error:
             raise _in_words(error) from None
 
-    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale), write)
+    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale(arm)), write)
 
 
 def _times(value: Any, scale: float) -> Any:

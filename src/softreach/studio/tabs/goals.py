@@ -444,7 +444,7 @@ def _fit(given: Given) -> Results:
 JOBS = (
     Job(
         "needs",
-        "design needs",
+        "design needs appearance.unit",
         _check,
         lambda given: given.scene.draw_needs(given.found.check),
         wanted="needs",

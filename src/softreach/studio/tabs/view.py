@@ -19,9 +19,9 @@ from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.colors import color_names, key_html, shown_color
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import StudioState
+from softreach.studio.state import AXES, StudioState
 from softreach.studio.tabs.goals import verdict_text
-from softreach.support.units import LengthUnit
+from softreach.support.units import UNITS, LengthUnit
 
 _HISTORY_HINT = (
     "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
@@ -113,7 +113,6 @@ def _work(session: Session) -> str:
 # Looks
 
 
-_ACROSS = {axis: axis for axis in ("none", "x", "y", "z")}
 _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, from the map itself"),
@@ -132,16 +131,22 @@ def view(panel: Fields) -> None:
     )
     about = "What the color of a point says; the key is above the tabs"
     panel.dropdown("color by", offered, color, about)
+    lengths = Attribute(
+        lambda state: state.design.length_unit.name, lambda state, name: state.showing(unit=name)
+    )
+    about = "Unit of lengths, and those of areas and volumes beside it: here and in saved files"
+    panel.dropdown("unit", {name: name for name in UNITS}, lengths, about)
     with panel.folder("show"):
         for name, (label, hint) in _TOGGLES.items():
             panel.checkbox(label, attribute(f"appearance.{name}"), hint)
     looks = {name: lambda name=name: panel.session.look_from(name) for name in VIEWS}
     panel.choices("look from", looks, "Along an axis of the world, or between them")
     axis = attribute("appearance.slice.axis")
-    panel.dropdown("slice across", _ACROSS, axis, "Hides all but a slab across this axis")
-    with panel.folder("slab", lambda state, _: axis.read(state) != "none") as slab:
-        size = lambda state, _: (state.design.length_unit, state.design.length)
-        panel.anew(slab, "design", key=size, build=_center)
+    across = {axis: axis for axis in AXES}
+    panel.dropdown("slice across", across, axis, "Hides all but a slab across this axis")
+    size = lambda state, _: (state.design.length_unit, state.design.length)
+    is_cut = lambda state, _: axis.read(state) != "none"
+    panel.anew("slab", "design", key=size, build=_center, shown=is_cut)
 
 
 def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
