@@ -193,7 +193,7 @@ def test_a_closed_worker_does_nothing_more():
 
 def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
     told = []
-    watch = CompilationWatch(told.append)
+    watch = CompilationWatch(lambda: told.append(bool(watch.running)))
     inner = njit(lambda x: x + 1)
     outer = njit(lambda x: 2 * inner(x))
     assert outer(1) == 4

@@ -136,11 +136,11 @@ def test_what_was_counted_before_it_was_stopped_is_kept(folded):
     reach = fine_reach(*FOLDED[1])
     rows = np.arange(1 << LEVEL)
 
-    def stop(done: int) -> None:
+    def stop(doing: str) -> None:
         raise Dropped
 
     with pytest.raises(Dropped):
-        count_activations(reach, rows[:5000], progress=stop)
+        count_activations(reach, rows[:5000], report=stop)
     assert len(uncounted(reach, rows)) == len(rows) - 5000
 
 

@@ -122,7 +122,7 @@ def loaded_share(found: Found, design: Manipulator) -> str:
     if reach.size is None or free is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = size_unit(free.size, free.arm).rounded(free.size.value, free.size.power)
+    whole = size_unit(free.size, design).rounded(free.size.value, free.size.power)
     return f" under loads, {share} of {whole} without"
 
 

@@ -294,7 +294,7 @@ SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
     Job(
         "reach",
-        "design appearance.level appearance.unit",
+        "design design.display_unit appearance.level",
         _compute_reach,
         _draw_cloud,
         makes="reach key slopes",
@@ -332,7 +332,7 @@ SCENE_JOBS = (
     ),
     Job(
         "sweep",
-        "design appearance.swept appearance.unit",
+        "design design.display_unit appearance.swept",
         _sweep,
         wanted="appearance.sweep",
         makes="sweep",

@@ -444,7 +444,7 @@ def _fit(given: Given) -> Results:
 JOBS = (
     Job(
         "needs",
-        "design needs appearance.unit",
+        "design design.display_unit needs",
         _check,
         lambda given: given.scene.draw_needs(given.found.check),
         wanted="needs",
