@@ -13,10 +13,10 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
+from softreach.studio.figures import Slope, VolumeSlopes, slope_bars, volume_slopes
 from softreach.studio.markup import bar
 from softreach.studio.reach import Quality, Reach, stages
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.slopes import Slope, VolumeSlopes, slope_bars, volume_slopes
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores, level_in_memory
 from softreach.workspace import volume_gradient
 
@@ -106,7 +106,7 @@ def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_g
 def test_no_stage_keeps_the_turn_while_its_reach_is_drawn(trunk):
     for arm in (trunk, changed(trunk, {"longitudinal.bundles": 2})):
         for _ in reaching.stages(arm, 10, SMALL, nothing):
-            assert not all_cores.taken
+            assert not all_cores.is_taken()
 
 
 # The bars under the sliders: how the volume changes with each, exactly and on one scale
@@ -154,7 +154,7 @@ def test_where_there_is_no_volume_there_is_no_slope(trunk):
 
 
 def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
-    from softreach.studio import slopes as module
+    from softreach.studio import figures as module
     from softreach.support.errors import InvalidInput
 
     plain = module.gradient_of

@@ -179,6 +179,6 @@ def test_needs_of_many_places_are_drawn_with_few_labels(session):
     needs = Requirements(targets=(Target(places, name="row"),))
     session.update(lambda state: state.replace(needs=needs.to_toml()))
     session.settle()
-    assert "row</b>: 0 of 60 places, missed by" in verdict(session)
+    assert "row</b>: 0 of 60 places reached, missed by" in verdict(session)
     assert drawn(session, "/label 19") is not None
     assert drawn(session, "/label 20") is None

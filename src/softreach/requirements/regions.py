@@ -290,8 +290,8 @@ class Mesh(Region):
 
         Args:
             path: The file.
-            unit: Unit of length that the file counts in: "m", "cm", "mm" or "in". None for that which
-                softreach wrote into it, and m for a GLB.
+            unit: Unit of length that the file counts in: "m", "cm", "mm" or "in". None for that
+                which softreach wrote into it, and m for a GLB.
 
         Raises:
             InvalidInput: No such file, too large a one, no triangles in it, or no unit where the

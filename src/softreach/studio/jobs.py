@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
+from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Found, Known, in_session
 from softreach.studio.reach import Reach, count_activations, shown_samples, stages
 from softreach.studio.scene.camera import is_behind
@@ -20,7 +20,6 @@ from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.serve import theme
 from softreach.studio.shown_parameters import slider_ends
-from softreach.studio.slopes import volume_slopes
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck, rest
 from softreach.support.errors import InvalidInput

@@ -16,6 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import GRAY, Attribute, Fields, of_design
+from softreach.studio.figures import NO_BAR, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import (
     Part,
@@ -28,7 +29,6 @@ from softreach.studio.shown_parameters import (
     slider_parameters,
     typed_unit,
 )
-from softreach.studio.slopes import NO_BAR, slope_bars
 from softreach.studio.state import StudioState, rod_of, vector
 from softreach.studio.widgets import Line, SliderField, TextKind, number_kind, vector_kind
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
