@@ -14,7 +14,6 @@ from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.studio import Studio
-from softreach.studio.scene.scene import VERDICTS
 from softreach.studio.session import Session
 from softreach.studio.state import requirements_of
 from softreach.studio.tabs import click, goals
@@ -105,7 +104,8 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
         atol=1e-5,
     )
     broken = [
-        tuple(np.asarray(node.colors).ravel()[:3]) == VERDICTS["missed"] for node in (inside, avoid)
+        tuple(np.asarray(node.colors).ravel()[:3]) == goals.VERDICTS["missed"]
+        for node in (inside, avoid)
     ]
     assert broken == [False, True]
     assert "the arm keeps" in verdict(session)

@@ -9,17 +9,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import softreach as sr
 from softreach.arm import Marker, designs
 from softreach.arm.parameters import changed
+from softreach.inverse.path import PathStatus
 from softreach.rod import as_tip_map
 from softreach.rod.kinematics import marker_positions
+from softreach.studio.found import Found
 from softreach.studio.reach import Size, stages
 from softreach.studio.scene.camera import NumberedBox
 from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
-from softreach.studio.state import Appearance, Slice, StudioState
+from softreach.studio.state import Appearance, Slice, StudioState, TipPath
+from softreach.studio.tabs import JOBS
 from softreach.studio.tabs.compare import compared, comparison_html, kept, swapped
 from tests.made_arms import MADE_ARMS
 from tests.studio.conftest import SMALL
@@ -63,12 +67,22 @@ class Meshes:
 
 def test_a_path_ends_in_a_ball_where_the_arm_follows_it_no_further():
     points, meshes = np.linspace([0.0, 0.0, 1.0], [0.5, 0.0, 1.0], 11), Meshes()
-    scene = Scene(meshes)
-    scene.draw_path(points, np.concatenate([points[:4], [[0.17, 0.0, 1.0]]]))
-    np.testing.assert_array_equal(meshes.added["/path/end"].position, [0.17, 0.0, 1.0])
-    assert len(meshes.added["/path/followed"].points) == 4
-    scene.draw_path(points, points)
-    assert "/path/end" not in meshes.added
+    job = next(job for job in JOBS if job.name == "path")
+    state, end = StudioState(design=TRUNK, path=TipPath.through(points)), [0.17, 0.0, 1.0]
+
+    def drawn(followed: int) -> dict:
+        status = np.where(np.arange(11) < followed, PathStatus.FOLLOWED, PathStatus.FOLD)
+        values = {
+            "status": ("point", status),
+            "activation": (("point", "bundle"), np.zeros((11, 3))),
+        }
+        track = xr.Dataset(values | {"end_position": ("axis", end)})
+        job.draw(SimpleNamespace(state=state, found=Found(track=track), scene=Scene(meshes)))
+        return meshes.added
+
+    np.testing.assert_array_equal(drawn(4)["/path/end"].position, end)
+    assert len(drawn(4)["/path/followed"].points) == 4
+    assert "/path/end" not in drawn(11)
 
 
 @pytest.mark.parametrize(("unit", "size"), [("mm", 1e-3), ("cm", 1e-2), ("L", 0.2)])
@@ -178,7 +192,8 @@ def test_a_reach_beside_is_a_faint_surface_and_points_only_where_it_has_none(tru
 def test_a_ghost_is_met_by_a_ray_to_it_but_not_behind_the_arm_or_where_all_meet(trunk):
     scene, shapes = Scene(Meshes()), np.array([[-1.0, 0.0, -0.4], [0.0, -1.0, -0.4]])
     scene.draw_arm(trunk, [0.0, 0.0, -1.2])
-    scene.draw_ghosts(trunk, shapes)
+    for k, shape in enumerate(shapes):
+        scene.draw_arm(trunk, shape.tolist(), f"/ghosts/{k}")
     middles = as_tip_map(trunk).frames(shapes, [0.6 * trunk.length]).position[:, 0] / trunk.length
     tips = sr.tip_positions(trunk, shapes) / trunk.length
     for k, (middle, tip) in enumerate(zip(middles, tips, strict=True)):

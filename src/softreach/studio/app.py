@@ -11,7 +11,7 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.scene.camera import UPRIGHT
+from softreach.studio.scene.camera import UPRIGHT, VIEWS
 from softreach.studio.serve import (
     LOOPBACK,
     close_sockets,
@@ -29,8 +29,7 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-_LOOK_AT, _AWAY = np.array([0.0, 0.0, 0.28]), np.array([2.1, -3.85, 1.17])
-"""What a new tab looks at, seen from the base, and its camera, seen from there [L]."""
+_LOOK_AT = np.array([0.0, 0.0, 0.28])  # from the base to what a new tab looks at [L]
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 _PATIENCE = 3.0  # [s] for tabs that are closed
 
@@ -70,7 +69,8 @@ class Studio:
         self.server = start_server(host, port, token)
         arm, camera = start.state.design, start.state.camera
         look_at = arm.base.to_world(arm.length * _LOOK_AT) / arm.length
-        self.server.initial_camera.position = camera.position if camera else look_at + _AWAY
+        away = look_at + VIEWS["oblique"]
+        self.server.initial_camera.position = camera.position if camera else away
         self.server.initial_camera.look_at = camera.look_at if camera else look_at
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
@@ -119,9 +119,9 @@ class Studio:
         furnish(session)
         client.camera.on_update(lambda _: session.follow("camera"))
         session.begin()
-        if left is None and self.start.state.camera is not None:
-            session.look_as(self.start.state.camera)
-        elif session.camera.aspect < UPRIGHT and (left is None or left.camera is None):
+        if (camera := (left or self.start.state).camera) is not None:
+            session.look_as(camera)
+        elif session.camera.aspect < UPRIGHT:
             session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)

@@ -90,9 +90,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
 def section_picture(reach: Reach, cut: Slice) -> Picture:
     """The section and how many activations reach each place, in the unit of the arm.
 
-    Args:
-        reach: Of the design.
-        cut: The slice, of which the middle plane is cut; without one that across y by the base.
+    It is by the middle plane of the slice; without one by that across y at the base.
 
     Raises:
         InvalidInput: As `section_curves`.
@@ -172,13 +170,7 @@ def swept_parameter(state: StudioState) -> ShownParameter | None:
 def sweep_pictures(
     arm: Manipulator, parameter: ShownParameter, quality: Quality
 ) -> Iterator[Picture]:
-    """Volumes over the range of a slider, from the design's own value outwards, ever more.
-
-    Args:
-        arm: The design.
-        parameter: What the slider changes.
-        quality: How coarse, and how far off the tips may be.
-    """
+    """Volumes over the range of a slider, from the design's own value outwards, ever more."""
     unit, known = arm.length_unit, dict[float, float | None]()
     for value, volume in swept_volumes(arm, parameter, quality):
         known[value] = volume
@@ -250,10 +242,7 @@ class VolumeSlopes(NamedTuple):
 def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSlopes:
     """Slopes of a design whose set is known, for as many sliders as can be moved continuously.
 
-    Args:
-        reach: Of the design.
-        quality: How accurate the set is, and how long its derivatives may take.
-        check: Called often; raises to stop.
+    The check is called often, and raises to stop.
     """
     arm, solid, known = reach.arm, reach.exact, parameters(reach.arm)
     slopes = dict[str, Slope]()
@@ -285,10 +274,7 @@ def slope_bars(
 ) -> dict[str, str]:
     """A bar for each slider as HTML: by how much V changes over `PART` of its range.
 
-    Args:
-        found: Slopes of a design.
-        sliders: By names of parameters, with their ranges.
-        old: Whether they are of the design before.
+    Sliders are by names of parameters, with their ranges; old bars are of the design before.
     """
     part = {name: PART * ends for name, (_, ends) in sliders.items() if name in found.slopes}
     percent = {name: 100 * step / found.volume for name, step in part.items()}  # per ∂V/∂p

@@ -124,11 +124,6 @@ class Reach:
         return np.full(self.samples, np.nan)
 
     @property
-    def lost_share(self) -> float:
-        """Share of the activation box that the exact set leaves out [-]."""
-        return 0.0 if self.exact is None else self.exact.lost_share
-
-    @property
     def has_surface(self) -> bool:
         """True if there is a boundary to be drawn."""
         return self.exact is not None and self.exact.dimension >= 2

@@ -115,12 +115,8 @@ def new_token() -> str:
 def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:
     """Reason why a request is refused; "" for one that is welcome.
 
-    Args:
-        host: That the server listens on.
-        token: That a request shows in its address, or in the cookie that it got for that; "" for
-            none.
-        path: Of the request, with its query.
-        headers: Of the request.
+    It shows the token in its path, or in the cookie that it got for that; "" is for none. The host
+    is what the server listens on.
     """
     query, cookies = parse_qs(urlsplit(path).query), SimpleCookie()
     with suppress(CookieError):
@@ -156,13 +152,10 @@ def same_origin(headers: Mapping[str, str], host: str) -> bool:
 
 
 def page_headers(host: str) -> dict[str, str]:
-    """Headers that keep a page to its own server, whatever its address says.
+    """Headers that keep a page to its own server, by name and port as its request has them.
 
     viser's page is one file of inline scripts and styles; it would open a socket to any server that
     `?websocket=` names, and read a scene from any address.
-
-    Args:
-        host: Name and port, as the request has them.
     """
     plain = _PLAIN_HOST.fullmatch(host) is not None
     sockets = f" ws://{host} wss://{host}" if plain else ""  # older browsers: not part of 'self'

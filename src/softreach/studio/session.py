@@ -136,8 +136,6 @@ class Session:
         self.state, self.is_touched = state, True
         if state.design != self.start.state.design:
             self.found = Found()
-        if state.camera is not None:
-            self.look_as(state.camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""

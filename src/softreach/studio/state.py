@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from typing import Any, Self
@@ -20,8 +19,7 @@ from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_instance, as_integer, as_number, as_one_of
 from softreach.support.arrays import as_floats
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
-from softreach.support.files.toml import tables_of
+from softreach.support.errors import InvalidDesign, InvalidInput, Range
 from softreach.support.units import UNITS
 
 TOL = 1e-5  # [L], the largest tip error: far below a pixel
@@ -96,30 +94,14 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
 
     Raises:
         InvalidDesign: The text is none of requirements, or names other files: those that lie beside
-            it are not sent with it, and files of this machine are not for whoever has the page.
+            it are not sent with it, and files of this machine are not for users of the page.
         InvalidInput: It lists more places than can be shown.
     """
-    if faults := list(_foreign_files(text)):
-        raise InvalidDesign(faults, source)
-    needs = Requirements.from_toml(text, length=length, source=source)
+    needs = Requirements.from_toml(text, folder=None, length=length, source=source)
     if (count := len(needs.places)) > _MOST_PLACES:
         allowed = f"at most {_MOST_PLACES} in the studio"
         raise InvalidInput("places", f"{count:,}", allowed, "use softreach check")
     return needs
-
-
-def _foreign_files(text: str) -> Iterator[Fault]:
-    """Every place where a text of tables names another file."""
-    document: Mapping[str, Any] = {}
-    with suppress(ValueError):  # which the reader refuses
-        document = tables_of(text)
-    kinds = {"file": "places_m", "mesh": "a table of vertices_m and faces"}
-    for key, tables in document.items():
-        for k, table in enumerate(tables if isinstance(tables, list) else ()):
-            for name, instead in kinds.items():
-                if isinstance(table, dict) and isinstance(table.get(name), str):
-                    why = f"names another file, which is not sent along: write {instead} instead"
-                    yield Fault(f"{key}[{k}].{name}", None, why)
 
 
 VERSION = 4

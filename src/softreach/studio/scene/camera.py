@@ -45,13 +45,9 @@ _GRAY = 170, 170, 175  # of the axes
 
 
 def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
-    """Camera that sees all of a box [L] from a direction.
+    """Camera that sees all of a box between two corners [L], from a direction seen from its middle.
 
-    Args:
-        low: Its lowest corner.
-        high: Its highest.
-        direction: From the middle of the box to the camera.
-        aspect: Width of the picture over its height.
+    The aspect is the width of the picture over its height.
     """
     room = _ROOM_UPRIGHT if aspect < UPRIGHT else _ROOM
     middle, radius = (low + high) / 2, room * float(np.linalg.norm(high - low)) / 2
@@ -104,8 +100,7 @@ class TabCamera:
 
         Returns:
             True if the window is changing, so that one has to look again: a layout passes through
-            widths that are gone before the page has heard of a step. That of a new page, which has
-            no panel at first, takes long on a slow machine.
+            widths that are gone before the page has heard of a step, that of a new page for long.
         """
         now = self.aspect
         if now < _NARROWEST:
@@ -207,11 +202,7 @@ def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
     """True if a ball stands between the camera and a point [L], other than those that touch it.
 
-    Args:
-        point: Shape (3,).
-        camera: Shape (3,).
-        centers: Of the balls, shape (n, 3).
-        radii: Shape (n,).
+    Balls have centers of shape (n, 3) and radii of shape (n,) [L].
     """
     distance = float(np.linalg.norm(point - camera))
     ahead, aside = _beside(centers, camera, (point - camera) / distance)
@@ -221,11 +212,7 @@ def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool
 def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
     """Way along a ray to the first ball that it meets [L]; infinite where it meets none.
 
-    Args:
-        centers: Of the balls, shape (n, 3).
-        radii: Shape (n,); balls are met as if they were no thinner than a pointer.
-        origin: Of the ray, shape (3,).
-        direction: Shape (3,).
+    Balls, as in `is_behind`, are met as if they were no thinner than a pointer.
     """
     ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
     met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
@@ -245,16 +232,9 @@ def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
 def picked_point(
     points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float
 ) -> int | None:
-    """The point that a ray through a pixel hits: of those close to it, the nearest to the camera.
+    """Number of the point that a ray from the camera hits; None if it passes all of them by.
 
-    Args:
-        points: Shape (n, 3), any unit.
-        origin: Where the camera is.
-        direction: Of the ray, any length.
-        tolerance: Largest angle between the ray and the point [rad].
-
-    Returns:
-        The point's number, or None if the ray passes all of them by.
+    Of the points, shape (n, 3), within an angle [rad] of the ray it is the nearest to the camera.
     """
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     depth, aside = _beside(points, np.asarray(origin, float), direction)

@@ -55,7 +55,7 @@ def color_names(arm: Manipulator) -> dict[str, str]:
 
 
 def shown_color(arm: Manipulator, color: str) -> str:
-    """Color of points where that name is wanted, which may be one of another arm."""
+    """The color of that name, which may be one of another arm."""
     return color if color in color_names(arm) else "rgb"
 
 
@@ -81,13 +81,9 @@ def sample_values(reach: Reach, level: int, color: str) -> str | int | xr.DataAr
 
 
 def sample_colors(reach: Reach, level: int, color: str, *, shares: bool = True) -> Coloring:
-    """Colors of the samples that are shown; an unknown name colors by all activations.
+    """Colors of the first 2^level samples; an unknown name colors by all activations.
 
-    Args:
-        reach: What has the samples.
-        level: The first 2^level samples are shown.
-        color: One of `color_names`.
-        shares: Whether a key of numbers of activations has their shares of the samples.
+    A key of numbers of activations may have their shares of the samples.
     """
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
     values = sample_values(reach, level, color)

@@ -81,10 +81,7 @@ def compared(kept: Candidate, now: Candidate) -> tuple[list[Row], bool]:
 def comparison_html(kept: Candidate, now: Candidate) -> str:
     """A row for each quantity: kept, now, and the change."""
     rows, is_complete = compared(kept, now)
-    cells = [
-        [(text,) for text in (row.title, *map(_digits, row[1:3], row.errors), _change_text(row))]
-        for row in rows
-    ]
+    cells = [(row.title, *map(_digits, row[1:3], row.errors), _change_text(row)) for row in rows]
     others = "The designs differ in more than these numbers."
     more = "" if is_complete else markup.paragraph(others)
     return markup.table(["", "kept", "now", "change"], cells) + more

@@ -22,13 +22,16 @@ from softreach.studio.fields import GRAY, Attribute, Fields
 from softreach.studio.found import Bench, Found, Sample
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.scene.scene import VERDICTS
+from softreach.studio.scene.camera import add_label
+from softreach.studio.scene.scene import DARK, MARK, MARKER, Scene, pieces
 from softreach.studio.session import Session
 from softreach.studio.state import LARGEST, StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
+from softreach.support import palette
 from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
 from softreach.support.files.text import text_of
+from softreach.support.palette import eight_bit
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -346,7 +349,7 @@ def _summary(bench: Bench | None) -> str:
         return ""
     report = result.report()
     printed = [part for part in report.sections if part.rows and part.printed]
-    tables = [markup.table(p.head, [[(cell,) for cell in row] for row in p.rows]) for p in printed]
+    tables = [markup.table(part.head, part.rows) for part in printed]
     lines = [*(line for part in report.sections for line in part.points), report.verdict]
     if not result.fit.converged:
         lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
@@ -360,6 +363,16 @@ _ACCURACY = 0.03  # of shares that are covered, and of distances between station
 _PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
 _POSES = ("reach", "cover", "stay_inside", "avoid")
 """Kinds of findings that other poses may change."""
+VERDICTS = {
+    "met": eight_bit(palette.MET),
+    "missed": eight_bit(palette.MISSED),
+    "undecided": (200, 130, 0),
+}
+"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
+_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
+_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
+_MOST_LABELS = 20  # more would hide each other
+_MEASURED = 0.03  # edge of a dot [L]
 
 
 def _check(given: Given) -> Results:
@@ -383,6 +396,46 @@ def _check(given: Given) -> Results:
         yield Learned({"check": made})
 
 
+def _draw_needs(given: Given) -> None:
+    """The places and regions of a design that was judged."""
+    check, scene = given.found.check, given.scene
+    scene.remove("/needs")
+    if check is None:
+        return
+    if len(check.places):
+        _draw_places(check, scene)
+    length, needs = check.arm.length, check.requirements
+    around, verdicts = (
+        length * np.array(scene.axes.corners),
+        {(f.kind, f.name): f.verdict for f in check.findings},
+    )
+    named = [(keep.kind, keep.name, keep.region) for keep in needs.keeps]
+    named += [("cover", t.name, t.region) for t in needs.targets if t.region is not None]
+    for k, (kind, name, region) in enumerate(named):
+        verdict = verdicts.get((kind, name), "met")
+        lines = np.concatenate([pieces(line / length) for line in region.wireframe(around)])
+        is_met = verdict == "met"
+        color, width = (_REGION[kind], _FINE) if is_met else (VERDICTS[verdict], _BROAD)
+        scene.lines(f"/needs/region {k}", lines, color, width)
+
+
+def _draw_places(check: Check, scene: Scene) -> None:
+    length, rows = check.arm.length, np.arange(len(check.places))
+    places, met = check.places / length, check.reached.all(axis=0)
+    worst = check.gaps.argmax(axis=0)  # of the payloads
+    gaps, nearest = check.gaps[worst, rows], check.nearest[worst, rows] / length
+    scene.dots("/needs/reached", places[met], VERDICTS["met"], _BALL)
+    missed = np.flatnonzero(~met)
+    arms = _CROSS * np.array([[1, 0, 1], [1, 0, -1], [0, 1, 0]]) / np.sqrt([[2], [2], [1]])
+    cross = places[missed][:, None, None] + np.stack([-arms, arms], axis=1)
+    scene.lines("/needs/missed", cross.reshape(-1, 2, 3), VERDICTS["missed"], _BROAD)
+    ways = np.stack([places, nearest], axis=1)[missed]
+    scene.lines("/needs/gaps", ways, VERDICTS["missed"], _FINE)
+    for k in missed[:_MOST_LABELS]:
+        text = check.arm.length_unit.rounded(float(gaps[k]), digits=".3g")
+        add_label(scene.api, f"/needs/label {k}", text, places[k] + [0.0, 0.0, 2.0 * _CROSS])
+
+
 def _predict(given: Given) -> Results:
     """Markers of the pose, while the arm has its inputs."""
     bench, design = given.found.bench, given.state.design
@@ -398,11 +451,15 @@ def _predict(given: Given) -> Results:
 
 
 def _draw_sample(given: Given) -> None:
+    """Measured and predicted markers, lines between them, and the arm that predicts."""
     sample, design, scene = given.found.sample, given.state.design, given.scene
     if sample is None:
         scene.remove("/sample")
         return
-    scene.draw_sample(sample.measured / design.length, sample.predicted / design.length)
+    measured, predicted = sample.measured / design.length, sample.predicted / design.length
+    scene.dots("/sample/measured", measured, MARK, _MEASURED)
+    scene.dots("/sample/predicted", predicted, DARK, MARKER)
+    scene.lines("/sample/residuals", np.stack([measured, predicted], axis=1), MARK, 0.005)
     if sample.arm == design:
         scene.remove("/sample/arm")
     else:
@@ -430,7 +487,7 @@ JOBS = (
         "needs",
         "design design.display_unit needs",
         _check,
-        lambda given: given.scene.draw_needs(given.found.check),
+        _draw_needs,
         wanted="needs",
         makes="check",
         draws="/needs",

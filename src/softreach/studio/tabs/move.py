@@ -22,7 +22,7 @@ from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
 from softreach.studio.found import Found, Lag, Pull
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
-from softreach.studio.scene.scene import MOST_BUNDLES
+from softreach.studio.scene.scene import DARK, MARK, MOST_BUNDLES, pieces
 from softreach.studio.session import Session
 from softreach.studio.state import (
     LARGEST,
@@ -321,6 +321,8 @@ _FAMILY = 6  # shapes offered where infinitely many reach the target
 _DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
 _RESIDUAL = 1e-8  # [L]
 _STEP = 0.05  # [s] between points that are played
+_TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
+_PALE = (240, 175, 205)  # of a path, where the arm does not follow it
 
 
 def _solve(given: Given) -> Results:
@@ -342,15 +344,19 @@ def _solve(given: Given) -> Results:
 
 
 def _draw_answer(given: Given) -> None:
+    """The shapes that reach the target, a ball there, or a line to the nearest place in reach."""
     answer, design, scene = given.found.answer, given.state.design, given.scene
-    scene.remove("/ghosts")
+    scene.remove("/ghosts", "/target", "/gap")
     if answer is None:
-        scene.draw_target(None)
         return
-    nearest = None if len(answer) else answer.nearest / design.length
-    scene.draw_target(answer.target / design.length, nearest)
+    target, nearest = answer.target / design.length, answer.nearest / design.length
+    scene.ball("/target", _TARGET, MARK, target)
+    if not len(answer):
+        scene.lines("/gap", pieces(np.stack([target, nearest])), MARK, 0.004)
+        scene.ball("/gap/nearest", _NEAREST, DARK, nearest)
     shapes = answer.activations if len(answer) else answer.nearest_activation[None]
-    scene.draw_ghosts(design, shapes)
+    for k, activation in enumerate(shapes):
+        scene.draw_arm(design, activation.tolist(), f"/ghosts/{k}")
 
 
 def _follow_tip(given: Given) -> Results:
@@ -394,15 +400,19 @@ def _follow(given: Given) -> Results:
 
 
 def _draw_path(given: Given) -> None:
-    path, length = given.state.path, given.state.design.length
+    """The path, pale, and as far as the arm follows it, dark; a ball where that ends."""
+    path, scene, length = given.state.path, given.scene, given.state.design.length
+    scene.remove("/path")
     if path is None:
-        given.scene.remove("/path")
         return
     points, track = np.array(path.points), _track(given.state, given.found)
     done = points[: len(_followed(given.state, given.found))]
     if track is not None and 0 < len(done) < len(points):
-        done = np.concatenate([done, track.end_position.values[None]])
-    given.scene.draw_path(points / length, done / length)
+        end = track.end_position.values
+        done = np.concatenate([done, end[None]])
+        scene.ball("/path/end", _END, DARK, end / length)
+    for name, line, color in (("all", points, _PALE), ("followed", done, MARK)):
+        scene.lines(f"/path/{name}", pieces(line / length), color, 0.006)
 
 
 def _play(given: Given) -> Results:
