@@ -196,7 +196,7 @@ class Fields:
         hint: str,
     ) -> None:
         """Add a slider over whole numbers, whose value and last number follow."""
-        slider = self.kept(self.gui.add_slider(label, 0, 1, 1, 0, hint=hint))
+        slider, session = self.kept(self.gui.add_slider(label, 0, 1, 1, 0, hint=hint)), self.session
 
         def show(state: StudioState, found: Found) -> None:
             value, last = at(state, found)
@@ -204,12 +204,8 @@ class Fields:
             if slider.value != value:
                 slider.value = value
 
-        def moved(event: Any) -> None:
-            if event.client_id is not None:
-                last = at(self.session.state, self.session.found)[1]
-                attempt(self.session, lambda: move(min(int(slider.value), last)))
-
-        slider.on_update(moved)
+        last = lambda: at(session.state, session.found)[1]
+        slider.on_update(self._by_hand(lambda: move(min(int(slider.value), last()))))
         self.follow(*paths, show=show)
 
     def button(
@@ -249,15 +245,19 @@ class Fields:
         """
         binding = _Binding(self.session, widget, at, options)
         act = self.session.learn if at.of == "found" else lambda change: self.apply(change, widget)
-
-        def moved(event: Any) -> None:
-            if event.client_id is not None:
-                attempt(self.session, lambda: act(binding.write))
-
-        widget.on_update(moved)
+        widget.on_update(self._by_hand(lambda: act(binding.write)))
         self._bindings.append(binding)
         self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
         return self.kept(widget)
+
+    def _by_hand(self, action: Callable[[], object]) -> Callable[[Any], None]:
+        """What acts where a person moved a widget, and not where the program did."""
+
+        def moved(event: Any) -> None:
+            if event.client_id is not None:
+                attempt(self.session, action)
+
+        return moved
 
     def apply(self, change: Change, widget: Any = None) -> None:
         """Change the state, or say below the widget why that cannot be."""

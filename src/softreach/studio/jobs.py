@@ -97,11 +97,8 @@ class Job:
         was, wanted = bool(self.is_wanted(old)), bool(self.is_wanted(new))
         if not (was and wanted):
             return was != wanted
-        return not all(map(_same, self._deciding(old), self._deciding(new)))
-
-
-def _same(before: Any, now: Any) -> bool:
-    return before is now or (not isinstance(now, np.ndarray) and bool(before == now))
+        pairs = zip(self._deciding(old), self._deciding(new), strict=True)
+        return any(a is not b and (isinstance(b, np.ndarray) or bool(a != b)) for a, b in pairs)
 
 
 def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job]:
