@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -43,14 +44,6 @@ def test_a_computation_ends_when_memory_runs_out_meanwhile(monkeypatch):
     time.sleep(0.25)
     with pytest.raises(OverBudget, match="memory"):
         running()
-
-
-def test_what_nobody_wants_ends_before_its_budget_does():
-    def check():
-        raise Dropped
-
-    with pytest.raises(Dropped):
-        Budget(check, 0.0)()
 
 
 def test_clouds_fit_into_memory_however_many_bundles_there_are():
@@ -170,15 +163,11 @@ def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, mo
     assert len(slopes) > 5
 
 
-def test_a_set_that_loads_tear_has_no_slopes(trunk):
+def test_a_set_that_loads_tear_has_no_slopes_and_what_takes_too_long_is_left_out(trunk):
     reach = reach_of(trunk)
-
-    class Torn(type(reach.exact)):
-        lost_share = 0.1
-
-    torn = object.__new__(Torn)
-    vars(torn).update({k: v for k, v in vars(reach.exact).items() if k != "lost_share"})
+    torn = SimpleNamespace(dimension=3, volume=1.0, lost_share=0.1, is_torn=False)
     assert volume_slopes(replace(reach, exact=torn), QUALITY, nothing).slopes == {}
+    assert volume_slopes(reach, replace(QUALITY, most_seconds=0.0), nothing).slopes == {}
 
 
 def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
@@ -192,11 +181,6 @@ def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
     with pytest.raises(Dropped):
         volume_slopes(reach, QUALITY, check)
     assert len(calls) == 5
-
-
-def test_what_takes_too_long_is_left_out(trunk):
-    hasty = replace(QUALITY, most_seconds=0.0)
-    assert volume_slopes(reach_of(trunk), hasty, nothing).slopes == {}
 
 
 def share_of(html: str) -> float:

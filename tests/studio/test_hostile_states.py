@@ -57,6 +57,12 @@ HOSTILE = {
     "needs of a mesh.json": state_with(needs='[[avoid]]\nmesh = "/etc/passwd"'),
     "many places.json": state_with(needs=f"[[reach]]\nplaces_m = {[[0, 0, 1]] * 301}"),
     "null.json": "null",
+    "list.json": "[]",
+    "nothing.json": "{}",
+    "version.json": state_with(softreach_studio=99),
+    "flat target.json": state_with(target=[1, 2]),
+    "unknown field.json": state_with(searched=None),
+    "too tapered.json": state_with(design=design_with("taper_deg = 2.0", "taper_deg = 50.0")),
     "bytes.json": "\x00\x01",
 }
 

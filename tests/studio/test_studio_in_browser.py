@@ -6,17 +6,97 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.studio import Quality
+from softreach.studio import Quality, Studio
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
+from softreach.studio.figures import enclosed_area, section_curves
+from softreach.studio.start import KeptWork
+from softreach.studio.state import Slice
 from softreach.studio.work import all_cores
 from tests.studio.conftest import SMALL
+from tests.studio.tab import Tab
 
 
 def test_nothing_leaves_the_machine_and_no_panel_of_viser_is_seen(tab, studio):
     assert not tab.page.evaluate("flashed")
     assert tab.requests
     assert all(url.startswith((studio.url, f"blob:{studio.url}", "data:")) for url in tab.requests)
+
+
+def test_every_control_has_a_tooltip_with_its_meaning(tab):
+    controls = tab.page.locator("[role=slider], input:not([type=hidden]), button")
+    assert controls.count() > 40
+    tab.open("Design")
+    thumb = tab.slider("extent σ [deg]")
+    tab.center(thumb)
+    thumb.hover()
+    meaning = tab.page.get_by_text("the angle of the cross-section")
+    meaning.wait_for()
+    box, panel = meaning.bounding_box(), tab.page.locator("[data-softreach]").bounding_box()
+    assert box["x"] + box["width"] < panel["x"]  # it covers no row
+    assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")
+
+
+def test_a_change_is_undone_and_done_again_by_buttons_and_keys(tab):
+    tab.open("Design")
+    first = tab.session.state.design
+    tab.type("taper φ [deg]", "1")
+    second = tab.session.state.design
+
+    def shows(design, degrees: float) -> None:
+        tab.wait(lambda: tab.session.state.design == design, "the design is there")
+        tab.settle()
+        shown = lambda: float(tab.slider("taper φ [deg]").get_attribute("aria-valuenow"))
+        tab.wait(lambda: abs(shown() - degrees) < 0.03, "the slider shows it")
+
+    tab.press("Undo")
+    shows(first, 2.0)
+    tab.press("Redo")
+    shows(second, 1.0)
+    tab.page.locator("canvas").first.focus()
+    tab.page.keyboard.press("Control+z")
+    shows(first, 2.0)
+    tab.page.keyboard.press("Control+Shift+z")
+    shows(second, 1.0)
+    assert tab.session.found.reach.arm == second
+
+
+@pytest.mark.large
+def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path):
+    with Studio(studio.start, work=KeptWork(tmp_path)) as running:
+        tab = Tab(browser, running)
+        design = changed(tab.session.state.design, {"taper": 0.02})
+        tab.session.update(lambda s: s.replace(design=design))
+        tab.settle()
+        known = set(running.sessions)
+        tab.page.reload()
+        tab.page.get_by_text("volume 0").first.wait_for()  # a page may connect twice
+        tab.wait(lambda: set(running.sessions) - known, "the page connects again")
+        tab.session = running.sessions[max(running.sessions)]
+        reach = tab.reach_of(design)
+        tab.page.get_by_text(size_text(reach.size, design)).wait_for()
+        tab.close()
+
+
+@pytest.mark.large
+def test_plots_follow_the_slice_and_the_design(tab):
+    tab.open("Plots")
+    tab.page.get_by_label("section", exact=True).check()
+    tab.page.get_by_text("y = 0 m: ").wait_for()
+    assert tab.page.locator("img").first.evaluate("image => image.naturalWidth") > 600
+    cut = Slice(axis="z", center=0.5, thickness=0.1)
+    tab.session.update(lambda s: s.showing(slice=cut, sweep=True, swept="taper"))
+    area = lambda: enclosed_area(section_curves(tab.session.found.reach, cut), 2)
+    tab.page.get_by_text(f"z = 0.5 m: one closed curve, {area():.4g} m²").wait_for()
+    tab.page.get_by_text("values make no design").wait_for()
+    pictures = [image.get_attribute("src") for image in tab.page.locator("img").all()]
+    tab.open("Design")
+    tab.drag("taper φ [deg]", -20)
+    tab.settle()
+    assert tab.session.found.sweep.arm == tab.session.found.section.arm == tab.session.state.design
+    tab.page.get_by_text(f"{area():.4g} m²").wait_for()
+    again = lambda: [image.get_attribute("src") for image in tab.page.locator("img").all()]
+    tab.wait(lambda: not set(pictures) & set(again()), "both pictures follow")
 
 
 def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_design(tab):
