@@ -16,9 +16,9 @@ from softreach.studio import reach as reaching
 from softreach.studio import work as budget
 from softreach.studio.figures import Slope, VolumeSlopes, slope_bars, volume_slopes
 from softreach.studio.markup import bar
-from softreach.studio.reach import Quality, Reach, stages
+from softreach.studio.reach import Quality, Reach, level_in_memory, stages
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.work import Budget, Dropped, OverBudget, all_cores, level_in_memory
+from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
 from softreach.workspace import volume_gradient
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)

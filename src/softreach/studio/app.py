@@ -11,15 +11,8 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
+from softreach.studio import serve
 from softreach.studio.scene.camera import UPRIGHT, VIEWS
-from softreach.studio.serve import (
-    LOOPBACK,
-    close_sockets,
-    page_address,
-    reachable_hosts,
-    start_server,
-    stop_server,
-)
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.tabs import JOBS, furnish
@@ -40,7 +33,7 @@ class Studio:
     def __init__(
         self,
         start: Start,
-        host: str = LOOPBACK,
+        host: str = serve.LOOPBACK,
         port: int | None = None,
         token: str = "",
         *,
@@ -66,7 +59,7 @@ class Studio:
         self._compilation = CompilationWatch(self._compiling)
         self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
-        self.server = start_server(host, port, token)
+        self.server = serve.start_server(host, port, token)
         arm, camera = start.state.design, start.state.camera
         look_at = arm.base.to_world(arm.length * _LOOK_AT) / arm.length
         away = look_at + VIEWS["oblique"]
@@ -78,24 +71,24 @@ class Studio:
     @property
     def url(self) -> str:
         """Address of the page, with its token."""
-        return page_address(self.server.get_host(), self.server.get_port(), self._token)
+        return serve.page_address(self.server.get_host(), self.server.get_port(), self._token)
 
     @property
     def urls_for_others(self) -> list[str]:
         """Addresses of the page for other machines; none if it is for this one alone."""
         host, port = self.server.get_host(), self.server.get_port()
-        return [page_address(name, port, self._token) for name in reachable_hosts(host)]
+        return [serve.page_address(name, port, self._token) for name in serve.reachable_hosts(host)]
 
     def stop(self) -> None:
         """Stop serving. Tabs go first: viser ends its pool before it reports their closing."""
         self._compilation.close()
         for session in list(self.sessions.values()):
             session.close()
-        close_sockets(self.server)
+        serve.close_sockets(self.server)
         deadline = time.monotonic() + _PATIENCE
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)
-        stop_server(self.server)
+        serve.stop_server(self.server)
 
     def __enter__(self) -> Self:
         return self

@@ -110,9 +110,9 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
 def loaded_share(found: Found, design: Manipulator) -> str:
     """Share of the reach without loads that is left; nothing for an arm without loads."""
     reach, free = found.reach, found.free
-    if reach is None or reach.arm.loads is None or reach.arm != design:
+    if reach is None or reach.arm.loads is None or reach.arm != design or free is None:
         return ""
-    if reach.size is None or free is None or free.size is None or free.size.value <= 0:
+    if reach.size is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
     whole = size_unit(free.size, design).rounded(free.size.value, free.size.power)
@@ -123,9 +123,8 @@ def tip_text(found: Found, design: Manipulator) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
     parts: list[Part] = []
     if found.tip is not None:
-        place = place_text(found.tip, design, 6)
         pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(found.pointing, 3))
-        parts.append(f"tip at {place}, pointing along ({pointing})")
+        parts.append(f"tip at {place_text(found.tip, design, 6)}, pointing along ({pointing})")
     if found.posture is not None:
         parts.append(f"{' · ' if parts else ''}{_POSTURES[found.posture]}")
     return parts

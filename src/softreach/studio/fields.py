@@ -15,20 +15,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part
-from softreach.studio.state import StudioState
-from softreach.studio.widgets import (
-    Line,
-    SliderField,
-    TextKind,
-    TypedField,
-    number_kind,
-    unit_in,
-)
+from softreach.studio.state import LARGEST, StudioState
+from softreach.studio.widgets import Line, Slider, TextKind, TypedField, number_kind, unit_in
 from softreach.support.errors import SoftreachError
+from softreach.support.files.text import text_of
 
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
+Action = Callable[[], object]
 Change = Callable[[StudioState], StudioState]
 Options = Callable[[StudioState], Mapping[Any, str]]
 Kind = Callable[[str, Callable[[], float]], TextKind]
@@ -177,10 +172,10 @@ class Fields:
 
     def slider(
         self, label: str, ends: tuple[float, float], step: float, at: Attribute, hint: str
-    ) -> SliderField:
+    ) -> Slider:
         """Add a slider beside a field for the same number."""
         kind = number_kind(unit_in(label), self._length)
-        return self.bind(SliderField(self.gui, label, ends, step, self._read(at), hint, kind), at)
+        return self.bind(Slider(self.gui, label, ends, step, self._read(at), hint, kind), at)
 
     def typed(self, label: str, at: Attribute, hint: str, kind: Kind = number_kind) -> TypedField:
         """Add a field for a number, or for what else is typed."""
@@ -209,12 +204,7 @@ class Fields:
         self.follow(*paths, show=show)
 
     def button(
-        self,
-        label: str,
-        action: Callable[[], object],
-        hint: str,
-        shown: Shown | str = "",
-        **looks: Any,
+        self, label: str, action: Action, hint: str, shown: Shown | str = "", **looks: Any
     ) -> Any:
         """Add a button that acts; it is there where `shown`, or what is at that path, is true."""
         button = self._seen_where(self.gui.add_button(label, hint=hint, **looks), shown)
@@ -227,7 +217,7 @@ class Fields:
         """Add a button that changes the state."""
         return self.button(label, lambda: self.apply(change), hint, shown, **looks)
 
-    def choices(self, label: str, actions: Mapping[str, Callable[[], object]], hint: str) -> None:
+    def choices(self, label: str, actions: Mapping[str, Action], hint: str) -> None:
         """Add a row of buttons."""
         row = self.kept(self.gui.add_button_group(label, tuple(actions), hint=hint))
         row.on_click(lambda _: attempt(self.session, actions[row.value]))
@@ -250,7 +240,7 @@ class Fields:
         self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
         return self.kept(widget)
 
-    def _by_hand(self, action: Callable[[], object]) -> Callable[[Any], None]:
+    def _by_hand(self, action: Action) -> Callable[[Any], None]:
         """What acts where a person moved a widget, and not where the program did."""
 
         def moved(event: Any) -> None:
@@ -263,7 +253,7 @@ class Fields:
         """Change the state, or say below the widget why that cannot be."""
         session, before = self.session, self._refused
         place, refusal = widget if isinstance(widget, TypedField) else self.message, ""
-        dragged = isinstance(widget, SliderField)
+        dragged = isinstance(widget, Slider)
         try:
             session.update(change, by_widget=widget is not None, goes_on=dragged)
         except SoftreachError as error:
@@ -339,9 +329,18 @@ class _Binding:
             widget.value = shown
 
 
-def attempt(session: Session, action: Callable[[], object]) -> None:
+def attempt(session: Session, action: Action) -> None:
     """Act, and show the reader what is wrong if that fails: a person sees no log."""
     try:
         action()
     except Exception as error:
         session.fail(error)
+
+
+def file_text(name: str, content: bytes) -> str:
+    """The text in a file that a person opens; `name` is what errors call it.
+
+    Raises:
+        InvalidInput: It is too large, or no text.
+    """
+    return text_of("file", name, content, LARGEST)

@@ -74,9 +74,9 @@ class Job:
     wanted: str = ""
     """Attribute that is false where it is of no use; it is done once more when that begins."""
     makes: str = ""
-    """Fields of `Found` that are forgotten where the work fails."""
+    """Fields of `Found`, beside that of its name, that are forgotten where the work fails."""
     draws: str = ""
-    """Nodes of the scene that are taken away then."""
+    """Nodes of the scene, beside that of its name, that are taken away then."""
     at_once: bool = True
     """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
     that what computes while it draws is sent piece by piece."""
@@ -280,11 +280,11 @@ def _draw_beside(given: Given, name: str) -> None:
 
 def _beside(name: str) -> Job:
     compute, draw = partial(_compute_beside, name=name), partial(_draw_beside, name=name)
-    follows = f"{name} appearance.slice"
-    return Job(name, follows, compute, draw, wanted=name, makes=name, draws=f"/{name}")
+    return Job(name, f"{name} appearance.slice", compute, draw, wanted=name)
 
 
 _CLOUD = "/cloud /unstable"
+_LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
@@ -293,15 +293,15 @@ SCENE_JOBS = (
         "design design.display_unit appearance.level",
         _compute_reach,
         _draw_cloud,
-        makes="reach key slopes",
+        makes="key slopes",
         draws=_CLOUD,
         at_once=False,
     ),
     # Ends of the sliders, and slopes of the volume by them, once nobody drags
-    Job("slopes", "design found.reach", _differentiate, makes="slopes"),
+    Job("slopes", "design found.reach", _differentiate),
     Job(
         "cloud",
-        "appearance.level appearance.color appearance.slice appearance.cloud appearance.surface",
+        f"appearance.level {_LOOKS}",
         _color_cloud,
         _draw_cloud,
         draws=_CLOUD,
@@ -311,12 +311,10 @@ SCENE_JOBS = (
     # The exact boundary
     Job(
         "surface",
-        "found.reach appearance.surface appearance.slice appearance.cloud "
-        "appearance.color appearance.dark",
+        f"found.reach appearance.dark {_LOOKS}",
         _color_surface,
         _draw_surface,
         wanted="appearance.surface",
-        draws="/surface",
         at_once=False,
     ),
     Job(
@@ -324,18 +322,9 @@ SCENE_JOBS = (
         "found.reach appearance.slice.axis appearance.slice.center",
         _cut,
         wanted="appearance.section",
-        makes="section",
     ),
-    Job(
-        "sweep",
-        "design design.display_unit appearance.swept",
-        _sweep,
-        wanted="appearance.sweep",
-        makes="sweep",
-    ),
-    Job(
-        "arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture", draws="/arm"
-    ),
+    Job("sweep", "design design.display_unit appearance.swept", _sweep, wanted="appearance.sweep"),
+    Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
     Job(
         "camera",
@@ -344,9 +333,7 @@ SCENE_JOBS = (
         _look,
     ),
     Job(
-        "theme",
-        "appearance.dark",
-        draw=lambda given: theme(given.client.gui, dark=given.state.appearance.dark),
+        "theme", "appearance.dark", draw=lambda g: theme(g.client.gui, dark=g.state.appearance.dark)
     ),
     _beside("free"),
     _beside("reference"),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,16 +15,10 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.picture.shading import vertex_normals
-from softreach.rod.tip_map import TipStatus, has_tip
+from softreach.rod.tip_map import TipMap, TipStatus, has_tip
+from softreach.sampling import cube_blocks
 from softreach.studio.state import TOL, solvable_rod
-from softreach.studio.work import (
-    Budget,
-    OverBudget,
-    StaleCheck,
-    affordable_level,
-    all_cores,
-    level_in_memory,
-)
+from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput, no_warnings
 from softreach.workspace import ReachableSet, reachable_set
@@ -34,6 +29,7 @@ if TYPE_CHECKING:
 
 Report = Callable[[str], object]
 """Shows the reader what is being done."""
+_quiet: Report = lambda doing: None
 
 _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
 _LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
@@ -185,11 +181,7 @@ def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
 
 
 def stages(
-    arm: Manipulator,
-    level: int,
-    quality: Quality,
-    check: StaleCheck,
-    report: Report = lambda doing: None,
+    arm: Manipulator, level: int, quality: Quality, check: StaleCheck, report: Report = _quiet
 ) -> Iterator[Reach]:
     """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
 
@@ -275,7 +267,7 @@ def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
     ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
     shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
     reach = Reach(arm=design_of(cloud), cloud=cloud, exact=None, fine=True, order=shuffled)
-    work = _Work(reach.arm, 0, quality, lambda: None, lambda doing: None)
+    work = _Work(reach.arm, 0, quality, lambda: None, _quiet)
     with all_cores:
         return work.measured(reach, quality.fine_accuracy)
 
@@ -292,6 +284,45 @@ def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> 
         return reachable_set(arm, accuracy=accuracy, tol=tol, memory=memory, progress=budget)
 
 
+# Effort: the samples of an arm that there is time and memory for.
+
+
+_PILOT = 512
+_LOWEST = 10  # level below which a cloud shows no shape
+_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
+
+
+def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
+    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
+
+    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
+    """
+    return _level(max(seconds, 1e-9) / _seconds_each(rod), wanted)
+
+
+def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
+    """The level of the largest cloud, at most wanted, that memory [bytes] holds with its copies."""
+    return _level(max(memory, 1.0) / (8.0 * (bundles + 3) * _COPIES), wanted)
+
+
+def _level(samples: float, wanted: int) -> int:
+    return min(wanted, max(_LOWEST, math.floor(math.log2(samples))))
+
+
+@lru_cache(maxsize=64)
+def _seconds_each(rod: TipMap) -> float:
+    """Cost of one sample [s], once everything is compiled and prepared."""
+    (cube,) = cube_blocks("sobol", _PILOT, rod.box.bundles, 0, _PILOT)
+    gamma, compute = rod.box.from_cube(cube), rod.status if rod.supports_unstable else rod.tips
+    compute(gamma[:16])
+    seconds = []
+    for _ in range(2):
+        start = time.perf_counter()
+        compute(gamma)
+        seconds.append(time.perf_counter() - start)
+    return max(min(seconds), 1e-6) / _PILOT
+
+
 # Multiplicity: the number of activations that reach a place, as the inverse finds them. The grid of
 # the exact set counts too, but not near folds, where half of the samples of a folded set are.
 
@@ -304,10 +335,7 @@ def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def count_activations(
-    reach: Reach,
-    rows: NDArray[np.int64],
-    check: StaleCheck = lambda: None,
-    report: Report = lambda doing: None,
+    reach: Reach, rows: NDArray[np.int64], check: StaleCheck = lambda: None, report: Report = _quiet
 ) -> NDArray[np.float64]:
     """Number of stable activations that put the tip where that of each sample is, shape (n,).
 

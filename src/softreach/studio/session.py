@@ -20,18 +20,13 @@ from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import (
-    CompilationWatch,
-    Dropped,
-    Latest,
-    StaleCheck,
-    rest,
-    return_memory_soon,
-)
+from softreach.studio.work import Dropped, Latest, StaleCheck, rest, return_memory_soon
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
+
+    from softreach.studio.work import CompilationWatch
 
 Change = Callable[[StudioState], StudioState]
 
@@ -314,9 +309,9 @@ class Session:
         except Dropped:
             raise
         except Exception:
-            nothing = Found()
-            self.learn({name: getattr(nothing, name) for name in job.makes.split()})
-            self.scene.remove(*job.draws.split())
+            nothing, names = vars(Found()), (job.name, *job.makes.split())
+            self.learn({name: nothing[name] for name in names if name in nothing})
+            self.scene.remove(f"/{job.name}", *job.draws.split())
             raise
         finally:
             if job.doing:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from softreach.arm import edits
 from softreach.arm.actuators import SectorActuator
 from softreach.arm.design_file import in_file_terms
-from softreach.arm.edits import ring_label
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, parameters, with_values
@@ -268,6 +268,18 @@ class Part(NamedTuple):
     actuator: str = ""  # name of an actuator; "" for all else
     home: int | str | None = None  # the ring that an actuator is in
 
+    def changed(self, arm: Manipulator, **changes: Any) -> Manipulator:
+        """The arm with other values of fields of this ring or actuator."""
+        if self.ring is not None:
+            return edits.with_changed_ring(arm, self.ring, **changes)
+        return edits.with_changed_actuator(arm, self.actuator, **changes)
+
+    def removed(self, arm: Manipulator) -> Manipulator:
+        """The arm without this ring or actuator."""
+        if self.ring is not None:
+            return edits.without_ring(arm, self.ring)
+        return edits.without_actuator(arm, self.actuator)
+
 
 _BODY = Part("body", ("", "profile"), "")
 _BODY_LABELS = {
@@ -294,7 +306,7 @@ def parts(arm: Manipulator) -> dict[str, Part]:
     listed = [_BODY, *([Part("core", ("core",), "")] if arm.section.core is not None else [])]
     for k, ring in enumerate(arm.section.rings):
         owners = (f"rings[{k}]", f"rings[{k}].material")
-        listed.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
+        listed.append(Part(edits.ring_label(arm, k), owners, ring.name, ring=k))
     labels = {part.label for part in listed}
     for each in arm.actuators:
         home = each.ring if isinstance(each, SectorActuator) else None

@@ -194,7 +194,7 @@ class TypedField:
         """Bring what else shows the value in line with it."""
 
 
-class SliderField(TypedField):
+class Slider(TypedField):
     """Number that is dragged, or typed: also beyond the ends of its slider."""
 
     def __init__(

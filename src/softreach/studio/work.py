@@ -7,14 +7,11 @@ import threading
 import time
 from collections.abc import Callable
 from contextvars import ContextVar
-from functools import lru_cache
 from typing import Any
 
 from numba.core import event
 
 from softreach.inverse.prepared import forget_prepared
-from softreach.rod.tip_map import TipMap
-from softreach.sampling import cube_blocks
 from softreach.support.memory import free_memory, return_memory
 
 StaleCheck = Callable[[], None]
@@ -192,45 +189,6 @@ class Budget:
             if free_memory() < self._least:
                 raise OverBudget("more memory than is free")
             self._report(self._done)
-
-
-# Effort: the samples of an arm that there is time and memory for.
-
-
-_PILOT = 512
-_LOWEST = 10  # level below which a cloud shows no shape
-_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
-
-
-def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
-
-    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
-    """
-    return _level(max(seconds, 1e-9) / _seconds_each(rod), wanted)
-
-
-def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
-    """The level of the largest cloud, at most wanted, that memory [bytes] holds with its copies."""
-    return _level(max(memory, 1.0) / (8.0 * (bundles + 3) * _COPIES), wanted)
-
-
-def _level(samples: float, wanted: int) -> int:
-    return min(wanted, max(_LOWEST, math.floor(math.log2(samples))))
-
-
-@lru_cache(maxsize=64)
-def _seconds_each(rod: TipMap) -> float:
-    """Cost of one sample [s], once everything is compiled and prepared."""
-    (cube,) = cube_blocks("sobol", _PILOT, rod.box.bundles, 0, _PILOT)
-    gamma, compute = rod.box.from_cube(cube), rod.status if rod.supports_unstable else rod.tips
-    compute(gamma[:16])
-    seconds = []
-    for _ in range(2):
-        start = time.perf_counter()
-        compute(gamma)
-        seconds.append(time.perf_counter() - start)
-    return max(min(seconds), 1e-6) / _PILOT
 
 
 # Compilation of kernels, for which only the first use on a machine has to wait.

@@ -149,6 +149,7 @@ class NumberedBox:
         self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         self._unit, self._scale = in_lengths(1.0), 1.0  # of the numbers, and L in it
         self._camera: tuple[Array, float] = np.array([50.0, -80.0, 30.0]), np.inf
+        self._drawn: object = None  # what the numbers were drawn for
 
     @property
     def corners(self) -> tuple[Array, Array]:
@@ -159,36 +160,32 @@ class NumberedBox:
     def draw(self, *points: Array, arm: Manipulator) -> None:
         """Surround points [L], shapes (n, 3), with numbers in the unit of the arm."""
         with self._lock:
-            before = self._unit, self._scale, np.array(self._box).tolist()
             self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
             self._box = round_box(*(self._scale * each for each in points))
-            same = before == (self._unit, self._scale, np.array(self._box).tolist())
-            if not (same and self._is_drawn()):
-                self._draw()
+            self._draw()
 
     def turn(self, camera: Array, focal: float = np.inf) -> None:
         """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
         with self._lock:
-            before, self._camera = self._side(), (camera, focal)
-            if self._is_drawn() and self._side() != before:
+            self._camera = camera, focal
+            if self._drawn is not None:
                 self._draw()
 
-    def _is_drawn(self) -> bool:
-        return self._api.get_handle_by_name("/axes/lines") is not None
-
-    def _side(self) -> object:
-        return seen_from(self._scale * self._camera[0], *self._box, self._camera[1])
-
     def _draw(self) -> None:
-        if self._api.get_handle_by_name("/axes") is not None:
+        """Draw what is not there yet."""
+        (camera, focal), scale, label = self._camera, self._scale, self._unit.label
+        side = seen_from(scale * camera, *self._box, focal)
+        before, self._drawn = self._drawn, (self._unit, scale, np.array(self._box).tolist(), side)
+        if before == self._drawn:
+            return
+        if before is not None:
             self._api.remove_by_name("/axes")
-        (camera, focal), ends = self._camera, [corner[None] for corner in self._box]
-        label = self._unit.label
-        box = axes_box(*ends, camera=self._scale * camera, focal=focal, label=label)
-        lines = (box.lines / self._scale).astype(np.float32)
+        ends = [corner[None] for corner in self._box]
+        box = axes_box(*ends, camera=scale * camera, focal=focal, label=label)
+        lines = (box.lines / scale).astype(np.float32)
         self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
         for k, (text, at) in enumerate(box.labels):
-            add_label(self._api, f"/axes/label {k}", text, at / self._scale)
+            add_label(self._api, f"/axes/label {k}", text, at / scale)
 
 
 def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:

@@ -16,12 +16,7 @@ from softreach.plot.figure_3d import page_keys
 from softreach.rod.tip_map import has_tip
 from softreach.schema import input_symbols
 from softreach.studio import markup
-from softreach.studio.reach import (
-    Reach,
-    count_activations,
-    nearest_samples,
-    shown_samples,
-)
+from softreach.studio.reach import Reach, count_activations, nearest_samples, shown_samples
 from softreach.studio.state import LEVELS, rod_of
 from softreach.studio.work import all_cores
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,24 +86,16 @@ class Scene:
             for known in [k for k in list(self._arms) if k == path or k.startswith(f"{path}/")]:
                 self._arms.pop(known, None)  # workers draw at the same time
             self._clouds.pop(path, None)
-            self._drop(path)
-
-    def _drop(self, path: str) -> None:
-        if self.api.get_handle_by_name(path) is not None:
-            self.api.remove_by_name(path)
+            if self.api.get_handle_by_name(path) is not None:
+                self.api.remove_by_name(path)
 
     def dots(
-        self,
-        path: str,
-        points: Array,
-        color: Color | NDArray[np.uint8],
-        size: float,
-        shape: Literal["circle", "diamond"] = "circle",
+        self, path: str, points: Array, color: Any, size: float, shape: str = "circle"
     ) -> None:
         """Dots at places [L], shape (n, 3); in viser's float16 they would be off by 1e-4 L."""
         points = points[np.isfinite(points).all(axis=1)]
         if not len(points):
-            self._drop(path)
+            self.remove(path)
             return
         look: Any = {"point_size": size, "point_shape": shape, "precision": "float32"}
         self.api.add_point_cloud(path, points.astype(np.float32), color, **look)
@@ -112,7 +104,7 @@ class Scene:
         """Pieces of lines between places [L], shape (n, 2, 3); a piece with NaN is left out."""
         pieces = pieces[np.isfinite(pieces).all(axis=(1, 2))]
         if not len(pieces):
-            self._drop(path)
+            self.remove(path)
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
 
@@ -154,19 +146,11 @@ class Scene:
     def _kept(self, points: Array) -> NDArray[np.bool_]:
         return ~self.hidden(points) & (np.arange(len(points)) < (self._most or len(points)))
 
-    def _cut_dots(
-        self,
-        path: str,
-        points: Array,
-        colors: NDArray[np.uint8],
-        size: float,
-        shape: Literal["circle", "diamond"] = "circle",
-    ) -> None:
+    def _cut_dots(self, path: str, points: Array, colors: NDArray[np.uint8], *look: Any) -> None:
         with self._lock:
             kept = self._kept(points)
-            self._clouds[path] = kept, (points, colors, size, shape)
-            shown = colors[kept] if colors.ndim == 2 else colors
-            self.dots(path, points[kept], shown, size, shape)
+            self.dots(path, points[kept], colors[kept] if colors.ndim == 2 else colors, *look)
+            self._clouds[path] = kept, (points, colors, *look)
 
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
@@ -180,7 +164,7 @@ class Scene:
         stable, size = kept & ~unstable, _point_size(len(points))
         self._cut_dots("/cloud", points[stable], coloring.rgb[stable], size)
         marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
-        self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, shape="diamond")
+        self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, "diamond")
         return coloring.key
 
     # Surfaces.
@@ -191,20 +175,14 @@ class Scene:
             self.remove("/surface")
             return None
         if shows_cloud(reach, look):  # whose colors it would hide
-            self._draw_boundary("/surface", reach, look.slice, _SURFACE, 0.35)
+            self._draw_boundary("/surface", reach, look.slice, _SURFACE, 0.35, None)
             return None
         coloring, ink = surface_colors(reach, look.color), _INK[look.dark]
         self._draw_boundary("/surface", reach, look.slice, coloring.rgb, _CLEAR_SURFACE, ink)
         return coloring.key
 
     def _draw_boundary(
-        self,
-        path: str,
-        reach: Reach,
-        cut: Slice,
-        rgb: ArrayLike,
-        opacity: float,
-        ink: Color | None = None,
+        self, path: str, reach: Reach, cut: Slice, rgb: ArrayLike, opacity: float, ink: Color | None
     ) -> None:
         """What a slice shows of a boundary in RGB of shape (v, 3) or (3,); its lines with ink."""
         faces, vertices = reach.sheets.faces, reach.sheets.vertices / reach.arm.length
@@ -230,7 +208,7 @@ class Scene:
         if reach is None:
             return
         if reach.has_surface:
-            self._draw_boundary(path, reach, cut, color, opacity)
+            self._draw_boundary(path, reach, cut, color, opacity, None)
             return
         points = cloud_points(reach, 15)
         size = 0.4 * _point_size(len(points))

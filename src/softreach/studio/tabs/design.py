@@ -30,7 +30,7 @@ from softreach.studio.shown_parameters import (
     typed_unit,
 )
 from softreach.studio.state import StudioState, rod_of, vector
-from softreach.studio.widgets import Line, SliderField, TextKind, number_kind, vector_kind
+from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector_kind
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 from softreach.support.units import LengthUnit
 
@@ -80,7 +80,7 @@ def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
 def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
     about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
     panel.text("design", "found.slopes", content=about)
-    rows, bars = dict[str, SliderField](), dict[str, Line]()
+    rows, bars = dict[str, Slider](), dict[str, Line]()
     before = panel.session.found.ends  # of a design with other sliders
     for each in shown:
         at = of_design(each.read, each.write)
@@ -120,12 +120,11 @@ def _designs() -> dict[str, Manipulator]:
 
 # Rings and actuators
 
-_AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
+_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
 _NEW_RING = "ring"
-_ABOUT_MADE_OF = "Material of all rings, which an actuator that pulls with a force needs"
-_OFFER = (
-    "A {kind} needs Young's modulus E, which this arm leaves open: choose what it is made of, and "
-    "press Add again."
+_ABOUT_MADE_OF = (
+    "Material that all rings get: an actuator that pulls with a force needs Young's modulus E, "
+    "which some arms leave open"
 )
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
@@ -138,27 +137,24 @@ def arm_parts(panel: Fields) -> None:
         kinds = (*edits.ACTUATOR_KINDS, _NEW_RING)
         hint = "An actuator, or a ring of the cross-section"
         kind = panel.gui.add_dropdown("kind", kinds, hint=hint)
-        made_of = panel.gui.add_dropdown(
-            "made of", tuple(material_names()), hint=_ABOUT_MADE_OF, visible=False
-        )
+        matters = (_AS_IT_IS, *material_names())
+        made_of = panel.gui.add_dropdown("made of", matters, hint=_ABOUT_MADE_OF)
 
         def add() -> None:
-            """Where the arm lacks the modulus for it, offer a material first."""
-            arm = session.state.design
-            lacking = _lacks_material(arm, kind.value)
-            made_of.visible = lacking and not made_of.visible
-            offer.warn(_OFFER.format(kind=kind.value) if made_of.visible else "")
-            if not made_of.visible:
-                matter = made_of.value if lacking else ""
-                new = lambda state: _with_part(state.design, kind.value, matter)
-                panel.apply(lambda state: state.replace(design=new(state)))
-            if session.state.design != arm:
-                known, is_ring = _listed(session.state.design).values(), kind.value == _NEW_RING
+            before, is_ring, matter = session.state.design, kind.value == _NEW_RING, made_of.value
+
+            def grown(arm: Manipulator) -> Manipulator:
+                arm = arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
+                return edits.with_ring(arm) if is_ring else edits.with_actuator(arm, kind.value)
+
+            panel.apply(lambda state: state.replace(design=grown(state.design)))
+            if session.state.design != before:
+                known = _listed(session.state.design).values()
                 like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
                 session.learn({"part": like[-1]})
+                made_of.value = _AS_IT_IS
 
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
-        offer = Line(panel.gui)
 
     def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
         fields.message = message
@@ -171,20 +167,6 @@ def arm_parts(panel: Fields) -> None:
     panel.anew("part", "design", "found.part", key=_chosen, build=build, words=words)
     message = panel.kept(Line(panel.gui))
     panel.message, panel.words = message, words
-
-
-def _with_part(arm: Manipulator, kind: str, matter: str = "") -> Manipulator:
-    arm = edits.with_material(arm, matter) if matter else arm
-    return edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
-
-
-def _lacks_material(arm: Manipulator, kind: str) -> bool:
-    try:
-        _with_part(arm, kind)
-    except InvalidDesign as error:
-        lacking = [fault.path for fault in error.faults if fault.value is None]
-        return any(path.endswith("young_modulus") for path in lacking)
-    return False
 
 
 def _listed(arm: Manipulator) -> dict[str, Part]:
@@ -209,20 +191,14 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     )
     hint = "The part whose numbers are below"
     panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
-    own = (ring := part.ring) is not None or bool(part.actuator)
-    if ring is not None:
-        renamed = lambda arm, name: edits.with_changed_ring(arm, ring, name=name)
-        without = lambda arm: edits.without_ring(arm, ring)
-    else:
-        renamed = lambda arm, name: edits.with_changed_actuator(arm, part.actuator, name=name)
-        without = lambda arm: edits.without_actuator(arm, part.actuator)
+    own = part.ring is not None or bool(part.actuator)
     if own:
-        at = of_design(lambda _: part.name, renamed)
+        at = of_design(lambda _: part.name, lambda arm, name: part.changed(arm, name=name))
         panel.typed("name", at, "What tables and files call it", lambda *_: _NAME)
     _add_matter(panel, part)
     _typed(panel, part_parameters(session.state.design, part))
     if own:
-        remove = lambda state: state.replace(design=without(state.design))
+        remove = lambda state: state.replace(design=part.removed(state.design))
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
 
 
@@ -232,7 +208,7 @@ def _add_matter(panel: Fields, part: Part) -> None:
     if ring is not None:
         of_ring = of_design(
             lambda arm: arm.section.rings[ring].material.name,
-            lambda arm, name: edits.with_changed_ring(arm, ring, material=name) if name else arm,
+            lambda arm, name: part.changed(arm, material=name) if name else arm,
         )
         _material(panel, "material", _AS_TYPED, of_ring)
     if ring == 0:
@@ -243,7 +219,7 @@ def _add_matter(panel: Fields, part: Part) -> None:
         home = lambda arm: next(p.home for p in parts(arm).values() if p.actuator == part.actuator)
         at = of_design(
             lambda arm: arm.section.rings.index(arm.section.ring(home(arm) or 0)),
-            lambda arm, ring: edits.with_changed_actuator(arm, part.actuator, ring=ring),
+            lambda arm, ring: part.changed(arm, ring=ring),
         )
         panel.dropdown("in ring", rings, at, "The ring that it lies in")
 

@@ -16,7 +16,7 @@ from softreach.export.surfaces import SURFACE_FILES
 from softreach.plot.coloring import draw_figure_key
 from softreach.rod.kinematics import configuration
 from softreach.studio.captions import legend_text, reach_text
-from softreach.studio.fields import GRAY, Fields
+from softreach.studio.fields import GRAY, Fields, file_text
 from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
@@ -24,9 +24,8 @@ from softreach.studio.scene.colors import sample_values
 from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import LARGEST, StudioState, design_of_text
+from softreach.studio.state import StudioState, design_of_text
 from softreach.support.errors import InvalidInput
-from softreach.support.files.text import text_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,7 +70,7 @@ def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
         InvalidInput: Neither of them.
         InvalidDesign: The design in it cannot exist.
     """
-    text = text_of("file", name, content, LARGEST)
+    text = file_text(name, content)
     if name.lower().endswith(".toml"):
         return state.replace(design=design_of_text(text, name))
     return StudioState.from_json(text)

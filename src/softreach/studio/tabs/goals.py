@@ -18,19 +18,18 @@ from softreach.calibration.model import MarkerModel
 from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target, check
 from softreach.requirements.checks import quick_check
 from softreach.studio import markup
-from softreach.studio.fields import GRAY, Attribute, Fields
+from softreach.studio.fields import GRAY, Attribute, Fields, file_text
 from softreach.studio.found import Bench, Found, Sample
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.camera import add_label
 from softreach.studio.scene.scene import DARK, MARK, MARKER, Scene, pieces
 from softreach.studio.session import Session
-from softreach.studio.state import LARGEST, StudioState, needs_of_text, requirements_of
+from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
 from softreach.support import palette
 from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
-from softreach.support.files.text import text_of
 from softreach.support.palette import eight_bit
 from softreach.support.units import LengthUnit
 
@@ -183,8 +182,8 @@ def read_needs(session: Session, name: str, content: bytes) -> None:
         InvalidInput: The file is too large, no text, or lists too many places.
         InvalidDesign: It has no requirements, or names other files.
     """
-    text, length = text_of("file", name, content, LARGEST), session.state.design.length
-    _keep(session, needs_of_text(text, length=length, source=name))
+    length = session.state.design.length
+    _keep(session, needs_of_text(file_text(name, content), length=length, source=name))
 
 
 def _keep(session: Session, needs: Requirements) -> None:
@@ -490,16 +489,7 @@ JOBS = (
         _draw_needs,
         wanted="needs",
         makes="check",
-        draws="/needs",
     ),
-    Job(
-        "sample",
-        "design activation found.bench",
-        _predict,
-        _draw_sample,
-        wanted="found.bench",
-        makes="sample",
-        draws="/sample",
-    ),
+    Job("sample", "design activation found.bench", _predict, _draw_sample, wanted="found.bench"),
     Job("fit", "", _fit, doing="calibrating"),
 )

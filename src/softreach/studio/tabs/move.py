@@ -18,25 +18,15 @@ from softreach.inverse.path import PathStatus, track_path
 from softreach.inverse.request import positions_in
 from softreach.schema import input_symbols
 from softreach.studio.captions import place_text, tip_text
-from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
+from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute, file_text
 from softreach.studio.found import Found, Lag, Pull
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.scene.scene import DARK, MARK, MOST_BUNDLES, pieces
 from softreach.studio.session import Session
-from softreach.studio.state import (
-    LARGEST,
-    MOST_POINTS,
-    MOUSE,
-    StudioState,
-    TipPath,
-    rod_of,
-    solvable_rod,
-    vector,
-)
+from softreach.studio.state import MOUSE, StudioState, TipPath, rod_of, solvable_rod, vector
 from softreach.studio.widgets import TypedField, vector_kind
 from softreach.support.errors import InvalidInput
-from softreach.support.files.text import text_of
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -292,9 +282,7 @@ def extend_path(session: Session, point: np.ndarray) -> None:
 
 
 def _read_path(session: Session, file: UploadedFile) -> None:
-    points = positions_in(text_of("file", file.name, file.content, LARGEST), file.name)
-    if not 2 <= len(points) <= MOST_POINTS:
-        raise InvalidInput(file.name, f"{len(points)} points", f"2 to {MOST_POINTS} points")
+    points = positions_in(file_text(file.name, file.content), file.name)
     state = session.state
     near = np.linalg.norm(_tip(state) - points[0]) < 1e-3 * state.design.length
     read = TipPath.through(points, state.activation if near else None)
@@ -452,7 +440,6 @@ JOBS = (
         _draw_path,
         wanted="path",
         makes="track",
-        draws="/path",
         doing="following the path",
     ),
     Job("play", "", _play),

@@ -43,11 +43,9 @@ def status(panel: Fields) -> None:
 
     def offer(_: StudioState, found: Found) -> None:
         lacking = is_behind(session) and not found.refusal
-        label = _GO_ON if lacking and not session.busy else _CANCEL
-        if cancel.label != label:
-            cancel.label = label
-        if cancel.visible != (session.busy or lacking):
-            cancel.visible = not cancel.visible
+        label, shown = _CANCEL if session.busy else _GO_ON, session.busy or lacking
+        if (cancel.label, cancel.visible) != (label, shown):
+            cancel.label, cancel.visible = label, shown
 
     panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
     toast: Any = None
@@ -71,16 +69,16 @@ def status(panel: Fields) -> None:
 def _numbers(session: Session, found: Found) -> str:
     """What is known, and whether it is about to change."""
     check, reach = found.check, found.reach
-    lines = [_reach_line(session), [verdict_text(check)] if check is not None else []]
-    marks: list[list[Part]] = []
+    above = [_reach_line(session), [verdict_text(check)] if check is not None else []]
+    below: list[list[Part]] = []
     if reach is not None:
-        marks.append(legend_text(reach, free=found.free is not None))
+        below.append(legend_text(reach, free=found.free is not None))
         if reach.refusal:
-            marks.append([f"No exact volume: {reach.refusal}"])
+            below.append([f"No exact volume: {reach.refusal}"])
         if reach.fine and reach.notes:
-            marks.append([f"{'; '.join(reach.notes)}."])
-    above, below = ([markup.paragraph(*line) for line in each] for each in (lines, marks))
-    return markup.status(*above, key_html(found.key), *below)
+            below.append([f"{'; '.join(reach.notes)}."])
+    lines = [markup.paragraph(*line) for line in (*above, *below)]
+    return markup.status(*lines[:2], key_html(found.key), *lines[2:])
 
 
 def is_behind(session: Session) -> bool:
@@ -92,22 +90,20 @@ def _reach_line(session: Session) -> list[Part]:
     found, design, work = session.found, session.state.design, _work(session)
     if found.reach is None:
         return [found.refusal or work]
-    parts = reach_text(found.reach, loaded_share(found, design))
-    if found.reach.arm != design:
-        parts = [Strong("of the design before: "), *parts]
-    return [*parts, *([f" · {work}"] if work else [])]
+    before = [Strong("of the design before: ")] * (found.reach.arm != design)
+    numbers = reach_text(found.reach, loaded_share(found, design))
+    return [*before, *numbers, *([f" · {work}"] if work else [])]
 
 
 def _work(session: Session) -> str:
-    if session.compiling:
-        return session.compiling
+    if words := session.compiling:
+        return words
     if session.doing:
         return f"{session.doing} ..."
     if not is_behind(session):
         return ""
-    if session.busy:
-        return "computing ..."
-    return "canceled" if session.canceled else "not computed"
+    idle = "canceled" if session.canceled else "not computed"
+    return "computing ..." if session.busy else idle
 
 
 # Looks
@@ -219,11 +215,10 @@ def _figure(panel: Fields, name: str) -> None:
             image.image, image.visible = picture.image, True
 
     def text(state: StudioState, found: Found) -> tuple[str, ...]:
-        picture = known(found)
-        if picture is None:
+        if (picture := known(found)) is None:
             return ("computing ...",)
-        old = picture.arm != state.design
-        return (picture.text, " · of the design before, computing ..." if old else "")
+        before = " · of the design before, computing ..."
+        return (picture.text, before * (picture.arm != state.design))
 
     with panel.folder(_PLOTS[name][0], f"appearance.{name}"):
         image = panel.gui.add_image(_NOTHING, format="png", visible=False)
