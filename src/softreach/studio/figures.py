@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed, parameters
+from softreach.arm.parameters import changed
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, plane_of
 from softreach.plot.sets import plot_slice
 from softreach.studio import markup
 from softreach.studio.reach import Quality, Reach, exact_set
-from softreach.studio.shown_parameters import ShownParameter, slider_parameters
+from softreach.studio.shown_parameters import ShownParameter, known_parameters, slider_parameters
 from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.widgets import unit_in
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
@@ -244,7 +244,7 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
 
     The check is called often, and raises to stop.
     """
-    arm, solid, known = reach.arm, reach.exact, parameters(reach.arm)
+    arm, solid, known = reach.arm, reach.exact, known_parameters(reach.arm)
     slopes = dict[str, Slope]()
     if solid is None or solid.dimension < 3 or not solid.volume > 0:
         return VolumeSlopes(arm, reach.volume, slopes)

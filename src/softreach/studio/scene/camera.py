@@ -35,7 +35,7 @@ VIEWS: dict[str, Array] = {
 UPRIGHT = 0.6  # aspect below which a window is that of a phone
 
 _PATIENCE = 30.0  # [s] for a picture
-_LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
+LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
@@ -127,9 +127,9 @@ class TabCamera:
         """
         camera, client = self._client.camera, self._client
         size = {"height": FINER * camera.image_height, "width": FINER * camera.image_width}
-        if max(size.values()) > _LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
+        if max(size.values()) > LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
             value = f"{size['width']} by {size['height']} pixels"
-            allowed = f"at most {_LONGEST} along a side and {_MOST_PIXELS / 1e6:.0f} million"
+            allowed = f"at most {LONGEST} along a side and {_MOST_PIXELS / 1e6:.0f} million"
             raise InvalidInput("picture", value, allowed, "make the window smaller")
         try:
             return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
