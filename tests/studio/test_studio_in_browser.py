@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.arm.parameters import changed
+from softreach.arm.parameters import changed, find_parameter
 from softreach.studio import Quality, Studio
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
@@ -60,6 +61,59 @@ def test_a_change_is_undone_and_done_again_by_buttons_and_keys(tab):
     tab.page.keyboard.press("Control+Shift+z")
     shows(second, 1.0)
     assert tab.session.found.reach.arm == second
+
+
+def test_what_is_typed_may_have_a_unit_lie_beyond_the_slider_or_be_refused_below_it(tab):
+    page, alerts = tab.page, tab.page.locator(".sr-alert").locator("visible=true")
+    tab.open("Design")
+    thumb = tab.slider("revolution Ω [deg]")
+
+    def is_shown(text: str) -> None:
+        page.locator(f"input[value='{text}']").locator("visible=true").first.wait_for()
+        near = pytest.approx(float(text), abs=1e-6)
+        tab.wait(lambda: float(thumb.get_attribute("aria-valuenow")) == near, "the thumb follows")
+
+    tab.type("revolution Ω [deg]", "400")
+    is_shown("400")
+    tab.type("revolution Ω [deg]", "0.5 rad")
+    is_shown("28.6478897565")
+    assert find_parameter(tab.session.state.design, "revolution").value(
+        tab.session.state.design
+    ) == pytest.approx(0.5)
+    before = tab.session.state
+    tab.type("taper φ [deg]", "50")
+    assert "taper φ [deg] = 50" in alerts.first.inner_text()
+    page.locator("input[value='50']").locator("visible=true").wait_for()
+    tab.type("revolution Ω [deg]", "far")
+    page.get_by_text("must be a number, without a unit or in deg").wait_for()
+    assert tab.session.state == before
+    tab.type("revolution Ω [deg]", "90")
+    is_shown("90")
+    tab.wait(lambda: alerts.count() == 0, "what was refused is given up")
+    page.locator("input[value='2']").locator("visible=true").first.wait_for()
+
+
+def test_a_slider_follows_others_but_is_not_set_back_while_it_is_in_the_hand(tab):
+    thumb, mouse = tab.slider("taper φ [deg]"), tab.page.mouse
+    tab.open("Design")
+    tab.center(thumb)
+    box = thumb.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x - 20, y, steps=4)
+    tab.wait(lambda: thumb.get_attribute("aria-valuenow") != "2", "the thumb is moved")
+    tab.settle()
+    held = thumb.get_attribute("aria-valuenow")
+    tab.session.update(lambda s: s.showing(color="rgb"), by_widget=True)
+    tab.settle()
+    assert thumb.get_attribute("aria-valuenow") == held
+    mouse.up()
+    tab.settle()
+    taper = find_parameter(tab.session.state.design, "taper").value(tab.session.state.design)
+    assert np.degrees(taper) == pytest.approx(float(held))
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": np.radians(1.25)})))
+    tab.wait(lambda: thumb.get_attribute("aria-valuenow") == "1.25", "the thumb follows")
 
 
 @pytest.mark.large
