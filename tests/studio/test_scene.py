@@ -24,7 +24,7 @@ from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import Appearance, Slice, StudioState, TipPath
 from softreach.studio.tabs import JOBS
-from softreach.studio.tabs.compare import compared, comparison_html, kept, swapped
+from softreach.studio.tabs.compare import compared, comparison_html
 from tests.made_arms import MADE_ARMS
 from tests.studio.conftest import SMALL
 
@@ -265,11 +265,3 @@ def test_designs_that_differ_in_more_than_sliders_say_so():
     two = (TRUNK, None), (designs.redundant_trunk(), None)
     assert not compared(*two)[1]
     assert "more than these numbers" in comparison_html(*two)
-
-
-def test_a_kept_design_and_the_present_one_are_swapped(trunk):
-    flat = changed(trunk, {"taper": 0.0})
-    state = kept(StudioState(design=trunk)).replace(design=flat)
-    assert (state.design, state.reference) == (flat, trunk)
-    assert swapped(swapped(state)) == state
-    assert swapped(state).design == trunk

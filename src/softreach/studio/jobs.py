@@ -250,7 +250,7 @@ def _look(given: Given) -> None:
     base = np.array(state.design.base.position) / state.design.length
     scene.look(ahead if look.half else None, base, _DRAGGED if found.is_dragged else None)
     scene.axes.turn(position, given.camera.focal)
-    tip = found.tip if look.handle and look.arm else None
+    tip = found.tip if look.mouse == "tip" and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
     scene.see_through_arm(found.sample is not None or hides)
 
@@ -328,7 +328,7 @@ SCENE_JOBS = (
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
     Job(
         "camera",
-        "appearance.half appearance.arm appearance.handle found.tip found.sample found.is_dragged",
+        "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged",
         _wait,
         _look,
     ),

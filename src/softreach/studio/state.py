@@ -157,11 +157,6 @@ class Appearance:
     swept: str = ""  # parameter against which the volume is plotted; "" for the first there is
     unit: str = ""  # of lengths, areas and volumes; "" for that of the design
 
-    @property
-    def handle(self) -> bool:
-        """True if there is a ball on the tip, to be dragged."""
-        return self.mouse == "tip"
-
     def __post_init__(self) -> None:
         as_integer("level", self.level, LEVELS[0], LEVELS[-1])
         as_one_of("mouse", self.mouse, MOUSE)

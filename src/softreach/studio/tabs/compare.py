@@ -29,21 +29,13 @@ def compare(panel: Fields) -> None:
     """Keeps a design, and compares the design with it."""
     known = "design", "reference", "found.reach", "found.reference"
     panel.html(*known, content=_compared)
-    panel.change("Keep this design", kept, "Draws its boundary in gray from now on")
+    keep = lambda state: state.replace(reference=state.design)
+    panel.change("Keep this design", keep, "Draws its boundary in gray from now on")
     with panel.folder("kept design", "reference"):
-        panel.change("Swap", swapped, "Makes the kept design the design, and back")
+        swap = lambda s: s.replace(design=s.reference or s.design, reference=s.design)
+        panel.change("Swap", swap, "Makes the kept design the design, and back")
         forget = "Compares no more, and takes the gray boundary away"
         panel.change("Forget", lambda state: state.replace(reference=None), forget, **GRAY)
-
-
-def kept(state: StudioState) -> StudioState:
-    """The state that keeps its design."""
-    return state.replace(reference=state.design)
-
-
-def swapped(state: StudioState) -> StudioState:
-    """The state with both designs exchanged."""
-    return state.replace(design=state.reference or state.design, reference=state.design)
 
 
 def _compared(state: StudioState, found: Found) -> str:

@@ -59,7 +59,7 @@ def drag(panel: Fields) -> None:
 
     def place(state: StudioState, found: Found) -> None:
         arm, look, lag = state.design, state.appearance, found.lag
-        grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
+        grasped = look.mouse == "tip" and look.arm and rod_of(arm).box.dimension > 0
         grasped = grasped and found.sample is None  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
         clear = state.path is not None
@@ -69,7 +69,7 @@ def drag(panel: Fields) -> None:
 
     def text(state: StudioState, found: Found) -> list[str]:
         gap = _gap(state, found)
-        if gap or not state.appearance.handle:
+        if gap or state.appearance.mouse != "tip":
             return [f"This branch ends {gap} short of the pointer."] if gap else []
         return [_DRAG_HINT]
 

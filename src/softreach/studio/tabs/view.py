@@ -43,7 +43,8 @@ def status(panel: Fields) -> None:
 
     def offer(_: StudioState, found: Found) -> None:
         lacking = is_behind(session) and not found.refusal
-        label, shown = _CANCEL if session.busy else _GO_ON, session.busy or lacking
+        label = _GO_ON if lacking and not session.busy else _CANCEL
+        shown = lacking or session.busy
         if (cancel.label, cancel.visible) != (label, shown):
             cancel.label, cancel.visible = label, shown
 
