@@ -207,7 +207,7 @@ def test_pictures_in_different_units_do_not_share_axes(cloud, lce, shape):
 def test_numbers_for_machines_do_not_depend_on_the_unit(lce, printed):
     asked = ["volume", "lce_arm", "--n", "3000", "--alpha", "0.4L", "--unit"]
     facts, *others = (printed(*asked, unit) for unit in UNITS)
-    assert others == [facts] * 3
+    assert others == [facts] * (len(UNITS) - 1)
     assert facts["volume_m3"] == pytest.approx(lce.length**3 * facts["volume_L3"])
 
 
