@@ -225,7 +225,7 @@ class TestArm:
             ]
             edges = {(a, b) for f in faces for a, b in zip(f, [*f[1:], f[0]], strict=True)}
             assert edges == {(b, a) for a, b in edges}  # each edge has a face on either side
-        with pytest.raises(InvalidInput, match=r"m, cm, mm for a \.3mf file"):
+        with pytest.raises(InvalidInput, match=r"m, cm, mm, in for a \.3mf file"):
             export_arm(trunk, bent, tmp_path / "again.3mf", unit="L")
         assert not left_over(tmp_path, "arm.vtu", "arm.3mf")
 

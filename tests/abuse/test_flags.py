@@ -50,8 +50,8 @@ REFUSED = {
     "atlas status nowhere.zarr": "must be an atlas written by build_atlas; it does not exist",
     f"show {TRUNK} --n 9 --color pink": "left, right, longitudinal",
     f"solve {TRUNK}": "give either --target or --targets",
-    "solve lce_arm --target 0,0,5inch": "or each with its unit (m, cm, mm, um, µm, L)",
-    "design lce_arm --unit ft": "unit = 'ft': must be one of m, cm, mm, L",
+    "solve lce_arm --target 0,0,5inch": "or each with its unit (m, cm, mm, um, µm, in, L)",
+    "design lce_arm --unit ft": "unit = 'ft': must be one of m, cm, mm, in, L",
     f"{VARY} --alpha=5cm": "must be a radius > 0 over the length of each design",
     # changes of a design
     "design lce_arm --payload 200": "payload = 200: must be a mass >= 0 with its unit (kg, g, mg)",

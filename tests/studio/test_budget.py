@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,11 +14,11 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
+from softreach.studio.figures import Slope, VolumeSlopes, slope_bars, volume_slopes
 from softreach.studio.markup import bar
-from softreach.studio.reach import Quality, Reach, stages
+from softreach.studio.reach import Quality, Reach, level_in_memory, stages
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.slopes import Slope, VolumeSlopes, slope_bars, volume_slopes
-from softreach.studio.work import Budget, Dropped, OverBudget, all_cores, level_in_memory
+from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
 from softreach.workspace import volume_gradient
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -43,14 +44,6 @@ def test_a_computation_ends_when_memory_runs_out_meanwhile(monkeypatch):
     time.sleep(0.25)
     with pytest.raises(OverBudget, match="memory"):
         running()
-
-
-def test_what_nobody_wants_ends_before_its_budget_does():
-    def check():
-        raise Dropped
-
-    with pytest.raises(Dropped):
-        Budget(check, 0.0)()
 
 
 def test_clouds_fit_into_memory_however_many_bundles_there_are():
@@ -106,7 +99,7 @@ def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_g
 def test_no_stage_keeps_the_turn_while_its_reach_is_drawn(trunk):
     for arm in (trunk, changed(trunk, {"longitudinal.bundles": 2})):
         for _ in reaching.stages(arm, 10, SMALL, nothing):
-            assert not all_cores.taken
+            assert not all_cores.is_taken()
 
 
 # The bars under the sliders: how the volume changes with each, exactly and on one scale
@@ -154,7 +147,7 @@ def test_where_there_is_no_volume_there_is_no_slope(trunk):
 
 
 def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
-    from softreach.studio import slopes as module
+    from softreach.studio import figures as module
     from softreach.support.errors import InvalidInput
 
     plain = module.gradient_of
@@ -170,15 +163,11 @@ def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, mo
     assert len(slopes) > 5
 
 
-def test_a_set_that_loads_tear_has_no_slopes(trunk):
+def test_a_set_that_loads_tear_has_no_slopes_and_what_takes_too_long_is_left_out(trunk):
     reach = reach_of(trunk)
-
-    class Torn(type(reach.exact)):
-        lost_share = 0.1
-
-    torn = object.__new__(Torn)
-    vars(torn).update({k: v for k, v in vars(reach.exact).items() if k != "lost_share"})
+    torn = SimpleNamespace(dimension=3, volume=1.0, lost_share=0.1, is_torn=False)
     assert volume_slopes(replace(reach, exact=torn), QUALITY, nothing).slopes == {}
+    assert volume_slopes(reach, replace(QUALITY, most_seconds=0.0), nothing).slopes == {}
 
 
 def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
@@ -192,11 +181,6 @@ def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
     with pytest.raises(Dropped):
         volume_slopes(reach, QUALITY, check)
     assert len(calls) == 5
-
-
-def test_what_takes_too_long_is_left_out(trunk):
-    hasty = replace(QUALITY, most_seconds=0.0)
-    assert volume_slopes(reach_of(trunk), hasty, nothing).slopes == {}
 
 
 def share_of(html: str) -> float:

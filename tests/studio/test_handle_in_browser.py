@@ -18,14 +18,6 @@ def inverse_tab(tab):
     return tab
 
 
-@pytest.fixture
-def full_tab(inverse_tab):
-    """With more points than are drawn while the tip is dragged."""
-    inverse_tab.session.update(lambda s: s.showing(level=14))
-    inverse_tab.settle()
-    return inverse_tab
-
-
 def pose(tab, activation):
     tab.session.update(lambda s: s.replace(activation=activation, target=None))
     tab.settle()
@@ -53,10 +45,6 @@ def around(tab, point):
     x, y = tab.screen(point)
     clip = {"x": x - 4, "y": y - 4, "width": 8, "height": 8}
     return imread(io.BytesIO(tab.page.screenshot(clip=clip)))[..., :3]
-
-
-def tip_of(tab):
-    return sr.tip_positions(tab.session.state.design, [tab.session.state.activation])[0]
 
 
 FOLDED = (-0.48, -0.16, -1.23)

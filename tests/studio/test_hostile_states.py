@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-import io
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
+from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud, save_cloud
-from softreach.export import export_cloud
+from softreach.export import export_cloud, export_mesh
 from softreach.studio.captions import size_text
+from softreach.studio.found import Found
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.colors import sample_values
 from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
 from softreach.studio.state import Slice, StudioState
-from softreach.studio.tabs.export import (
-    cloud_file,
-    figure_file,
-    page_file,
-    state_from,
-    surface_file,
-)
+from softreach.studio.tabs.export import FILES, content_of, state_from
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
@@ -61,6 +57,12 @@ HOSTILE = {
     "needs of a mesh.json": state_with(needs='[[avoid]]\nmesh = "/etc/passwd"'),
     "many places.json": state_with(needs=f"[[reach]]\nplaces_m = {[[0, 0, 1]] * 301}"),
     "null.json": "null",
+    "list.json": "[]",
+    "nothing.json": "{}",
+    "version.json": state_with(softreach_studio=99),
+    "flat target.json": state_with(target=[1, 2]),
+    "unknown field.json": state_with(searched=None),
+    "too tapered.json": state_with(design=design_with("taper_deg = 2.0", "taper_deg = 50.0")),
     "bytes.json": "\x00\x01",
 }
 
@@ -93,14 +95,24 @@ def fine(trunk):
     return last
 
 
-def test_files_are_those_of_the_librarys_own_writers(fine, tmp_path):
-    state = StudioState(design=fine.arm).showing(level=14)
-    export_cloud(fine.cloud, tmp_path / "cloud.ply")
-    assert cloud_file(fine, ".ply") == (tmp_path / "cloud.ply").read_bytes()
-    trimesh = pytest.importorskip("trimesh")
-    saved = trimesh.load(io.BytesIO(surface_file(fine, ".ply")), file_type="ply")
-    assert saved.volume == pytest.approx(fine.exact.surface().volume, rel=1e-6)
-    assert figure_file(fine, state).startswith(b"\x89PNG")
+def saved(fine, state, kind: str, name: str) -> bytes:
+    tab = SimpleNamespace(state=state, found=Found(reach=fine))
+    return content_of(tab, *FILES[kind][name])
+
+
+@pytest.mark.parametrize("unit", ["", "in"])
+def test_files_are_those_of_the_command_line_in_the_unit_of_the_page(fine, tmp_path, unit):
+    pulled = StudioState(design=fine.arm, activation=(-1.0, -0.2, -0.5)).showing(unit=unit)
+    pulled.design.save(tmp_path / "design.toml")
+    export_cloud(fine.cloud, tmp_path / "cloud.ply", unit=unit or "m")
+    export_mesh(fine.exact.surface(), tmp_path / "surface.3mf", unit=unit or "m")
+    for suffix in (".stl", ".3mf", ".glb"):
+        out = [str(tmp_path / f"arm{suffix}"), "--activation=-1,-0.2,-0.5"]
+        assert run(["export", str(tmp_path / "design.toml"), *out]) == 0
+    for name in ("design.toml", "cloud.ply", "surface.3mf", "arm.stl", "arm.3mf", "arm.glb"):
+        label = next(k for k, (file, _) in FILES["data"].items() if file == name)
+        assert saved(fine, pulled, "data", label) == (tmp_path / name).read_bytes()
+    assert saved(fine, pulled, "picture", "four views (.png)").startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
@@ -115,7 +127,8 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
 
     monkeypatch.setattr(plot, "plot_views", watched)
     cut = Slice(axis="y", center=0.1, thickness=0.3)
-    figure_file(fine, StudioState(design=fine.arm).showing(level=14, color=color, slice=cut))
+    state = StudioState(design=fine.arm).showing(level=14, color=color, slice=cut)
+    saved(fine, state, "picture", "four views (.png)")
     kept = in_slice(fine.cloud.tip.values / fine.arm.length, cut)
     np.testing.assert_array_equal(plotted["cloud"].tip, fine.cloud.tip[kept])
     wanted = sample_values(fine, 14, color)
@@ -127,11 +140,11 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
 
 
 def test_a_saved_page_holds_everything_itself(fine):
-    saved = page_file(fine, StudioState(design=fine.arm)).decode()
-    assert size_text(fine.size, fine.arm) in saved
-    assert "taper φ [deg] 2" in saved
-    assert "src=" not in saved
-    assert "://" not in saved
+    page = saved(fine, StudioState(design=fine.arm), "picture", "web page (.html)").decode()
+    assert size_text(fine.size, fine.arm) in page
+    assert "taper φ [deg] 2" in page
+    assert "src=" not in page
+    assert "://" not in page
 
 
 def test_a_design_file_changes_the_design_alone(trunk):

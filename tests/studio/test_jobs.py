@@ -45,51 +45,33 @@ def test_what_is_not_shown_does_not_follow_from_a_first_state(trunk):
     assert stale(None, full) == shown - {"surface"} | {"inverse", "section"}
 
 
-def test_each_change_makes_stale_what_depends_on_it(trunk):
-    state = StudioState(design=trunk)
-    other = changed(trunk, {"taper": 0.01})
-    changes = {
-        state.replace(activation=(-1.0, 0.0, 0.0)): {"arm"},
-        state.showing(color="multiplicity"): {"cloud", "surface"},
-        state.showing(slice=Slice(axis="x")): {"cloud", "surface"},
-        state.showing(surface=False): {"cloud", "surface"},
-        state.showing(cloud=True): {"cloud", "surface"},
-        state.replace(target=(0.1, 0.0, 0.8)): {"inverse"},
-        state.showing(half=False): {"camera"},
-        state.showing(dark=True): {"theme", "surface"},
-        state.replace(needs=NEEDS): {"needs"},
-        state.replace(reference=trunk): {"reference"},
-        state.replace(design=other): {"reach", "slopes", "arm"},
-        state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
-    }
-    for new, jobs in changes.items():
-        assert stale(state, new) == jobs
-
-
-def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(trunk):
-    bare = StudioState(design=trunk)
+def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(trunk):
+    bare, other = StudioState(design=trunk), changed(trunk, {"taper": 0.01})
     full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk, needs=NEEDS)
     full = full.showing(section=True, sweep=True)
-    other = changed(trunk, {"taper": 0.01})
-    moves = {
-        full.replace(design=other): {
-            "reach", "slopes", "arm", "inverse", "needs", "sweep",
-        },
-        full.showing(slice=Slice(axis="x")): {"cloud", "reference", "surface", "section"},
-        full.showing(section=False, sweep=False): {"sweep", "section"},
-        full.replace(target=None): {"inverse"},
-        full.replace(reference=None): {"reference"},
-        full.replace(needs=""): {"needs"},
-    }  # fmt: skip
-    for new, jobs in moves.items():
-        assert stale(full, new) == jobs
-
-
-def test_what_is_found_out_makes_stale_what_is_made_of_it(trunk):
-    state = StudioState(design=trunk).showing(section=True)
-    reach = object.__new__(Reach)
-    assert stale(state, state, NOTHING, Found(reach=reach)) == {"surface", "slopes", "section"}
-    assert stale(state, state, Found(reach=reach), Found(reach=reach)) == set()
+    changes = [
+        (bare, bare.replace(activation=(-1.0, 0.0, 0.0)), {"arm"}),
+        (bare, bare.showing(color="multiplicity"), {"cloud", "surface"}),
+        (bare, bare.showing(slice=Slice(axis="x")), {"cloud", "surface"}),
+        (bare, bare.showing(surface=False), {"cloud", "surface"}),
+        (bare, bare.showing(half=False), {"camera"}),
+        (bare, bare.showing(dark=True), {"theme", "surface"}),
+        (bare, bare.showing(unit="mm"), {"reach"}),
+        (bare, bare.replace(needs=NEEDS), {"needs"}),
+        (bare, bare.replace(reference=trunk), {"reference"}),
+        (bare, bare.replace(design=other), {"reach", "slopes", "arm"}),
+        (bare, bare.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))), set()),
+        (full, full.replace(design=other), {"reach", "slopes", "arm", "inverse", "needs", "sweep"}),
+        (full, full.showing(slice=Slice(axis="x")), {"cloud", "reference", "surface", "section"}),
+        (full, full.showing(section=False, sweep=False), {"sweep", "section"}),
+        (full, full.replace(target=None), {"inverse"}),
+        (full, full.replace(reference=None, needs=""), {"reference", "needs"}),
+    ]
+    for old, new, jobs in changes:
+        assert stale(old, new) == jobs
+    reach = Found(reach=object.__new__(Reach))
+    assert stale(full, full, NOTHING, reach) == {"surface", "slopes", "section"}
+    assert stale(full, full, reach, reach) == set()
 
 
 def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
@@ -168,24 +150,17 @@ def test_stale_work_is_dropped_between_its_stages():
     assert done == ["coarse", "newer"]
 
 
-def test_trouble_is_told_and_the_next_work_is_done():
+def test_trouble_is_told_the_next_work_is_done_and_none_after_closing():
     told, done = [], []
     latest = Latest(told.append)
-    latest.submit(lambda check: 1 / 0)
-    assert latest.join(600)
-    latest.submit(lambda check: done.append("next"))
-    assert latest.join(600)
-    assert isinstance(told[0], ZeroDivisionError)
-    assert done == ["next"]
-
-
-def test_a_closed_worker_does_nothing_more():
-    done = []
-    latest = Latest(done.append)
+    for work in (lambda check: 1 / 0, lambda check: done.append("next")):
+        latest.submit(work)
+        assert latest.join(600)
     latest.close()
     latest.submit(lambda check: done.append("late"))
     assert latest.join(600)
-    assert done == []
+    assert isinstance(told[0], ZeroDivisionError)
+    assert done == ["next"]
 
 
 # Compilation is noticed while it lasts
@@ -193,7 +168,7 @@ def test_a_closed_worker_does_nothing_more():
 
 def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
     told = []
-    watch = CompilationWatch(told.append)
+    watch = CompilationWatch(lambda: told.append(bool(watch.running)))
     inner = njit(lambda x: x + 1)
     outer = njit(lambda x: 2 * inner(x))
     assert outer(1) == 4

@@ -36,7 +36,11 @@ def test_an_arm_is_designed_loaded_seen_to_shrink_and_exported(tab, tmp_path):
     page = tab.page
     tab.open("Design")
     tab.choose("start from", "lce_arm")
-    free = size_text(tab.reach_of(designs.lce_arm()).size, designs.lce_arm())
+    arm = designs.lce_arm().replace(display_unit="in")
+    tab.open("View")
+    tab.choose("unit", "in")
+    free = size_text(tab.reach_of(arm).size, arm)
+    assert " in³" in free
     page.get_by_text(free).wait_for()
     tab.show_surface()
     before = tab.pixels()
@@ -44,7 +48,7 @@ def test_an_arm_is_designed_loaded_seen_to_shrink_and_exported(tab, tmp_path):
     tab.open("Parts")
     tab.unfold("base and loads")
     tab.choose("gravity", "up")
-    page.get_by_text(re.compile(r"under loads, \d+ % of [\d.]+ mL without")).wait_for()
+    page.get_by_text(re.compile(r"under loads, \d+ % of [\d.]+ in³ without")).wait_for()
     page.get_by_text("every sample rests in a stable equilibrium").wait_for()
     assert tab.changed(before) > 0.02
 
@@ -52,6 +56,7 @@ def test_an_arm_is_designed_loaded_seen_to_shrink_and_exported(tab, tmp_path):
     alert = page.get_by_role("alert").filter(has_text="payload = ")
     alert.wait_for()
     tab.type("payload [g]", "2g")
+    assert tab.field("base at [in]").count() == 1
     alert.wait_for(state="hidden")
     tab.wait(lambda: tab.field("payload [g]").input_value() == "2", "the payload is in grams")
 
@@ -61,7 +66,7 @@ def test_an_arm_is_designed_loaded_seen_to_shrink_and_exported(tab, tmp_path):
     assert design.loads == sr.Loads(gravity=(0.0, 0.0, 9.81), payload=0.002)
     tab.choose("data", "exact surface (.ply)")
     mesh = pytest.importorskip("trimesh").load(tab.save("Save data", tmp_path))
-    assert mesh.volume == pytest.approx(tab.reach_of(design).volume, rel=5e-3)
+    assert mesh.volume * 0.0254**3 == pytest.approx(tab.reach_of(design).volume, rel=5e-3)
 
     tab.open("Parts")
     tab.press("Take all loads off")
@@ -96,6 +101,16 @@ def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(ta
     assert tab.changed(alone) > 0.01  # the shapes of the others
     assert page.get_by_role("button", name="\N{CHECK MARK}").count() == 1
     tab.press("Clear the target")
+
+    tab.choose("mouse", "sets the target")
+    tab.click_at(goal)
+    page.get_by_text(re.compile(r"\d activations? reach")).first.wait_for()
+    tab.settle()
+    np.testing.assert_allclose(
+        tab.screen(np.array(tab.session.state.target)), tab.screen(goal), atol=12
+    )
+    tab.press("Clear the target")
+    tab.choose("mouse", "drags the tip")
 
     pulled(tab, (-1.0, -0.2, -0.5))
     around = 2 * np.pi * np.linspace(0, 1, 33)

@@ -14,7 +14,6 @@ from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.studio import Studio
-from softreach.studio.scene.scene import VERDICTS
 from softreach.studio.session import Session
 from softreach.studio.state import requirements_of
 from softreach.studio.tabs import click, goals
@@ -105,7 +104,8 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
         atol=1e-5,
     )
     broken = [
-        tuple(np.asarray(node.colors).ravel()[:3]) == VERDICTS["missed"] for node in (inside, avoid)
+        tuple(np.asarray(node.colors).ravel()[:3]) == goals.VERDICTS["missed"]
+        for node in (inside, avoid)
     ]
     assert broken == [False, True]
     assert "the arm keeps" in verdict(session)
@@ -136,11 +136,8 @@ def test_a_payload_without_a_modulus_is_refused_below_the_needs(session):
 
 BAD_FILES = {
     "bytes": (b"\xff\xfe", "UTF-8"),
-    "no toml": (b"[[reach", "TOML"),
     "a key": (b"[[reech]]", "reech"),
     "a file": (b'[[reach]]\nfile = "/etc/passwd"', "not sent along"),
-    "a mesh": (b'[[stay_inside]]\nmesh = "/etc/passwd"', "not sent along"),
-    "many": (f"[[reach]]\nplaces_m = {[[0, 0, 1]] * 301}".encode(), "at most 300"),
     "large": (b"#" * 2_000_001, "at most 2 MB"),
 }
 
@@ -179,6 +176,6 @@ def test_needs_of_many_places_are_drawn_with_few_labels(session):
     needs = Requirements(targets=(Target(places, name="row"),))
     session.update(lambda state: state.replace(needs=needs.to_toml()))
     session.settle()
-    assert "row</b>: 0 of 60 places, missed by" in verdict(session)
+    assert "row</b>: 0 of 60 places reached, missed by" in verdict(session)
     assert drawn(session, "/label 19") is not None
     assert drawn(session, "/label 20") is None

@@ -12,14 +12,14 @@ from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.inverse.path import PathStatus, end_text
-from softreach.studio.figures import swept_volumes
-from softreach.studio.reach import Quality
+from softreach.studio.figures import enclosed_area, section_curves, swept_volumes
+from softreach.studio.reach import Quality, stages
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import MOST_POINTS, StudioState, TipPath
+from softreach.studio.state import MOST_POINTS, Slice, StudioState, TipPath
 from softreach.support.errors import InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
-QUICK = Quality(coarse_accuracy=0.1, tol=1e-4)
+QUICK = Quality(coarse_level=10, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.02, tol=1e-4)
 
 
 def swept(arm, name):
@@ -51,6 +51,16 @@ def test_a_sweep_of_a_design_on_the_same_curve_computes_its_own_volume_alone(mon
     arm = changed(STATE.design, {"taper": np.radians(0.95)})
     assert swept(arm, "taper")[0.95] == 1.0
     assert computed == [arm]
+
+
+def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
+    *_, reach = stages(trunk, 10, QUICK, lambda: None)
+    heights = reach.exact.surface().vertices[:, 2] / trunk.length
+    edges = np.linspace(heights.min(), heights.max(), 41)
+    middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
+    cuts = (Slice(axis="z", center=float(at)) for at in middles)
+    areas = [enclosed_area(section_curves(reach, cut), 2) for cut in cuts]
+    assert sum(areas) * width == pytest.approx(reach.volume / trunk.length**3, rel=0.02)
 
 
 # Paths of the tip as values: kept in a state, refused

@@ -23,6 +23,7 @@ from softreach.studio.reach import (
     Quality,
     Reach,
     Size,
+    affordable_level,
     cloud_points,
     reached,
     shown_samples,
@@ -40,7 +41,7 @@ from softreach.studio.scene.scene import Scene
 from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.studio.tabs.design import base_field, gravity_name, load_field, other_loads
-from softreach.studio.work import Dropped, affordable_level
+from softreach.studio.work import Dropped
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.studio.test_scene import Meshes
 

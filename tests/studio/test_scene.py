@@ -9,18 +9,22 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import softreach as sr
 from softreach.arm import Marker, designs
 from softreach.arm.parameters import changed
+from softreach.inverse.path import PathStatus
 from softreach.rod import as_tip_map
 from softreach.rod.kinematics import marker_positions
+from softreach.studio.found import Found
 from softreach.studio.reach import Size, stages
 from softreach.studio.scene.camera import NumberedBox
 from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
-from softreach.studio.state import Appearance, Slice, StudioState
-from softreach.studio.tabs.compare import compared, comparison_html, kept, swapped
+from softreach.studio.state import Appearance, Slice, StudioState, TipPath
+from softreach.studio.tabs import JOBS
+from softreach.studio.tabs.compare import compared, comparison_html
 from tests.made_arms import MADE_ARMS
 from tests.studio.conftest import SMALL
 
@@ -63,12 +67,22 @@ class Meshes:
 
 def test_a_path_ends_in_a_ball_where_the_arm_follows_it_no_further():
     points, meshes = np.linspace([0.0, 0.0, 1.0], [0.5, 0.0, 1.0], 11), Meshes()
-    scene = Scene(meshes)
-    scene.draw_path(points, np.concatenate([points[:4], [[0.17, 0.0, 1.0]]]))
-    np.testing.assert_array_equal(meshes.added["/path/end"].position, [0.17, 0.0, 1.0])
-    assert len(meshes.added["/path/followed"].points) == 4
-    scene.draw_path(points, points)
-    assert "/path/end" not in meshes.added
+    job = next(job for job in JOBS if job.name == "path")
+    state, end = StudioState(design=TRUNK, path=TipPath.through(points)), [0.17, 0.0, 1.0]
+
+    def drawn(followed: int) -> dict:
+        status = np.where(np.arange(11) < followed, PathStatus.FOLLOWED, PathStatus.FOLD)
+        values = {
+            "status": ("point", status),
+            "activation": (("point", "bundle"), np.zeros((11, 3))),
+        }
+        track = xr.Dataset(values | {"end_position": ("axis", end)})
+        job.draw(SimpleNamespace(state=state, found=Found(track=track), scene=Scene(meshes)))
+        return meshes.added
+
+    np.testing.assert_array_equal(drawn(4)["/path/end"].position, end)
+    assert len(drawn(4)["/path/followed"].points) == 4
+    assert "/path/end" not in drawn(11)
 
 
 @pytest.mark.parametrize(("unit", "size"), [("mm", 1e-3), ("cm", 1e-2), ("L", 0.2)])
@@ -178,7 +192,8 @@ def test_a_reach_beside_is_a_faint_surface_and_points_only_where_it_has_none(tru
 def test_a_ghost_is_met_by_a_ray_to_it_but_not_behind_the_arm_or_where_all_meet(trunk):
     scene, shapes = Scene(Meshes()), np.array([[-1.0, 0.0, -0.4], [0.0, -1.0, -0.4]])
     scene.draw_arm(trunk, [0.0, 0.0, -1.2])
-    scene.draw_ghosts(trunk, shapes)
+    for k, shape in enumerate(shapes):
+        scene.draw_arm(trunk, shape.tolist(), f"/ghosts/{k}")
     middles = as_tip_map(trunk).frames(shapes, [0.6 * trunk.length]).position[:, 0] / trunk.length
     tips = sr.tip_positions(trunk, shapes) / trunk.length
     for k, (middle, tip) in enumerate(zip(middles, tips, strict=True)):
@@ -216,7 +231,7 @@ def reach(volume, error=1e-4, unr=0.3):
 
 def test_only_the_parameters_that_differ_have_rows_and_changes_are_from_the_kept_design():
     flat = changed(TRUNK, {"taper": 0.0})
-    rows = {row.title: row for row in compared((TRUNK, reach(0.7)), (flat, reach(0.5))).rows}
+    rows = {row.title: row for row in compared((TRUNK, reach(0.7)), (flat, reach(0.5)))[0]}
     assert list(rows) == ["volume [m³]", "UNR [%]", "taper φ [deg]"]
     assert rows["volume [m³]"].change == pytest.approx(-0.2)
     assert rows["taper φ [deg]"].change == pytest.approx(-2)
@@ -225,37 +240,28 @@ def test_only_the_parameters_that_differ_have_rows_and_changes_are_from_the_kept
 @pytest.mark.parametrize(("liters", "title"), [(0.5, "volume [mL]"), (1.2, "volume [liters]")])
 def test_volumes_are_compared_in_liters_from_one_liter_on(liters, title):
     arm = designs.lce_arm().replace(display_unit="mm")
-    row, *_ = compared((arm, reach(4e-4)), (arm, reach(1e-3 * liters))).rows
+    (row, *_), _ = compared((arm, reach(4e-4)), (arm, reach(1e-3 * liters)))
     assert row.title == title
     assert row.now == pytest.approx(liters * (1000 if "mL" in title else 1))
 
 
 def test_what_is_not_known_of_a_design_has_no_change():
     turned = changed(TRUNK, {"revolution": 1.0})
-    comparison = compared((TRUNK, reach(0.7)), (turned, None))
-    assert comparison.is_complete
-    volume, *_, angle = comparison.rows
+    (volume, *_, angle), is_complete = compared((TRUNK, reach(0.7)), (turned, None))
+    assert is_complete
     assert volume.change is None
     assert angle.change == pytest.approx(np.degrees(1.0) - 108)
 
 
 def test_digits_of_volumes_and_of_their_change_follow_the_errors():
     kept, now = reach(0.691648, 2e-5, 0.311592), reach(0.6926257, 3e-4, 1.311592)
-    table = comparison_html(compared((TRUNK, kept), (TRUNK, now)))
+    table = comparison_html((TRUNK, kept), (TRUNK, now))
     texts = re.sub("<[^>]*>", " ", table).split()
     for text in ("0.69165", "0.6926", "+0.0010", "(+0.14", "31.16", "131.16", "+100"):
         assert text in texts
 
 
 def test_designs_that_differ_in_more_than_sliders_say_so():
-    comparison = compared((TRUNK, None), (designs.redundant_trunk(), None))
-    assert not comparison.is_complete
-    assert "more than these numbers" in comparison_html(comparison)
-
-
-def test_a_kept_design_and_the_present_one_are_swapped(trunk):
-    flat = changed(trunk, {"taper": 0.0})
-    state = kept(StudioState(design=trunk)).replace(design=flat)
-    assert (state.design, state.reference) == (flat, trunk)
-    assert swapped(swapped(state)) == state
-    assert swapped(state).design == trunk
+    two = (TRUNK, None), (designs.redundant_trunk(), None)
+    assert not compared(*two)[1]
+    assert "more than these numbers" in comparison_html(*two)

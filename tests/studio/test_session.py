@@ -10,7 +10,7 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.cli.studio import _begun
+from softreach.cli.studio import begun
 from softreach.inverse import solve_inverse
 from softreach.rod.rods import as_tip_map
 from softreach.studio.reach import (
@@ -136,11 +136,11 @@ def test_what_was_counted_before_it_was_stopped_is_kept(folded):
     reach = fine_reach(*FOLDED[1])
     rows = np.arange(1 << LEVEL)
 
-    def stop(done: int) -> None:
+    def stop(doing: str) -> None:
         raise Dropped
 
     with pytest.raises(Dropped):
-        count_activations(reach, rows[:5000], progress=stop)
+        count_activations(reach, rows[:5000], report=stop)
     assert len(uncounted(reach, rows)) == len(rows) - 5000
 
 
@@ -193,7 +193,7 @@ def test_the_command_goes_on_with_the_work_on_its_design_unless_it_is_to_begin_a
     bent = STATE.replace(activation=(-0.5, 0.0, 0.0))
     work_on(TRUNK).keep(bent)
     for fresh, latest in ((False, bent), (True, None)):
-        assert _begun("minimal_trunk", fresh=fresh)[1].latest == latest
+        assert begun("minimal_trunk", fresh=fresh)[1].latest == latest
     assert home in next(home.rglob("latest.json")).parents
 
 
@@ -201,7 +201,7 @@ def test_a_state_that_is_opened_by_its_file_is_shown_as_it_is(home, tmp_path):
     work_on(TRUNK).keep(STATE.replace(activation=(-0.5, 0.0, 0.0)))
     file = tmp_path / "state.json"
     file.write_text(STATE.to_json())
-    assert _begun(str(file), fresh=False)[1].latest is None
+    assert begun(str(file), fresh=False)[1].latest is None
 
 
 @pytest.mark.usefixtures("home")

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-import threading
-from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +14,7 @@ from softreach.arm import designs, edits
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
-from softreach.studio.fields import Attribute, Fields, attribute
-from softreach.studio.found import Found
+from softreach.studio.fields import attribute
 from softreach.studio.shown_parameters import (
     named_parameters,
     part_parameters,
@@ -30,8 +24,8 @@ from softreach.studio.shown_parameters import (
     slider_parameters,
 )
 from softreach.studio.state import Slice, StudioState
-from softreach.studio.widgets import Line, number_kind, number_of, unit_in, vector_kind
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.studio.widgets import number_kind, number_of, unit_in, vector_kind
+from softreach.support.errors import InvalidDesign
 from tests.cable import Cable
 from tests.laws import arm_of, arms
 
@@ -194,216 +188,15 @@ def test_a_parameter_is_shown_in_one_part_and_is_its_value_in_the_unit_that_is_s
         assert one.shown * one.scale == pytest.approx(value, rel=1e-11, nan_ok=True)
 
 
-# Fields show values of the state and change them; a stand-in for the page takes their widgets
-
-
-class Widget(SimpleNamespace):
-    """Widget of a page: it has a value, and tells who listens that it was moved."""
-
-    def __init__(self, **properties: Any) -> None:
-        super().__init__(**properties)
-        self.listeners: list[Callable[[Any], object]] = []
-        self.removed = False
-        self.on_update = self.on_click = self.on_submit = self.listeners.append
-
-    def moved(self, value: Any = None, client: int | None = 1) -> None:
-        if value is not None:
-            self.value = value
-        for listener in self.listeners:
-            listener(SimpleNamespace(client_id=client))
-
-    def remove(self) -> None:
-        self.removed = True
-
-
-class Form(Widget, AbstractContextManager):
-    """Form, in whose context its fields are made."""
-
-    def __exit__(self, *_: object) -> None:
-        pass
-
-
-class Gui:
-    """Page that keeps its widgets in order."""
-
-    def __init__(self) -> None:
-        self.widgets: list[Widget] = []
-
-    def __getattr__(self, adds: str) -> Callable[..., Widget]:
-        def add(label, *given, **options) -> Widget:
-            value = options.pop("initial_value", given[-1] if given else None)
-            kind = Form if adds == "add_form" else Widget
-            widget = kind(label=label, content=label, value=value, **options)
-            widget.options = given[0] if adds == "add_dropdown" else ()
-            self.widgets.append(widget)
-            return widget
-
-        return add
-
-
-class Tab:
-    """Session without a server."""
-
-    def __init__(self) -> None:
-        self.state = StudioState(design=designs.minimal_trunk())
-        self.found = Found()
-        self.client: Any = SimpleNamespace(gui=Gui())
-        self.lock = threading.RLock()
-        self.revision, self.updates = 0, 0
-        self.failures: list[Exception] = []
-
-    def update(self, change, *, by_widget=False, goes_on=False):
-        before, self.state = self.state, change(self.state)
-        self.updates += self.state != before
-        self.revision += not by_widget
-
-    def fail(self, error):
-        self.failures.append(error)
-
-    @property
-    def widgets(self) -> list[Any]:
-        return self.client.gui.widgets
-
-
-@pytest.fixture
-def page() -> Any:
-    return Tab()
-
-
-CENTER = attribute("appearance.slice.center")
-
-
-def field(page, *, at=CENTER):
-    """Fields with one slider: its parts, in the order in which a panel shows them."""
-    fields = Fields(page)
-    bound = fields.slider("center / L", (-1.5, 1.5), 0.01, at, "hint")
-    slider, form, text, line = page.widgets
-    return fields, bound, slider, form, text, line
-
-
-def typed(text, form, value):
-    text.moved(value)
-    form.moved()
+# Values of the state that fields show, and texts that are typed into them
 
 
 def test_an_attribute_reads_and_writes_its_own_value_alone():
     state = StudioState(design=designs.minimal_trunk()).showing(slice=Slice(axis="x"))
-    written = CENTER.write(state, 0.25)
-    assert CENTER.read(written) == 0.25
+    center = attribute("appearance.slice.center")
+    written = center.write(state, 0.25)
+    assert center.read(written) == 0.25
     assert written == state.showing(slice=Slice(axis="x", center=0.25))
-
-
-def test_a_field_writes_what_a_person_changes_and_nothing_else(page):
-    box = Fields(page).checkbox("cloud", attribute("appearance.cloud"), "hint")
-    box.moved(True, client=None)  # as the program sets it
-    assert not page.state.appearance.cloud
-    box.moved(True)
-    assert page.state.appearance.cloud
-    box.moved(True)
-    assert page.updates == 1  # a page reports again what was only drawn anew
-
-
-def test_a_field_shows_what_others_change_but_is_not_set_back_while_it_is_dragged(page):
-    fields, bound, slider, *_ = field(page)
-    slider.moved(0.5)
-    slider.value = 0.7  # the hand is ahead of its events
-    fields.show()
-    assert (page.state.appearance.slice.center, slider.value) == (0.5, 0.7)
-    page.update(lambda state: CENTER.write(state, -0.2))
-    fields.show()
-    assert (bound.value, slider.value) == (-0.2, -0.2)
-
-
-def test_a_slider_and_its_text_show_one_number_also_beyond_the_ends(page):
-    _, bound, slider, form, text, _ = field(page)
-    typed(text, form, "2.25")
-    assert (bound.value, slider.value, page.state.appearance.slice.center) == (2.25, 1.5, 2.25)
-    slider.moved(0.5)
-    assert (text.value, page.state.appearance.slice.center) == ("0.5", 0.5)
-
-
-def test_nothing_is_applied_before_enter(page):
-    *_, form, text, line = field(page)
-    text.moved("0.25")
-    assert (page.updates, "Enter" in line.content) == (0, True)
-    form.moved()
-    assert (page.state.appearance.slice.center, line.content) == (0.25, "")
-
-
-def test_a_refused_value_stays_in_its_field_beside_the_reason(page):
-    fields, _, _, form, text, line = field(page)
-    other = fields.typed("thickness", attribute("appearance.slice.thickness"), "hint")
-    *_, other_form, other_text, other_line = page.widgets
-    typed(text, form, "5000")
-    assert (page.updates, text.value) == (0, "5000")
-    assert "slice.center = 5000" in line.content
-    typed(other_text, other_form, "-1")
-    assert "slice.thickness = -1" in other_line.content
-    assert line.content == ""
-    typed(other_text, other_form, "0.5")
-    assert (other.value, other_line.content, page.updates) == (0.5, "", 1)
-    typed(text, form, "far")
-    assert "must be a number" in line.content
-    assert page.failures == []
-
-
-def test_a_refusal_of_a_widget_without_a_line_is_said_in_that_of_the_panel(page):
-    def refuse(state, value):
-        raise InvalidInput("box", value, "empty")
-
-    at = Attribute(lambda _: False, refuse)
-    Fields(page).checkbox("alone", at, "hint").moved(True)
-    assert "box = True" in str(page.failures[0])
-    fields = Fields(page)
-    fields.message = Line(page.client.gui)
-    fields.checkbox("with a line", at, "hint").moved(True)
-    *_, line, _ = page.widgets
-    assert "box = True" in line.content
-    assert len(page.failures) == 1
-
-
-def test_a_button_gives_up_what_was_refused(page):
-    fields, bound, _, form, text, line = field(page)
-    fields.change("Rest", lambda state: state, "hint")
-    typed(text, form, "5000")
-    page.widgets[-1].moved()
-    assert (bound.value, text.value, line.content) == (0.0, "0", "")
-
-
-def test_a_menu_offers_what_the_design_has(page):
-    fields = Fields(page)
-    menu = fields.dropdown(
-        "parameter",
-        lambda state: {one.name: one.label for one in slider_parameters(state.design)},
-        Attribute(lambda state: "taper", lambda state, name: state.showing(color=name)),
-        "hint",
-    )
-    assert menu.value == "taper φ [deg]"
-    menu.moved("extent σ [deg]")
-    assert page.state.appearance.color == "extent"
-    straight = page.state.design.replace(actuators=page.state.design.actuators[2:])
-    page.update(lambda state: state.replace(design=straight), by_widget=True)
-    fields.show()
-    assert "revolution Ω [deg]" not in menu.options
-    menu.moved("revolution Ω [deg]")  # an event from before
-    assert page.state.appearance.color == "extent"
-
-
-def test_fields_follow_a_design_that_others_change(page):
-    fields = Fields(page)
-    at = Attribute(lambda state: state.design.length, lambda state, value: state)
-    bound = fields.typed("L [m]", at, "hint")
-    longer = changed(page.state.design, {"length": 1.2})
-    page.update(lambda state: state.replace(design=longer), by_widget=True)
-    fields.show()
-    assert bound.value == 1.2
-
-
-def test_fields_that_are_removed_leave_nothing(page):
-    fields = field(page)[0]
-    fields.change("Rest", lambda state: state, "hint")
-    fields.remove()
-    assert all(widget.removed for widget in page.widgets)
 
 
 @pytest.mark.parametrize(
@@ -415,18 +208,6 @@ def test_fields_that_are_removed_leave_nothing(page):
 )  # fmt: skip
 def test_a_number_is_what_a_person_types(text, value):
     assert number_of(text) == value
-
-
-def test_a_number_with_a_unit_is_applied_and_shown_in_that_of_the_field(page):
-    _, bound, _, form, text, line = field(page)
-    page.state = page.state.replace(design=changed(page.state.design, {"length": 0.2}))
-    typed(text, form, "5 cm")
-    assert (bound.value, text.value, line.content) == (0.25, "0.25", "")
-    for wrong in ("5 deg", "1/2", "cm"):
-        typed(text, form, wrong)
-        assert (bound.value, text.value, page.updates) == (0.25, wrong, 1)
-        demand = "must be a number, without a unit or in L, m, cm"
-        assert f"&#x27;{wrong}&#x27;: {demand}" in line.content
 
 
 @pytest.mark.parametrize(

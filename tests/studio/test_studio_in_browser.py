@@ -2,21 +2,163 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.arm.parameters import changed
-from softreach.studio import Quality
+from softreach.arm.parameters import changed, find_parameter
+from softreach.studio import Quality, Studio
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
+from softreach.studio.figures import enclosed_area, section_curves
+from softreach.studio.start import KeptWork
+from softreach.studio.state import Slice
 from softreach.studio.work import all_cores
 from tests.studio.conftest import SMALL
+from tests.studio.tab import Tab
 
 
 def test_nothing_leaves_the_machine_and_no_panel_of_viser_is_seen(tab, studio):
     assert not tab.page.evaluate("flashed")
     assert tab.requests
     assert all(url.startswith((studio.url, f"blob:{studio.url}", "data:")) for url in tab.requests)
+
+
+def test_every_control_has_a_tooltip_with_its_meaning(tab):
+    controls = tab.page.locator("[role=slider], input:not([type=hidden]), button")
+    assert controls.count() > 40
+    tab.open("Design")
+    thumb = tab.slider("extent σ [deg]")
+    tab.center(thumb)
+    thumb.hover()
+    meaning = tab.page.get_by_text("the angle of the cross-section")
+    meaning.wait_for()
+    box, panel = meaning.bounding_box(), tab.page.locator("[data-softreach]").bounding_box()
+    assert box["x"] + box["width"] < panel["x"]  # it covers no row
+    assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")
+
+
+def test_a_change_is_undone_and_done_again_by_buttons_and_keys(tab):
+    tab.open("Design")
+    first = tab.session.state.design
+    tab.type("taper φ [deg]", "1")
+    second = tab.session.state.design
+
+    def shows(design, degrees: float) -> None:
+        tab.wait(lambda: tab.session.state.design == design, "the design is there")
+        tab.settle()
+        thumb = tab.slider("taper φ [deg]")
+        shown = f"{degrees} is shown"
+        tab.wait(lambda: abs(float(thumb.get_attribute("aria-valuenow")) - degrees) < 0.03, shown)
+
+    tab.press("Undo")
+    shows(first, 2.0)
+    tab.press("Redo")
+    shows(second, 1.0)
+    tab.page.locator("canvas").first.focus()
+    tab.page.keyboard.press("Control+z")
+    shows(first, 2.0)
+    tab.page.keyboard.press("Control+Shift+z")
+    shows(second, 1.0)
+    assert tab.session.found.reach.arm == second
+
+
+def test_what_is_typed_may_have_a_unit_lie_beyond_the_slider_or_be_refused_below_it(tab):
+    page, alerts = tab.page, tab.page.locator(".sr-alert").locator("visible=true")
+    tab.open("Design")
+    thumb = tab.slider("revolution Ω [deg]")
+
+    def is_shown(text: str) -> None:
+        page.locator(f"input[value='{text}']").locator("visible=true").first.wait_for()
+        near = pytest.approx(float(text), abs=1e-6)
+        tab.wait(lambda: float(thumb.get_attribute("aria-valuenow")) == near, "the thumb follows")
+
+    tab.type("revolution Ω [deg]", "400")
+    is_shown("400")
+    tab.type("revolution Ω [deg]", "0.5 rad")
+    is_shown("28.6478897565")
+    assert find_parameter(tab.session.state.design, "revolution").value(
+        tab.session.state.design
+    ) == pytest.approx(0.5)
+    before = tab.session.state
+    tab.type("taper φ [deg]", "50")
+    assert "taper φ [deg] = 50" in alerts.first.inner_text()
+    page.locator("input[value='50']").locator("visible=true").wait_for()
+    tab.type("revolution Ω [deg]", "far")
+    page.get_by_text("must be a number, without a unit or in deg").wait_for()
+    assert tab.session.state == before
+    tab.type("revolution Ω [deg]", "90")
+    is_shown("90")
+    tab.wait(lambda: alerts.count() == 0, "what was refused is given up")
+    page.locator("input[value='2']").locator("visible=true").first.wait_for()
+
+
+def test_a_slider_follows_others_but_is_not_set_back_while_it_is_in_the_hand(tab):
+    thumb, mouse = tab.slider("taper φ [deg]"), tab.page.mouse
+    tab.open("Design")
+    tab.center(thumb)
+    box = thumb.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    mouse.move(x, y)
+    mouse.down()
+    mouse.move(x - 20, y, steps=4)
+    tab.wait(lambda: thumb.get_attribute("aria-valuenow") != "2", "the thumb is moved")
+    tab.settle()
+    held = thumb.get_attribute("aria-valuenow")
+    tab.session.update(lambda s: s.showing(color="rgb"), by_widget=True)
+    tab.settle()
+    assert thumb.get_attribute("aria-valuenow") == held
+    mouse.up()
+    tab.settle()
+    taper = find_parameter(tab.session.state.design, "taper").value(tab.session.state.design)
+    assert np.degrees(taper) == pytest.approx(float(held))
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": np.radians(1.25)})))
+    tab.wait(lambda: thumb.get_attribute("aria-valuenow") == "1.25", "the thumb follows")
+
+
+@pytest.mark.large
+def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path):
+    with Studio(studio.start, work=KeptWork(tmp_path)) as running:
+        tab = Tab(browser, running)
+        design = changed(tab.session.state.design, {"taper": 0.02})
+        tab.session.update(lambda s: s.replace(design=design))
+        tab.settle()
+        known = set(running.sessions)
+        tab.page.reload()
+        tab.page.get_by_text("volume 0").first.wait_for()  # a page may connect twice
+        tab.wait(lambda: set(running.sessions) - known, "the page connects again")
+        tab.session = running.sessions[max(running.sessions)]
+        reach = tab.reach_of(design)
+        tab.page.get_by_text(size_text(reach.size, design)).wait_for()
+        tab.close()
+
+
+@pytest.mark.large
+def test_plots_follow_the_slice_and_the_design(tab):
+    tab.open("Plots")
+    tab.page.get_by_label("section", exact=True).check()
+    tab.page.get_by_text("y = 0 m: ").wait_for()
+    assert tab.page.locator("img[src^=blob]").first.evaluate("image => image.naturalWidth") > 600
+    cut = Slice(axis="z", center=0.5, thickness=0.1)
+    tab.session.update(lambda s: s.showing(slice=cut, sweep=True, swept="taper"))
+
+    def area() -> float:
+        return enclosed_area(section_curves(tab.session.found.reach, cut), 2)
+
+    tab.page.get_by_text("z = 0.5 m: ").wait_for()
+    tab.page.get_by_text(f"{area():.4g} m²").wait_for()
+    tab.page.get_by_text("values make no design").wait_for()
+    images = tab.page.locator("img[src^=blob]")
+    pictures = {image.get_attribute("src") for image in images.all()}
+    tab.open("Design")
+    tab.drag("taper φ [deg]", -20)
+    tab.settle()
+    assert tab.session.found.sweep.arm == tab.session.found.section.arm == tab.session.state.design
+    tab.page.get_by_text(f"{area():.4g} m²").wait_for()
+    tab.wait(
+        lambda: not {image.get_attribute("src") for image in images.all()} & pictures,
+        "both pictures follow",
+    )
 
 
 def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_design(tab):

@@ -96,7 +96,7 @@ def test_a_saved_picture_is_drawn_anew_over_key_numbers_and_design(tab, tmp_path
     differ = np.abs(scene[::2, ::2] - scene[1::2, 1::2]).max(axis=-1) > 0.02
     assert differ.mean() > 0.02  # copies of a pixel would be equal
     assert tab.drawn("/thick-lines") is None
-    monkeypatch.setattr("softreach.studio.scene.camera._LONGEST", 100)
+    monkeypatch.setattr("softreach.studio.scene.camera.LONGEST", 100)
     with pytest.raises(InvalidInput, match="make the window smaller"):
         tab.session.camera.picture()
 

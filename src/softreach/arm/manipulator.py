@@ -62,7 +62,7 @@ class Manipulator(Body):
     """Name of the marker that is asked for wherever tips are, such as that of a tool; None for the
     tip. Clouds, reachable sets, inverse solutions, paths, checks and searches are then of it."""
     display_unit: str | None = field(default=None, compare=False)
-    """Unit that it is shown in, "m", "cm", "mm" or "L"; None for one that is handy.
+    """Unit that it is shown in, "m", "cm", "mm", "in" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
 
     def _faults(self) -> list[Fault]:

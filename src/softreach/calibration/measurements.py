@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 _SIZES = {
     name.lower(): (unit, size) for unit in ("m", "N", "Pa") for name, size in sizes_in(unit).items()
 } | {
-    "in": ("m", 0.0254),
     "gf": ("N", 9.80665e-3),
     "mbar": ("Pa", 1e2),
     "psi": ("Pa", 6894.757293168361),

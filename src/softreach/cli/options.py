@@ -49,7 +49,7 @@ Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or bu
 _ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
 Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]
 AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "--json")]
-_UNIT = "Unit of lengths: m, cm, mm or L. If left out: that of the design file, else m or mm."
+_UNIT = "Unit of lengths: m, cm, mm, in or L. If left out: that of the design file, else m or mm."
 Unit = Annotated[str | None, _output(_UNIT)]
 Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]

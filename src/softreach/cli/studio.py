@@ -69,7 +69,7 @@ def studio(
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
     with_token = not is_local(host) if token is None else token
-    start, work = _begun(source, fresh=fresh)
+    start, work = begun(source, fresh=fresh)
     secret = new_token() if with_token else ""
     with Studio(start, host, port, secret, work=work) as running:
         console.line(f"{running.url}  (Ctrl-C ends it)")
@@ -109,7 +109,7 @@ def _warning(*, with_token: bool) -> str:
     )
 
 
-def _begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
+def begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
     from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 
     if is_stored(source):

@@ -139,7 +139,7 @@ def export_cloud(
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
         path: The file; it is replaced only when the new one is complete.
-        unit: Of the places: "m", "cm", "mm", or "L" if the cloud knows it.
+        unit: Of the places: "m", "cm", "mm", "in", or "L" if the cloud knows it.
         overwrite: Whether it may replace a file.
 
     Raises:

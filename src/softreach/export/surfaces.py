@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 _CORE_3MF = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-_UNITS_3MF = {"m": "meter", "cm": "centimeter", "mm": "millimeter"}
+_UNITS_3MF = {"m": "meter", "cm": "centimeter", "mm": "millimeter", "in": "inch"}
 _PACKAGE_3MF = {
     "[Content_Types].xml": """<?xml version="1.0" encoding="UTF-8"?>
 <Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
@@ -89,7 +89,7 @@ def export_mesh(
     Args:
         mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
         path: The file; it is replaced only when the new one is complete.
-        unit: Of lengths in the file: "m", "cm" or "mm".
+        unit: Of lengths in the file: "m", "cm", "mm" or "in".
         overwrite: Whether it may replace any file, and not only a surface of that format.
 
     Raises:
@@ -142,7 +142,7 @@ def export_arm(
         configuration: One configuration of that arm [m].
         path: The file; it is replaced only when the new one is complete.
         sides: Corners of each section of the body.
-        unit: Of lengths in the file: "m", "cm", "mm" or "L".
+        unit: Of lengths in the file: "m", "cm", "mm", "in" or "L".
         overwrite: Whether it may replace any file, and not only a surface of that format.
 
     Raises:

@@ -290,8 +290,8 @@ class Mesh(Region):
 
         Args:
             path: The file.
-            unit: Unit of length that the file counts in: "m", "cm" or "mm". None for that which
-                softreach wrote into it, and m for a GLB.
+            unit: Unit of length that the file counts in: "m", "cm", "mm" or "in". None for that
+                which softreach wrote into it, and m for a GLB.
 
         Raises:
             InvalidInput: No such file, too large a one, no triangles in it, or no unit where the
@@ -431,7 +431,7 @@ def _unit_of(name: str) -> str | None:
     size = int.from_bytes(head[12:16], "little") * 100 if is_scene else path.stat().st_size
     if size > _MOST_BYTES:  # the list of parts of a scene, each of which may be a copy
         raise InvalidInput("path", repr(name), f"a mesh of at most {_MOST_BYTES / 1e6:g} MB")
-    said = re.search(rb"(?:lengths in|comment units:) (mm|cm|m)\b", head)
+    said = re.search(rb"(?:lengths in|comment units:) (mm|cm|m|in)\b", head)
     return said[1].decode() if said else "m" if is_scene else None
 
 

@@ -142,7 +142,7 @@ class Requirements:
         cls,
         text: str,
         *,
-        folder: str | PathLike[str] = ".",
+        folder: str | PathLike[str] | None = ".",
         length: float | None = None,
         source: str = "",
     ) -> Self:
@@ -150,16 +150,17 @@ class Requirements:
 
         Args:
             text: The text.
-            folder: Folder that the paths in it start from.
+            folder: Folder that the paths in it start from; None for a text that may name no file.
             length: As for `load`.
             source: What errors call it.
 
         Raises:
             InvalidDesign: As for `load`.
         """
-        text, folder = as_text("text", text), as_path("folder", folder)
+        text = as_text("text", text)
+        place = None if folder is None else Path(as_path("folder", folder))
         size = None if length is None else as_number("length", length, POSITIVE)
-        reader = _Reader(Path(folder), size)
+        reader = _Reader(place, size)
         parts = reader.parts(document_of(text, LONGEST, as_text("source", source)))
         if reader.faults:
             raise InvalidDesign(reader.faults, source)
@@ -277,7 +278,7 @@ def _contradictions(needs: Requirements) -> Iterator[Fault]:
 
 
 class _Reader(FaultReader):
-    def __init__(self, folder: Path, length: float | None) -> None:
+    def __init__(self, folder: Path | None, length: float | None) -> None:
         super().__init__()
         self.folder, self.length = folder, length
 
@@ -310,12 +311,19 @@ class _Reader(FaultReader):
             return self._refuse(path, None, allowed)
         if file is not None:
             try:
-                text = read_text("file", self.folder / as_text("file", file), LONGEST)
+                text = read_text("file", self._beside(as_text("file", file), "places_m"), LONGEST)
                 values["places"] = np.array(positions_in(text, file, self.length))
             except InvalidInput as error:
                 allowed = f"must be {error.allowed} ({error.name} = {error.value})"
                 values["places"] = self._refuse(f"{path}.file", file, allowed)
         return self._made(Target, raw, path, values)
+
+    def _beside(self, name: str, instead: str) -> Path:
+        """Path of a file that lies beside the text, if that has a place."""
+        if self.folder is None:
+            allowed = f"part of the text, as other files are not sent along: write {instead}"
+            raise InvalidInput("file", repr(name), allowed)
+        return self.folder / name
 
     def _keep(self, raw: dict[str, Any], path: str, inside: bool) -> Any:
         values = self._part(raw, path, {"clearance": "m"}, ("name", "of", "when"))
@@ -342,7 +350,9 @@ class _Reader(FaultReader):
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
-                return Mesh.load(self.folder / table, unit=raw.get("mesh_unit"))
+                return Mesh.load(
+                    self._beside(table, "vertices_m and faces"), unit=raw.get("mesh_unit")
+                )
             except InvalidInput as error:
                 of_unit = error.name == "unit"
                 place, value = (f"{path}_unit", error.value) if of_unit else (path, table)

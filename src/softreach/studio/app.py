@@ -11,15 +11,8 @@ import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.plot.style import pyplot
-from softreach.studio.scene.camera import UPRIGHT
-from softreach.studio.serve import (
-    LOOPBACK,
-    close_sockets,
-    page_address,
-    reachable_hosts,
-    start_server,
-    stop_server,
-)
+from softreach.studio import serve
+from softreach.studio.scene.camera import UPRIGHT, VIEWS
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.tabs import JOBS, furnish
@@ -29,8 +22,7 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-_LOOK_AT, _AWAY = np.array([0.0, 0.0, 0.28]), np.array([2.1, -3.85, 1.17])
-"""What a new tab looks at, seen from the base, and its camera, seen from there [L]."""
+_LOOK_AT = np.array([0.0, 0.0, 0.28])  # from the base to what a new tab looks at [L]
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 _PATIENCE = 3.0  # [s] for tabs that are closed
 
@@ -41,7 +33,7 @@ class Studio:
     def __init__(
         self,
         start: Start,
-        host: str = LOOPBACK,
+        host: str = serve.LOOPBACK,
         port: int | None = None,
         token: str = "",
         *,
@@ -67,10 +59,11 @@ class Studio:
         self._compilation = CompilationWatch(self._compiling)
         self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
-        self.server = start_server(host, port, token)
+        self.server = serve.start_server(host, port, token)
         arm, camera = start.state.design, start.state.camera
         look_at = arm.base.to_world(arm.length * _LOOK_AT) / arm.length
-        self.server.initial_camera.position = camera.position if camera else look_at + _AWAY
+        away = look_at + VIEWS["oblique"]
+        self.server.initial_camera.position = camera.position if camera else away
         self.server.initial_camera.look_at = camera.look_at if camera else look_at
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
@@ -78,24 +71,24 @@ class Studio:
     @property
     def url(self) -> str:
         """Address of the page, with its token."""
-        return page_address(self.server.get_host(), self.server.get_port(), self._token)
+        return serve.page_address(self.server.get_host(), self.server.get_port(), self._token)
 
     @property
     def urls_for_others(self) -> list[str]:
         """Addresses of the page for other machines; none if it is for this one alone."""
         host, port = self.server.get_host(), self.server.get_port()
-        return [page_address(name, port, self._token) for name in reachable_hosts(host)]
+        return [serve.page_address(name, port, self._token) for name in serve.reachable_hosts(host)]
 
     def stop(self) -> None:
         """Stop serving. Tabs go first: viser ends its pool before it reports their closing."""
         self._compilation.close()
         for session in list(self.sessions.values()):
             session.close()
-        close_sockets(self.server)
+        serve.close_sockets(self.server)
         deadline = time.monotonic() + _PATIENCE
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)
-        stop_server(self.server)
+        serve.stop_server(self.server)
 
     def __enter__(self) -> Self:
         return self
@@ -103,20 +96,13 @@ class Studio:
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    def _compiling(self, running: bool) -> None:
+    def _compiling(self) -> None:
         """Notify every tab, on another thread: this one holds the compiler's lock."""
-
-        def notify(_: object) -> None:
-            for session in list(self.sessions.values()):
-                session.compiling, session.compiled = running, self._compilation.done
-                session.show()
-
-        self._notice.submit(notify)
+        self._notice.submit(lambda _: [session.show() for session in [*self.sessions.values()]])
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start, JOBS, work=self.work)
-        session.compiling = self._compilation.running
-        session.compiled = self._compilation.done
+        watch = self._compilation
+        session = Session(client, self.start, JOBS, work=self.work, compilation=watch)
         self._libraries.join()
         left = None if self.work is None else self.work.latest
         with self._lock:
@@ -126,9 +112,9 @@ class Studio:
         furnish(session)
         client.camera.on_update(lambda _: session.follow("camera"))
         session.begin()
-        if left is None and self.start.state.camera is not None:
-            session.look_as(self.start.state.camera)
-        elif session.camera.aspect < UPRIGHT and (left is None or left.camera is None):
+        if (camera := (left or self.start.state).camera) is not None:
+            session.look_as(camera)
+        elif session.camera.aspect < UPRIGHT:
             session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)

@@ -76,19 +76,14 @@ def place_text(place: Iterable[float], arm: Manipulator, decimals: int = 4) -> s
 
 
 def reach_text(reach: Reach, share: str = "") -> list[Part]:
-    """The numbers of a reach in one line.
-
-    Args:
-        reach: What is shown.
-        share: How the size compares, such as with that without loads.
-    """
+    """The numbers of a reach in one line; `share` says how its size compares with another."""
     parts: list[Part] = []
     if reach.size is not None:
         parts += [Term(size_text(reach.size, reach.arm), _SIZES[reach.size.name]), f"{share} · "]
     if not math.isnan(reach.unreachability):
         parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
-    if reach.lost_share:
-        parts.append(f"{_percent(reach.lost_share)} of the activations left out · ")
+    if reach.exact is not None and reach.exact.lost_share:
+        parts.append(f"{_percent(reach.exact.lost_share)} of the activations left out · ")
     parts.append(f"{reach.samples:,} samples")
     if reach.fine and reach.samples < reach.wanted:
         parts.append(f" of {reach.wanted:,}")
@@ -96,11 +91,9 @@ def reach_text(reach: Reach, share: str = "") -> list[Part]:
 
 
 def legend_text(reach: Reach, *, free: bool) -> list[Part]:
-    """Legend of the marks: how many samples have each, and how many are left out.
+    """Legend of the marks: how many samples of a loaded arm have each, or are left out.
 
-    Args:
-        reach: What is shown; of an arm without loads there is nothing to say.
-        free: Whether the cloud without loads is shown too.
+    The reach without loads may be shown, too.
     """
     if reach.arm.loads is None:
         return []
@@ -117,12 +110,12 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
 def loaded_share(found: Found, design: Manipulator) -> str:
     """Share of the reach without loads that is left; nothing for an arm without loads."""
     reach, free = found.reach, found.free
-    if reach is None or reach.arm.loads is None or reach.arm != design:
+    if reach is None or reach.arm.loads is None or reach.arm != design or free is None:
         return ""
-    if reach.size is None or free is None or free.size is None or free.size.value <= 0:
+    if reach.size is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = size_unit(free.size, free.arm).rounded(free.size.value, free.size.power)
+    whole = size_unit(free.size, design).rounded(free.size.value, free.size.power)
     return f" under loads, {share} of {whole} without"
 
 
@@ -130,9 +123,8 @@ def tip_text(found: Found, design: Manipulator) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
     parts: list[Part] = []
     if found.tip is not None:
-        place = place_text(found.tip, design, 6)
         pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(found.pointing, 3))
-        parts.append(f"tip at {place}, pointing along ({pointing})")
+        parts.append(f"tip at {place_text(found.tip, design, 6)}, pointing along ({pointing})")
     if found.posture is not None:
         parts.append(f"{' · ' if parts else ''}{_POSTURES[found.posture]}")
     return parts

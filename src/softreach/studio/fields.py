@@ -15,20 +15,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part
-from softreach.studio.state import StudioState
-from softreach.studio.widgets import (
-    Line,
-    SliderField,
-    TextKind,
-    TypedField,
-    number_kind,
-    unit_in,
-)
+from softreach.studio.state import LARGEST, StudioState
+from softreach.studio.widgets import Line, Slider, TextKind, TypedField, number_kind, unit_in
 from softreach.support.errors import SoftreachError
+from softreach.support.files.text import text_of
 
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
+Action = Callable[[], object]
 Change = Callable[[StudioState], StudioState]
 Options = Callable[[StudioState], Mapping[Any, str]]
 Kind = Callable[[str, Callable[[], float]], TextKind]
@@ -134,24 +129,27 @@ class Fields:
 
     def anew(
         self,
-        container: Any,
+        label: str,
         *paths: str,
         key: Shown = lambda *_: object(),
         build: Callable[[Fields, Any], object],
         words: Callable[[SoftreachError], str] = str,
+        **looks: Any,
     ) -> None:
-        """Fields at the end of a folder that are made anew where their key differs.
+        """A folder whose fields are made anew where their key differs.
 
         By default that is whenever what stands at one of the paths is another object.
         """
         fields, known = Fields(self.session), object()
+        with self.folder(label, **looks) as folder:
+            pass
 
         def fit(state: StudioState, found: Found) -> None:
             nonlocal fields, known
             if (now := key(state, found)) != known:
                 fields.remove()
                 fields, known = Fields(self.session, words), now
-                with container:
+                with folder:
                     build(fields, now)
 
         self.follow(*paths, show=fit)
@@ -174,10 +172,10 @@ class Fields:
 
     def slider(
         self, label: str, ends: tuple[float, float], step: float, at: Attribute, hint: str
-    ) -> SliderField:
+    ) -> Slider:
         """Add a slider beside a field for the same number."""
         kind = number_kind(unit_in(label), self._length)
-        return self.bind(SliderField(self.gui, label, ends, step, self._read(at), hint, kind), at)
+        return self.bind(Slider(self.gui, label, ends, step, self._read(at), hint, kind), at)
 
     def typed(self, label: str, at: Attribute, hint: str, kind: Kind = number_kind) -> TypedField:
         """Add a field for a number, or for what else is typed."""
@@ -193,7 +191,7 @@ class Fields:
         hint: str,
     ) -> None:
         """Add a slider over whole numbers, whose value and last number follow."""
-        slider = self.kept(self.gui.add_slider(label, 0, 1, 1, 0, hint=hint))
+        slider, session = self.kept(self.gui.add_slider(label, 0, 1, 1, 0, hint=hint)), self.session
 
         def show(state: StudioState, found: Found) -> None:
             value, last = at(state, found)
@@ -201,21 +199,12 @@ class Fields:
             if slider.value != value:
                 slider.value = value
 
-        def moved(event: Any) -> None:
-            if event.client_id is not None:
-                last = at(self.session.state, self.session.found)[1]
-                attempt(self.session, lambda: move(min(int(slider.value), last)))
-
-        slider.on_update(moved)
+        last = lambda: at(session.state, session.found)[1]
+        slider.on_update(self._by_hand(lambda: move(min(int(slider.value), last()))))
         self.follow(*paths, show=show)
 
     def button(
-        self,
-        label: str,
-        action: Callable[[], object],
-        hint: str,
-        shown: Shown | str = "",
-        **looks: Any,
+        self, label: str, action: Action, hint: str, shown: Shown | str = "", **looks: Any
     ) -> Any:
         """Add a button that acts; it is there where `shown`, or what is at that path, is true."""
         button = self._seen_where(self.gui.add_button(label, hint=hint, **looks), shown)
@@ -228,7 +217,7 @@ class Fields:
         """Add a button that changes the state."""
         return self.button(label, lambda: self.apply(change), hint, shown, **looks)
 
-    def choices(self, label: str, actions: Mapping[str, Callable[[], object]], hint: str) -> None:
+    def choices(self, label: str, actions: Mapping[str, Action], hint: str) -> None:
         """Add a row of buttons."""
         row = self.kept(self.gui.add_button_group(label, tuple(actions), hint=hint))
         row.on_click(lambda _: attempt(self.session, actions[row.value]))
@@ -246,21 +235,25 @@ class Fields:
         """
         binding = _Binding(self.session, widget, at, options)
         act = self.session.learn if at.of == "found" else lambda change: self.apply(change, widget)
-
-        def moved(event: Any) -> None:
-            if event.client_id is not None:
-                attempt(self.session, lambda: act(binding.write))
-
-        widget.on_update(moved)
+        widget.on_update(self._by_hand(lambda: act(binding.write)))
         self._bindings.append(binding)
         self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
         return self.kept(widget)
+
+    def _by_hand(self, action: Action) -> Callable[[Any], None]:
+        """What acts where a person moved a widget, and not where the program did."""
+
+        def moved(event: Any) -> None:
+            if event.client_id is not None:
+                attempt(self.session, action)
+
+        return moved
 
     def apply(self, change: Change, widget: Any = None) -> None:
         """Change the state, or say below the widget why that cannot be."""
         session, before = self.session, self._refused
         place, refusal = widget if isinstance(widget, TypedField) else self.message, ""
-        dragged = isinstance(widget, SliderField)
+        dragged = isinstance(widget, Slider)
         try:
             session.update(change, by_widget=widget is not None, goes_on=dragged)
         except SoftreachError as error:
@@ -336,9 +329,18 @@ class _Binding:
             widget.value = shown
 
 
-def attempt(session: Session, action: Callable[[], object]) -> None:
+def attempt(session: Session, action: Action) -> None:
     """Act, and show the reader what is wrong if that fails: a person sees no log."""
     try:
         action()
     except Exception as error:
         session.fail(error)
+
+
+def file_text(name: str, content: bytes) -> str:
+    """The text in a file that a person opens; `name` is what errors call it.
+
+    Raises:
+        InvalidInput: It is too large, or no text.
+    """
+    return text_of("file", name, content, LARGEST)

@@ -1,8 +1,8 @@
-"""Figures in panels: a section of the reachable set, and volumes over a parameter."""
+"""Figures in panels: a section of the reachable set, volumes over a parameter, bars of slopes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, cast
@@ -15,11 +15,16 @@ from softreach.arm.parameters import changed
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, plane_of
 from softreach.plot.sets import plot_slice
+from softreach.studio import markup
 from softreach.studio.reach import Quality, Reach, exact_set
-from softreach.studio.shown_parameters import ShownParameter, slider_parameters
+from softreach.studio.shown_parameters import ShownParameter, known_parameters, slider_parameters
 from softreach.studio.state import Slice, StudioState, solvable_rod
-from softreach.studio.work import Budget, OverBudget, all_cores, check_wanted
-from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.studio.widgets import unit_in
+from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
+from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
+from softreach.support.parallel import undivided
+from softreach.support.quantity import quantity
+from softreach.workspace.gradient import gradient_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,9 +90,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
 def section_picture(reach: Reach, cut: Slice) -> Picture:
     """The section and how many activations reach each place, in the unit of the arm.
 
-    Args:
-        reach: Of the design.
-        cut: The slice, of which the middle plane is cut; without one that across y by the base.
+    It is by the middle plane of the slice; without one by that across y at the base.
 
     Raises:
         InvalidInput: As `section_curves`.
@@ -167,13 +170,7 @@ def swept_parameter(state: StudioState) -> ShownParameter | None:
 def sweep_pictures(
     arm: Manipulator, parameter: ShownParameter, quality: Quality
 ) -> Iterator[Picture]:
-    """Volumes over the range of a slider, from the design's own value outwards, ever more.
-
-    Args:
-        arm: The design.
-        parameter: What the slider changes.
-        quality: How coarse, and how far off the tips may be.
-    """
+    """Volumes over the range of a slider, from the design's own value outwards, ever more."""
     unit, known = arm.length_unit, dict[float, float | None]()
     for value, volume in swept_volumes(arm, parameter, quality):
         known[value] = volume
@@ -214,3 +211,85 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
     with all_cores:
         solvable_rod(design)
         return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
+
+
+# Bars under the sliders: change of the reachable volume by each, on one scale for all of them.
+
+
+PART = 0.01
+"""Part of the range of a slider over which the change of the volume is told."""
+NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)
+"""Room for a bar."""
+_FINEST = 1e-3  # [%] of V: more digits tell nobody more
+
+
+class Slope(NamedTuple):
+    """∂V/∂p for one slider, and its error [m³ per unit of the slider]."""
+
+    value: float
+    error: float
+
+
+class VolumeSlopes(NamedTuple):
+    """Slopes of all sliders of a design."""
+
+    arm: Manipulator
+    volume: float  # [m³]
+    slopes: Mapping[str, Slope]
+    """By names of parameters; none where there is no volume, or loads tear the set."""
+
+
+def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSlopes:
+    """Slopes of a design whose set is known, for as many sliders as can be moved continuously.
+
+    The check is called often, and raises to stop.
+    """
+    arm, solid, known = reach.arm, reach.exact, known_parameters(reach.arm)
+    slopes = dict[str, Slope]()
+    if solid is None or solid.dimension < 3 or not solid.volume > 0:
+        return VolumeSlopes(arm, reach.volume, slopes)
+    sliders = slider_parameters(arm)
+    scale = {each.name: each.scale for each in sliders if not known[each.name].whole}
+    budget = Budget(check, quality.most_seconds)
+    # what remains of a torn set are differences between neighbors, which take minutes
+    groups = [] if solid.lost_share or solid.is_torn or not scale else [tuple(scale)]
+    while groups:
+        names = groups.pop()
+        try:
+            budget()
+            with no_warnings(), undivided():  # other cores are for who moves a slider
+                gradient = gradient_of(solid, names, quality.fine_accuracy, budget)
+        except SoftreachError:  # of one of them, such as a bound at which a bundle is held
+            groups += [(name,) for name in names if len(names) > 1]
+        except (OverBudget, MemoryError):
+            break
+        else:
+            for name, *row in zip(names, gradient.volume, gradient.volume_error, strict=True):
+                slopes[name] = Slope(*(float(value) * scale[name] for value in row))
+    return VolumeSlopes(arm, reach.volume, slopes)
+
+
+def slope_bars(
+    found: VolumeSlopes, sliders: Mapping[str, tuple[ShownParameter, float]], *, old: bool
+) -> dict[str, str]:
+    """A bar for each slider as HTML: by how much V changes over `PART` of its range.
+
+    Sliders are by names of parameters, with their ranges; old bars are of the design before.
+    """
+    part = {name: PART * ends for name, (_, ends) in sliders.items() if name in found.slopes}
+    percent = {name: 100 * step / found.volume for name, step in part.items()}  # per ∂V/∂p
+    changes = {name: per * found.slopes[name].value for name, per in percent.items()}
+    most, unit = max(map(abs, changes.values()), default=0.0) or 1.0, found.arm.length_unit
+    bars, before = {}, "of the design before; " if old else ""
+    for name, change in changes.items():
+        slope, label = found.slopes[name], unit_in(sliders[name][0].label)
+        text = quantity(change, "%", max(percent[name] * slope.error, _FINEST))
+        text = f"+{text}" if change > 0 else text.replace("-", "\N{MINUS SIGN}")
+        per = f"{unit.symbol(3)} per {label}" if label else unit.symbol(3)
+        value, error = (number / unit.scale(3) for number in slope)
+        meaning = (
+            f"{before}change of V over one hundredth of this slider, "
+            f"{f'{part[name]:.3g} {label}'.rstrip()}; ∂V/∂({name}) = {quantity(value, per, error)}"
+        )
+        bars[name] = markup.bar(change / most, text, meaning, faded=old)
+    return bars

@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from softreach.inverse.drag import Drag, Dragged
     from softreach.plot.coloring import BundleKey, ScalarKey
     from softreach.requirements import Check
-    from softreach.studio.figures import Picture
+    from softreach.studio.figures import Picture, VolumeSlopes
     from softreach.studio.reach import Reach
-    from softreach.studio.slopes import VolumeSlopes
 
 Array = NDArray[np.float64]
 

@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter
+from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Found, Known, in_session
-from softreach.studio.reach import Reach, count_activations, shown_samples, stages, uncounted
+from softreach.studio.reach import Reach, count_activations, shown_samples, stages
 from softreach.studio.scene.camera import is_behind
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import shows_cloud
 from softreach.studio.serve import theme
 from softreach.studio.shown_parameters import slider_ends
-from softreach.studio.slopes import volume_slopes
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck, rest
 from softreach.support.errors import InvalidInput
@@ -67,7 +66,7 @@ class Job:
     depends_on: str = ""
     """Attributes that decide the result: "design appearance.arm found.reach", the last of what is
     known; without any the work is done when it is asked for."""
-    compute: Callable[[Given], Iterable[Learned]] = lambda _: ()
+    compute: Callable[[Given], Iterable[Learned]] = lambda _: (Learned(),)
     """Results, each better than the one before."""
     draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
     """Draws what is known after each result, and takes away what is not; returns what follows only
@@ -75,9 +74,9 @@ class Job:
     wanted: str = ""
     """Attribute that is false where it is of no use; it is done once more when that begins."""
     makes: str = ""
-    """Fields of `Found` that are forgotten where the work fails."""
+    """Fields of `Found`, beside that of its name, that are forgotten where the work fails."""
     draws: str = ""
-    """Nodes of the scene that are taken away then."""
+    """Nodes of the scene, beside that of its name, that are taken away then."""
     at_once: bool = True
     """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
     that what computes while it draws is sent piece by piece."""
@@ -98,11 +97,8 @@ class Job:
         was, wanted = bool(self.is_wanted(old)), bool(self.is_wanted(new))
         if not (was and wanted):
             return was != wanted
-        return not all(map(_same, self._deciding(old), self._deciding(new)))
-
-
-def _same(before: Any, now: Any) -> bool:
-    return before is now or (not isinstance(now, np.ndarray) and bool(before == now))
+        pairs = zip(self._deciding(old), self._deciding(new), strict=True)
+        return any(a is not b and (isinstance(b, np.ndarray) or bool(a != b)) for a, b in pairs)
 
 
 def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job]:
@@ -115,14 +111,16 @@ def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job
 
 
 def _compute_reach(given: Given) -> Results:
-    state, check, level = given.state, given.check, given.state.appearance.level
+    state, level = given.state, given.state.appearance.level
     if (known := given.found.complete_reach(state.design)) is not None:
         enough = max(known.samples, known.wanted) >= 1 << level
         if enough or known.cloud.attrs.get("sampler") != "sobol":
+            same_unit = known.arm.length_unit == state.design.length_unit
+            yield Learned({} if same_unit else {"reach": replace(known, arm=state.design)})
             return
     try:
-        for reach in stages(state.design, level, given.quality, check, given.report):
-            _count_shown(reach, given)
+        for reach in stages(state.design, level, given.quality, given.check, given.report):
+            _count_cloud(given, reach)
             yield Learned({"reach": reach, "refusal": ""})
         return
     except InvalidInput as error:
@@ -135,9 +133,21 @@ def _compute_reach(given: Given) -> Results:
 
 
 def _color_cloud(given: Given) -> Results:
-    if given.found.reach is not None:
-        _count_shown(given.found.reach, given)
+    _count_cloud(given, given.found.reach)
     yield Learned()
+
+
+def _count_cloud(given: Given, reach: Reach | None) -> None:
+    if reach is not None and shows_cloud(reach, given.state.appearance):
+        _count(reach, given)
+
+
+def _count(reach: Reach, given: Given) -> None:
+    """Count the activations of what is shown, where its colors say them."""
+    look = given.state.appearance
+    if reach.fine and shown_color(reach.arm, look.color) == "multiplicity":
+        rows = shown_samples(reach, look.level)
+        count_activations(reach, rows, given.check, given.report)
 
 
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
@@ -146,14 +156,8 @@ def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
         given.scene.remove(*_CLOUD.split())
         return None
     key = given.scene.draw_cloud(reach, look)
-    draw_axes(given)
+    given.scene.draw_axes(reach, given.found.free)
     return {"key": key} if shows_cloud(reach, look) or not look.surface else None
-
-
-def draw_axes(given: Given) -> None:
-    """The box with numbers around what is drawn."""
-    if given.found.reach is not None:
-        given.scene.draw_axes(given.found.reach, given.found.free)
 
 
 _SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
@@ -177,26 +181,6 @@ def _draw_surface(given: Given) -> Mapping[str, Any] | None:
         return None
     key = given.scene.draw_surface(given.found.reach, given.state.appearance)
     return None if key is None else {"key": key}
-
-
-def _count_shown(reach: Reach, given: Given) -> None:
-    if shows_cloud(reach, given.state.appearance):
-        _count(reach, given)
-
-
-def _count(reach: Reach, given: Given) -> None:
-    """Count the activations of what is shown, where its colors say them."""
-    look = given.state.appearance
-    if not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
-        return
-    missing, done = uncounted(reach, shown_samples(reach, look.level)), 0
-
-    def progress(more: int) -> None:
-        nonlocal done
-        done += more
-        given.report(f"counting activations: {done:,} of {len(missing):,} points")
-
-    count_activations(reach, missing, given.check, progress)
 
 
 def _differentiate(given: Given) -> Results:
@@ -266,7 +250,7 @@ def _look(given: Given) -> None:
     base = np.array(state.design.base.position) / state.design.length
     scene.look(ahead if look.half else None, base, _DRAGGED if found.is_dragged else None)
     scene.axes.turn(position, given.camera.focal)
-    tip = found.tip if look.handle and look.arm else None
+    tip = found.tip if look.mouse == "tip" and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
     scene.see_through_arm(found.sample is not None or hides)
 
@@ -277,9 +261,8 @@ def _look(given: Given) -> None:
 def _compute_beside(given: Given, name: str) -> Results:
     """Its reach, unless that is known; where the designs agree it is that of the present one."""
     design, known = getattr(given.state, name), getattr(given.found, name)
-    if known is not None and known.fine and known.arm == design:
-        return
-    present = None if design is None else given.found.complete_reach(design)
+    is_known = known is not None and known.fine and known.arm == design
+    present = known if is_known else given.found.complete_reach(design)
     if design is None or present is not None:
         yield Learned({name: present})
         return
@@ -291,33 +274,34 @@ def _compute_beside(given: Given, name: str) -> Results:
 
 def _draw_beside(given: Given, name: str) -> None:
     given.scene.draw_beside(f"/{name}", getattr(given.found, name), given.state.appearance.slice)
-    draw_axes(given)
+    if given.found.reach is not None:
+        given.scene.draw_axes(given.found.reach, given.found.free)
 
 
 def _beside(name: str) -> Job:
     compute, draw = partial(_compute_beside, name=name), partial(_draw_beside, name=name)
-    follows = f"{name} appearance.slice"
-    return Job(name, follows, compute, draw, wanted=name, makes=name, draws=f"/{name}")
+    return Job(name, f"{name} appearance.slice", compute, draw, wanted=name)
 
 
 _CLOUD = "/cloud /unstable"
+_LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
     Job(
         "reach",
-        "design appearance.level",
+        "design design.display_unit appearance.level",
         _compute_reach,
         _draw_cloud,
-        makes="reach key slopes",
+        makes="key slopes",
         draws=_CLOUD,
         at_once=False,
     ),
     # Ends of the sliders, and slopes of the volume by them, once nobody drags
-    Job("slopes", "design found.reach", _differentiate, makes="slopes"),
+    Job("slopes", "design found.reach", _differentiate),
     Job(
         "cloud",
-        "appearance.level appearance.color appearance.slice appearance.cloud appearance.surface",
+        f"appearance.level {_LOOKS}",
         _color_cloud,
         _draw_cloud,
         draws=_CLOUD,
@@ -327,12 +311,10 @@ SCENE_JOBS = (
     # The exact boundary
     Job(
         "surface",
-        "found.reach appearance.surface appearance.slice appearance.cloud "
-        "appearance.color appearance.dark",
+        f"found.reach appearance.dark {_LOOKS}",
         _color_surface,
         _draw_surface,
         wanted="appearance.surface",
-        draws="/surface",
         at_once=False,
     ),
     Job(
@@ -340,23 +322,18 @@ SCENE_JOBS = (
         "found.reach appearance.slice.axis appearance.slice.center",
         _cut,
         wanted="appearance.section",
-        makes="section",
     ),
-    Job("sweep", "design appearance.swept", _sweep, wanted="appearance.sweep", makes="sweep"),
-    Job(
-        "arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture", draws="/arm"
-    ),
+    Job("sweep", "design design.display_unit appearance.swept", _sweep, wanted="appearance.sweep"),
+    Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
     Job(
         "camera",
-        "appearance.half appearance.arm appearance.handle found.tip found.sample found.is_dragged",
+        "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged",
         _wait,
         _look,
     ),
     Job(
-        "theme",
-        "appearance.dark",
-        draw=lambda given: theme(given.client.gui, dark=given.state.appearance.dark),
+        "theme", "appearance.dark", draw=lambda g: theme(g.client.gui, dark=g.state.appearance.dark)
     ),
     _beside("free"),
     _beside("reference"),

@@ -7,7 +7,7 @@ makes it here; nobody else escapes, and nobody else writes tags around what is n
 from __future__ import annotations
 
 import html
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Self
 
 
@@ -65,13 +65,10 @@ def alert(text: str) -> str:
 
 
 def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
-    """A bar from the middle of its track under a slider, text under its label, as HTML.
+    """A bar from the middle of its track under a slider, behind a text, as HTML.
 
-    Args:
-        share: Its length over that of half of the track, to the right for positive ones.
-        text: Before it.
-        meaning: What it says when pointed at.
-        faded: Whether it is pale.
+    The share is its length over that of half of the track, to the right for positive ones; the
+    meaning is shown when it is pointed at.
     """
     side, meaning = ("left" if share > 0 else "right"), html.escape(meaning)
     return (
@@ -94,19 +91,14 @@ def swatches(title: str, entries: Sequence[tuple[str, str]]) -> str:
     parts = [f"{title} \N{EN SPACE} "] if title else []
     for label, color in entries:
         parts += [Swatch(color), f" {label} \N{EN SPACE} "]
-    return f'<div class="sr-line">{inline(*parts)}</div>'
+    return paragraph(*parts)
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[Sequence[Part]]]) -> str:
-    """A table as HTML, as wide as it needs to be; the first column stays in sight.
-
-    Args:
-        head: Titles of the columns.
-        rows: For every cell its lines.
-    """
+def table(head: Sequence[str], rows: Iterable[Sequence[Part]]) -> str:
+    """A table as HTML, as wide as it needs to be; the first column stays in sight."""
     titles = "".join(f"<th>{inline(text)}</th>" for text in head)
-    lines = ([f"<td>{'<br>'.join(map(_part, cell))}</td>" for cell in row] for row in rows)
-    body = "".join(f"<tr>{''.join(cells)}</tr>" for cells in lines)
+    lines = ("".join(f"<td>{inline(cell)}</td>" for cell in row) for row in rows)
+    body = "".join(f"<tr>{cells}</tr>" for cells in lines)
     inner = f"<thead><tr>{titles}</tr></thead><tbody>{body}</tbody>"
     return f'<div class="sr-table"><table>{inner}</table></div>'
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -14,24 +15,21 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.picture.shading import vertex_normals
-from softreach.rod.tip_map import TipStatus, has_tip
+from softreach.rod.tip_map import TipMap, TipStatus, has_tip
+from softreach.sampling import cube_blocks
 from softreach.studio.state import TOL, solvable_rod
-from softreach.studio.work import (
-    Budget,
-    OverBudget,
-    StaleCheck,
-    affordable_level,
-    all_cores,
-    level_in_memory,
-)
+from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput, no_warnings
-from softreach.support.progress import Progress, silent
 from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.sheets import Sheets
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Report = Callable[[str], object]
+"""Shows the reader what is being done."""
+_quiet: Report = lambda doing: None
 
 _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
 _LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
@@ -118,16 +116,8 @@ class Reach:
 
     @cached_property
     def counts(self) -> NDArray[np.float64]:
-        """Number of activations that reach the place of each sample; NaN where it is not known.
-
-        Filled by `count_activations`.
-        """
+        """Number of activations at the place of each sample; NaN before `count_activations`."""
         return np.full(self.samples, np.nan)
-
-    @property
-    def lost_share(self) -> float:
-        """Share of the activation box that the exact set leaves out [-]."""
-        return 0.0 if self.exact is None else self.exact.lost_share
 
     @property
     def has_surface(self) -> bool:
@@ -152,11 +142,8 @@ class Reach:
         if activation is None:
             shown = given.values[shown_samples(self, _LEVEL)]
             activation = shown[nearest_samples(self, sheets.vertices)].mean(axis=1)
-        cloud = (
-            self.cloud[["tip", "activation"]]
-            .drop_vars("status", errors="ignore")
-            .isel(sample=np.zeros(len(activation), np.int64))
-        )
+        plain = self.cloud[["tip", "activation"]].drop_vars("status", errors="ignore")
+        cloud = plain.isel(sample=np.zeros(len(activation), np.int64))
         cloud = cloud.assign(
             tip=(cloud.tip.dims, sheets.vertices + inward, cloud.tip.attrs),
             activation=(given.dims, activation, given.attrs),
@@ -194,23 +181,13 @@ def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
 
 
 def stages(
-    arm: Manipulator,
-    level: int,
-    quality: Quality,
-    check: StaleCheck,
-    report: Callable[[str], None] = lambda doing: None,
+    arm: Manipulator, level: int, quality: Quality, check: StaleCheck, report: Report = _quiet
 ) -> Iterator[Reach]:
     """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
 
     Where samples cost much, under loads and with more than three bundles, the first cloud comes
-    alone, and clouds are as large as there is time for.
-
-    Args:
-        arm: The design.
-        level: The fine cloud has at least 2^level points, where there is time and memory for them.
-        quality: How much is computed in each stage, and how long it may take.
-        check: Called all the time; raises to stop.
-        report: Called with words for what is being computed.
+    alone, and clouds are as large as there is time for. The fine one has at least 2^level points,
+    where there is time and memory for them. The check is called all the time, and raises to stop.
 
     Raises:
         InvalidInput: Loads that cannot be computed.
@@ -222,10 +199,10 @@ def stages(
         check()
         coarse = affordable_level(rod, quality.coarse_seconds, min(level, coarse))
         fine = affordable_level(rod, quality.fine_seconds, level)
-    rough, exact = quality.coarse_accuracy, quality.fine_accuracy
-    slowly, at_once = ((coarse, 0.0), (0, rough), (fine, exact)), ((coarse, rough), (fine, exact))
+    rough, last = quality.coarse_accuracy, (fine, quality.fine_accuracy)
+    plan = ((coarse, 0.0), (0, rough), last) if is_slow else ((coarse, rough), last)
     reach: Reach | None = None
-    for points, accuracy in slowly if is_slow else at_once:
+    for points, accuracy in plan:
         check()
         with all_cores:  # and not while it is drawn, which may take a turn
             if reach is None or points:
@@ -241,7 +218,7 @@ class _Work:
     level: int
     quality: Quality
     check: StaleCheck
-    report: Callable[[str], None]
+    report: Report
 
     def sampled(self, known: Reach | None, at: int) -> Reach:
         """A cloud of 2^at points, or of as many as memory holds, with what is known besides."""
@@ -259,23 +236,20 @@ class _Work:
         return replace(reach, cloud=cloud, fine=fine, notes=notes, wanted=1 << self.level)
 
     def measured(self, reach: Reach, accuracy: float) -> Reach:
-        """With its exact set, or with why there is none, or none as accurate as wanted."""
+        """With its exact set, or the reason why there is none, or none as accurate as wanted."""
         if reach.refusal:
             return reach
         budget = self._budget(f"computing the exact set to {100 * accuracy:g} %")
         try:
             exact = exact_set(reach.arm, accuracy, self.quality.tol, budget)
-        except InvalidInput as error:
-            if error.name != "memory":
+        except (InvalidInput, OverBudget, MemoryError) as error:
+            if isinstance(error, InvalidInput) and error.name != "memory":
                 return replace(reach, exact=None, refusal=str(error))  # never at rest
-            needed = "needs more memory than is free"  # so many bundles that no search fits
-        except OverBudget as error:
-            needed = f"needs {error}"
-        except MemoryError:
-            needed = "needs more memory than is free"
+            # or of so many bundles that no search fits
+            reason = error if isinstance(error, OverBudget) else "more memory than is free"
         else:
-            return replace(reach, exact=exact, refusal="")
-        needed = f"to {100 * accuracy:g} % it {needed}"
+            return replace(reach, exact=exact)
+        needed = f"to {100 * accuracy:g} % it needs {reason}"
         if reach.exact is None:
             return replace(reach, refusal=needed)
         return replace(reach, notes=(*reach.notes, f"exact set coarser than asked: {needed}"))
@@ -293,19 +267,13 @@ def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
     ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
     shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
     reach = Reach(arm=design_of(cloud), cloud=cloud, exact=None, fine=True, order=shuffled)
-    work = _Work(reach.arm, 0, quality, lambda: None, lambda doing: None)
+    work = _Work(reach.arm, 0, quality, lambda: None, _quiet)
     with all_cores:
         return work.measured(reach, quality.fine_accuracy)
 
 
 def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
-    """The exact set alone.
-
-    Args:
-        arm: The design.
-        accuracy: Relative error allowed in the volume.
-        tol: Largest tip error, in L.
-        budget: Time and memory that it may take.
+    """The exact set alone, to a relative error of its volume and a largest tip error in L.
 
     Raises:
         InvalidInput: Some activation never comes to rest.
@@ -314,6 +282,45 @@ def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> 
     memory = budget.memory if solvable_rod(arm).box.dimension > 3 else None
     with no_warnings():  # the error is shown beside the volume
         return reachable_set(arm, accuracy=accuracy, tol=tol, memory=memory, progress=budget)
+
+
+# Effort: the samples of an arm that there is time and memory for.
+
+
+_PILOT = 512
+_LOWEST = 10  # level below which a cloud shows no shape
+_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
+
+
+def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
+    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
+
+    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
+    """
+    return _level(max(seconds, 1e-9) / _seconds_each(rod), wanted)
+
+
+def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
+    """The level of the largest cloud, at most wanted, that memory [bytes] holds with its copies."""
+    return _level(max(memory, 1.0) / (8.0 * (bundles + 3) * _COPIES), wanted)
+
+
+def _level(samples: float, wanted: int) -> int:
+    return min(wanted, max(_LOWEST, math.floor(math.log2(samples))))
+
+
+@lru_cache(maxsize=64)
+def _seconds_each(rod: TipMap) -> float:
+    """Cost of one sample [s], once everything is compiled and prepared."""
+    (cube,) = cube_blocks("sobol", _PILOT, rod.box.bundles, 0, _PILOT)
+    gamma, compute = rod.box.from_cube(cube), rod.status if rod.supports_unstable else rod.tips
+    compute(gamma[:16])
+    seconds = []
+    for _ in range(2):
+        start = time.perf_counter()
+        compute(gamma)
+        seconds.append(time.perf_counter() - start)
+    return max(min(seconds), 1e-6) / _PILOT
 
 
 # Multiplicity: the number of activations that reach a place, as the inverse finds them. The grid of
@@ -328,20 +335,11 @@ def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def count_activations(
-    reach: Reach,
-    rows: NDArray[np.int64],
-    check: StaleCheck = lambda: None,
-    progress: Progress = silent,
+    reach: Reach, rows: NDArray[np.int64], check: StaleCheck = lambda: None, report: Report = _quiet
 ) -> NDArray[np.float64]:
     """Number of stable activations that put the tip where that of each sample is, shape (n,).
 
-    Counts are kept with the reach, also if `check` raises.
-
-    Args:
-        reach: Of an arm with three free bundles.
-        rows: Numbers of the samples.
-        check: Called between blocks; raises to stop.
-        progress: Called with the number of samples done since its last call.
+    The arm has three free bundles. Counts are kept with the reach, also if `check` raises.
     """
     from softreach.inverse import solve_inverse
 
@@ -351,5 +349,5 @@ def count_activations(
         with all_cores:
             targets = reach.cloud.tip.values[missing[block]]
             reach.counts[missing[block]] = solve_inverse(solvable_rod(reach.arm), targets).counts
-        progress(len(targets))
+        report(f"counting activations: {block.stop:,} of {len(missing):,} points")
     return reach.counts[rows]

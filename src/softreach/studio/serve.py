@@ -14,7 +14,6 @@ import io
 import re
 import secrets
 import socket
-import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from functools import lru_cache
@@ -52,7 +51,6 @@ _POLICY = {
         "'none'",
     ),
 }
-_starting = threading.Lock()
 
 
 def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
@@ -73,9 +71,9 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
 
     _check_address(host, port or 0)
     # viser prints a banner; we print our own line.
-    with redirect_stdout(io.StringIO()), guarding(host, token) as guard:
+    with redirect_stdout(io.StringIO()), guarding(host, token) as guards:
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
-    if not guard.is_set():
+    if not guards:
         stop_server(server)
         allowed = "one whose requests can be checked"
         raise InvalidInput("viser", viser.__version__, allowed, "install viser>=1.1,<1.2")
@@ -115,29 +113,19 @@ def new_token() -> str:
 def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:
     """Reason why a request is refused; "" for one that is welcome.
 
-    Args:
-        host: That the server listens on.
-        token: That a request shows in its address, or in the cookie that it got for that; "" for
-            none.
-        path: Of the request, with its query.
-        headers: Of the request.
+    It shows the token in its path, or in the cookie that it got for that; "" is for none. The host
+    is what the server listens on.
     """
-    if token and not _shows(token, path, headers):
+    query, cookies = parse_qs(urlsplit(path).query), SimpleCookie()
+    with suppress(CookieError):
+        cookies.load(headers.get("Cookie", ""))
+    shown = [*query.get("token", []), *(c.value for name, c in cookies.items() if name == _COOKIE)]
+    if token and not any(hmac.compare_digest(each.encode(), token.encode()) for each in shown):
         return _NO_TOKEN
     if not same_origin(headers, host):
         return _FOREIGN
-    sockets = parse_qs(urlsplit(path).query).get("websocket", [])
     own = headers.get("Host", "")
-    return "" if all(_place(socket) == own for socket in sockets) else _ELSEWHERE
-
-
-def _shows(token: str, path: str, headers: Mapping[str, str]) -> bool:
-    shown, cookies = parse_qs(urlsplit(path).query).get("token", []), SimpleCookie()
-    with suppress(CookieError):
-        cookies.load(headers.get("Cookie", ""))
-    if _COOKIE in cookies:
-        shown.append(cookies[_COOKIE].value)
-    return any(hmac.compare_digest(each.encode(), token.encode()) for each in shown)
+    return "" if all(_place(each) == own for each in query.get("websocket", [])) else _ELSEWHERE
 
 
 def _place(address: str) -> str:
@@ -162,13 +150,10 @@ def same_origin(headers: Mapping[str, str], host: str) -> bool:
 
 
 def page_headers(host: str) -> dict[str, str]:
-    """Headers that keep a page to its own server, whatever its address says.
+    """Headers that keep a page to its own server, by name and port as its request has them.
 
     viser's page is one file of inline scripts and styles; it would open a socket to any server that
     `?websocket=` names, and read a scene from any address.
-
-    Args:
-        host: Name and port, as the request has them.
     """
     plain = _PLAIN_HOST.fullmatch(host) is not None
     sockets = f" ws://{host} wss://{host}" if plain else ""  # older browsers: not part of 'self'
@@ -182,15 +167,15 @@ def page_headers(host: str) -> dict[str, str]:
 
 
 @contextmanager
-def guarding(host: str, token: str) -> Iterator[threading.Event]:
+def guarding(host: str, token: str) -> Iterator[list[Any]]:
     """A server that starts inside the block checks every request, page and socket alike.
 
     Yields:
-        Set once a server has taken the checks over; else it has none of them.
+        Those that have taken the checks over; a server that is not among them has none.
     """
     import websockets.asyncio.server as sockets
 
-    plain, taken = sockets.serve, threading.Event()
+    plain, guarded = sockets.serve, list[Any]()
 
     def add(connection: Any, request: Any, response: Any) -> None:
         del connection
@@ -211,15 +196,14 @@ def guarding(host: str, token: str) -> Iterator[threading.Event]:
                 return connection.respond(HTTPStatus.FORBIDDEN, reason)
             return process_request(connection, request) if process_request else None
 
-        taken.set()
-        return plain(*arguments, process_request=admit, process_response=add, **options)
+        guarded.append(plain(*arguments, process_request=admit, process_response=add, **options))
+        return guarded[-1]
 
-    with _starting:
-        sockets.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
-        try:
-            yield taken
-        finally:
-            sockets.serve = plain
+    sockets.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+    try:
+        yield guarded
+    finally:
+        sockets.serve = plain
 
 
 def close_sockets(server: ViserServer) -> None:
@@ -277,10 +261,8 @@ def reachable_hosts(host: str) -> list[str]:
 
     For every address of this machine: the one that it would call others from.
     """
-    if is_local(host):
-        return []
     if host not in ANYWHERE:
-        return [host]
+        return [] if is_local(host) else [host]
     with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
         line.connect(("192.0.2.1", 9))  # reserved for examples; nothing is sent
         return [str(line.getsockname()[0])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Known
-from softreach.studio.jobs import Given, Job, Learned, what_follows
+from softreach.studio.jobs import Given, Job, what_follows
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.scene import Scene, shows_cloud
@@ -26,7 +26,9 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-Array = NDArray[np.float64]
+    from softreach.studio.work import CompilationWatch
+
+Change = Callable[[StudioState], StudioState]
 
 _CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
@@ -43,6 +45,7 @@ class Session:
         jobs: Iterable[Job] = (),
         *,
         work: KeptWork | None = None,
+        compilation: CompilationWatch | None = None,
     ) -> None:
         """Begin a session of a tab, whose state is kept in `work`; then it is furnished."""
         self.client, self.quality = client, start.quality
@@ -59,10 +62,9 @@ class Session:
         self.revision = 0  # number of changes that widgets have to follow, whatever they hold
         self.note, self.doing = "", ""  # for the reader, the second on the work that is being done
         self.canceled = False  # true if the reader stopped what was being computed of this state
-        self.compiling, self.compiled = False, 0
-        """Whether kernels are being compiled, and how many were since the studio was started."""
-        kept = () if work is None else (self._keeping(),)
-        self._jobs = {job.name: job for job in (*jobs, *kept)}
+        self._compilation = compilation
+        kept = Job("keep", " ".join(field.name for field in fields(StudioState)), self._keep_soon)
+        self._jobs = {job.name: job for job in (*jobs, *([kept] if work else []))}
         self._workers = {name: Latest(self.fail, self._rested) for name in self._jobs}
 
     def begin(self) -> None:
@@ -76,13 +78,7 @@ class Session:
 
     # The state, and what is known of it
 
-    def update(
-        self,
-        change: Callable[[StudioState], StudioState],
-        *,
-        by_widget: bool = False,
-        goes_on: bool = False,
-    ) -> None:
+    def update(self, change: Change, *, by_widget: bool = False, goes_on: bool = False) -> None:
         """Replace the state, and start what follows from that.
 
         Args:
@@ -116,9 +112,8 @@ class Session:
         """Undo the latest step of the work, or do again what was undone last."""
         with self.lock:
             history, state = self.history.step(self.state, back=back)
-            stays = state is self.state
-            note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
-            self._become(state, history, note)
+            nothing = f"There is nothing to {'undo' if back else 'redo'}."
+            self._become(state, history, nothing if state is self.state else "")
 
     def reset(self) -> None:
         """Go back to what the studio was opened on; can be undone."""
@@ -136,13 +131,17 @@ class Session:
         self.state, self.is_touched = state, True
         if state.design != self.start.state.design:
             self.found = Found()
-        if state.camera is not None:
-            self.look_as(state.camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""
         if self.work is not None and self.is_touched:
             self.work.keep(self.state_now())
+
+    def _keep_soon(self, given: Given) -> tuple[()]:
+        """Once the state rests for a moment."""
+        rest(given.check, _REST if self.is_touched else 0.0)
+        self.keep()
+        return ()
 
     def end_step(self) -> None:
         """Make the next change a step of its own for who undoes it."""
@@ -168,6 +167,15 @@ class Session:
 
     # What the reader is shown
 
+    @property
+    def compiling(self) -> str:
+        """Words for what is being compiled; "" for nothing."""
+        watch = self._compilation
+        if watch is None or not watch.running:
+            return ""
+        done = f", {watch.done} kernels so far" if watch.done else ""
+        return f"compiling, once on this machine{done} ..."
+
     def show(self) -> None:
         """Let all panels show what has changed."""
         with self.lock:
@@ -192,9 +200,8 @@ class Session:
         if isinstance(error, MemoryError):
             text = "There is not enough memory for that: close other tabs."
         elif not ours:
-            threading.excepthook(
-                threading.ExceptHookArgs((type(error), error, error.__traceback__, None))
-            )
+            trace = type(error), error, error.__traceback__, None
+            threading.excepthook(threading.ExceptHookArgs(trace))
         self.say(text if len(text) <= _LONGEST_NOTE else f"{text[:_LONGEST_NOTE]} ...")
 
     def send(self, name: str, content: Callable[[], bytes]) -> None:
@@ -211,14 +218,13 @@ class Session:
 
     # The scene
 
-    def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
+    def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> NDArray[np.float64] | None:
         """Place of the tip [m], shape (3,), in the sample that a ray from the camera [L] meets.
 
         None beside all. It is computed anew: a point is rounded, at the rim perhaps out of reach.
         """
         reach, look = self.found.reach, self.state.appearance
-        shown = look.cloud or look.surface
-        if reach is None or not shown or reach.arm != self.state.design:
+        if reach is None or not (look.cloud or look.surface) or reach.arm != self.state.design:
             return None
         points = cloud_points(reach, look.level)
         hidden = self.scene.hidden(points) & shows_cloud(reach, look)
@@ -288,7 +294,6 @@ class Session:
         check()
         if job.doing:
             self.report(job.doing)
-        is_drawn = False
         try:
             for learned in job.compute(self._given(check)):
                 check()
@@ -297,16 +302,16 @@ class Session:
                     self.update(learned.change, goes_on=True)
                 if learned.ends_step:
                     self.end_step()
-                self._draw(job, check)
-                is_drawn = True
-            if not is_drawn:
-                self._draw(job, check)
+                with self.client.atomic() if job.at_once else nullcontext():
+                    drawn = job.draw(self._given(check))
+                self.learn(drawn, quiet=True)
+                self.show()
         except Dropped:
             raise
         except Exception:
-            nothing = Found()
-            self.learn({name: getattr(nothing, name) for name in job.makes.split()})
-            self.scene.remove(*job.draws.split())
+            nothing, names = vars(Found()), (job.name, *job.makes.split())
+            self.learn({name: nothing[name] for name in names if name in nothing})
+            self.scene.remove(f"/{job.name}", *job.draws.split())
             raise
         finally:
             if job.doing:
@@ -316,25 +321,9 @@ class Session:
         page = self.client, self.scene, self.camera
         return Given(self.state, self.found, self.quality, check, self.report, *page)
 
-    def _draw(self, job: Job, check: StaleCheck) -> None:
-        with self.client.atomic() if job.at_once else nullcontext():
-            drawn = job.draw(self._given(check))
-        self.learn(drawn, quiet=True)
-        self.show()
-
-    def _keeping(self) -> Job:
-        """Writes the state, once it rests for a moment, to where the next tab finds it."""
-
-        def keep(given: Given) -> Iterator[Learned]:
-            rest(given.check, _REST if self.is_touched else 0.0)
-            self.keep()
-            yield from ()
-
-        return Job("keep", " ".join(field.name for field in fields(StudioState)), keep)
-
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that follows from the state is done; return whether it is."""
-        with self.lock:  # what changes it also asks for what follows
+        with self.lock:  # what changes it also starts what follows
             pass
         # Work of one kind may order work of another.
         return all(worker.join(timeout) for _ in range(3) for worker in self._workers.values())

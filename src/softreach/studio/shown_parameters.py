@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from softreach.arm import edits
 from softreach.arm.actuators import SectorActuator
 from softreach.arm.design_file import in_file_terms
-from softreach.arm.edits import ring_label
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
+from softreach.studio.widgets import unit_in
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
+from softreach.support.units import METER, LengthUnit
 
 Ends = tuple[float, float]
 
@@ -101,20 +103,21 @@ _MORE = {
 _NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
 """Words of symbols on sliders."""
 _HALVINGS = 14
-_Unit = tuple[str, float]
-"""Name of a unit, and how many units of the parameter it is."""
-_Units = Mapping[str, _Unit]
-_DEGREES: _Unit = ("deg", math.radians(1))
-_KPA: _Unit = ("kPa", 1e3)
+_DEGREES = "deg", math.radians(1)
 
 
-@lru_cache(maxsize=16)
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
     """The parameters of a design that have sliders, those of the whole arm first.
 
     What the design leaves open, such as a modulus that cancels, has none; all that actuators and
     profiles outside softreach declare has one, but for a zero of unknown size.
     """
+    return _slider_parameters(arm, arm.length_unit)
+
+
+@lru_cache(maxsize=16)
+def _slider_parameters(arm: Manipulator, unit: LengthUnit) -> tuple[ShownParameter, ...]:
+    del unit  # that of the arm: of equal arms each may have its own
     known, arm_parts = known_parameters(arm), parts_of(arm)
     own = {  # what a kind of part outside softreach declares
         name
@@ -135,12 +138,12 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
 
 
 def _on_slider(arm: Manipulator, parameter: Parameter, *, is_own: bool) -> ShownParameter | None:
-    units = {"rad": _DEGREES, "m": (arm.length_unit.name, arm.length_unit.size), "Pa": _KPA}
     slider = None if is_own else _fixed(arm, parameter)
-    if (slider := slider or _around_value(arm, parameter, units)) is None:
+    if (slider := slider or _around_value(arm, parameter)) is None:
         return None
+    shown = _shown(arm, parameter, parameter.symbol, "", arm.length_unit)
     more = f"{parameter.meaning}{_MORE.get(parameter.field, '')} (parameter {parameter.name})"
-    shown, (label, low, high, step) = _shown(arm, parameter, units, parameter.symbol, ""), slider
+    label, low, high, step = slider
     label, hint = label.replace("{owner}", parameter.owner), f"{shown.label}: {more}"
     return shown._replace(label=label, hint=hint, low=low, high=high, step=step)
 
@@ -151,19 +154,19 @@ def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     outside_arm = parameter.field == "distance_ratio" and parameter.value(arm) > 1
     if fixed is None or parameter.unit not in ("1", "rad", "m") or outside_arm:
         return None
-    if parameter.unit == "m":
-        scale = float(f"{arm.length / arm.length_unit.size:.12g}")
-        low, high, step = (scale * end for end in fixed[1:])
-        return arm.length_unit.label(fixed[0]), low, high, step
-    return fixed
+    if parameter.unit != "m":
+        return fixed
+    scale = float(f"{arm.length / arm.length_unit.size:.12g}")
+    low, high, step = (scale * end for end in fixed[1:])
+    return arm.length_unit.label(fixed[0]), low, high, step
 
 
-def _around_value(arm: Manipulator, parameter: Parameter, units: _Units) -> _Slider | None:
+def _around_value(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     """From zero to twice the value, or all angles, within the range; None for a zero of no size.
 
     Where the range itself does not end at zero, the slider stays off it by a hundredth.
     """
-    unit, scale = _unit(parameter, units)
+    unit, scale = _unit(parameter, arm.length_unit)
     value, allowed = parameter.value(arm) / scale, parameter.range
     low, high = allowed.low / scale, allowed.high / scale
     size = 2 * abs(value) or high - low
@@ -208,8 +211,8 @@ def slider_ends(
     """Ends of the sliders of a design: as far as each alone can go, to three digits.
 
     Making an arm to see whether it exists costs a millisecond. So an end is looked for near that of
-    a design before, and a slider that ended at its own limit does so again; whoever meets a refusal
-    there asks without a design before. The check is called often, and may raise.
+    a design before, and a slider that ended at its own limit does so again. The check is called
+    often, and may raise.
     """
     known, before = known_parameters(arm), before or {}
 
@@ -265,10 +268,22 @@ class Part(NamedTuple):
     actuator: str = ""  # name of an actuator; "" for all else
     home: int | str | None = None  # the ring that an actuator is in
 
+    def changed(self, arm: Manipulator, **changes: Any) -> Manipulator:
+        """The arm with other values of fields of this ring or actuator."""
+        if self.ring is not None:
+            return edits.with_changed_ring(arm, self.ring, **changes)
+        return edits.with_changed_actuator(arm, self.actuator, **changes)
+
+    def removed(self, arm: Manipulator) -> Manipulator:
+        """The arm without this ring or actuator."""
+        if self.ring is not None:
+            return edits.without_ring(arm, self.ring)
+        return edits.without_actuator(arm, self.actuator)
+
 
 _BODY = Part("body", ("", "profile"), "")
 _BODY_LABELS = {
-    "length": "length [mm]",
+    "length": "length",
     "radius_ratio": "inner / outer radius",
     "bore_ratio": "bore / outer radius",
     "poisson_ratio": "Poisson's ratio \N{GREEK SMALL LETTER NU}",
@@ -279,17 +294,19 @@ def body_numbers(arm: Manipulator) -> list[ShownParameter]:
     """The parameters of the body that have no slider, in the words of those that have one."""
     slid = {slider.name for slider in slider_parameters(arm)}
     rest = (number for number in part_parameters(arm, _BODY) if number.name not in slid)
-    return [each._replace(label=_BODY_LABELS.get(each.name, each.label)) for each in rest]
+    return [
+        each._replace(label=_titled(_BODY_LABELS.get(each.name) or symbol, unit_in(each.label)))
+        for each in rest
+        for symbol in (known_parameters(arm)[each.name].symbol,)
+    ]
 
 
 def parts(arm: Manipulator) -> dict[str, Part]:
     """Body, core, rings and actuators of an arm by their labels."""
-    listed = [_BODY]
-    if arm.section.core is not None:
-        listed.append(Part("core", ("core",), ""))
+    listed = [_BODY, *([Part("core", ("core",), "")] if arm.section.core is not None else [])]
     for k, ring in enumerate(arm.section.rings):
         owners = (f"rings[{k}]", f"rings[{k}].material")
-        listed.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
+        listed.append(Part(edits.ring_label(arm, k), owners, ring.name, ring=k))
     labels = {part.label for part in listed}
     for each in arm.actuators:
         home = each.ring if isinstance(each, SectorActuator) else None
@@ -298,36 +315,46 @@ def parts(arm: Manipulator) -> dict[str, Part]:
     return {part.label: part for part in listed}
 
 
-@lru_cache(maxsize=16)
 def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
     """The parameters of a part in the units in which they are typed.
 
     Of those of the whole arm, what its parts differ in is typed with each of them.
     """
-    units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": _KPA}
+    return _part_parameters(arm, part, typed_unit(arm))
+
+
+@lru_cache(maxsize=16)
+def _part_parameters(arm: Manipulator, part: Part, unit: LengthUnit) -> tuple[ShownParameter, ...]:
     return tuple(
-        _shown(arm, each, units, each.symbol, f"{each.meaning}: {each.name}")
+        _shown(arm, each, each.symbol, f"{each.meaning}: {each.name}", unit)
         for each in known_parameters(arm).values()
         if each.owner in part.owners and (each.owner or not math.isnan(each.value(arm)))
     )
 
 
+def typed_unit(arm: Manipulator) -> LengthUnit:
+    """Unit of lengths that are typed: that of the page, but not L, which may be what is typed."""
+    return METER if arm.length_unit.relative else arm.length_unit
+
+
 def named_parameters(arm: Manipulator) -> list[ShownParameter]:
     """All parameters of an arm under their own names, angles in degrees."""
-    every = known_parameters(arm).values()
-    return [_shown(arm, each, {"rad": _DEGREES}, each.name, each.meaning) for each in every]
+    return [_shown(arm, one, one.name, one.meaning) for one in known_parameters(arm).values()]
 
 
 def _shown(
-    arm: Manipulator, parameter: Parameter, units: _Units, name: str, hint: str
+    arm: Manipulator, parameter: Parameter, name: str, hint: str, lengths: LengthUnit | None = None
 ) -> ShownParameter:
-    unit, scale = _unit(parameter, units)
+    unit, scale = _unit(parameter, lengths)
     value, label = shown_value(parameter, arm, scale), _titled(name, unit)
     return ShownParameter(parameter.name, label, hint, scale, value, whole=parameter.whole)
 
 
-def _unit(parameter: Parameter, units: _Units) -> _Unit:
-    return units.get(parameter.unit, ("" if parameter.unit == "1" else parameter.unit, 1.0))
+def _unit(parameter: Parameter, lengths: LengthUnit | None) -> tuple[str, float]:
+    """Unit of a number, and its size: where none of lengths is given, SI but for angles."""
+    units = {"rad": _DEGREES, "1": ("", 1.0)}
+    units |= {"m": tuple(lengths), "Pa": ("kPa", 1e3)} if lengths else {}
+    return units.get(parameter.unit, (parameter.unit, 1.0))
 
 
 def _titled(name: str, unit: str) -> str:
@@ -335,9 +362,6 @@ def _titled(name: str, unit: str) -> str:
 
 
 # Refusals
-
-
-_IN_WORDS = {"R2(L)": "R₂ at the tip", "R2(0)": "R₂ at the base"}
 
 
 def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipulator) -> str:
@@ -351,9 +375,7 @@ def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipul
     }
     known |= {parameter.name: parameter for parameter in shown}
     text = "\n".join(_line(fault, known.get(fault.path)) for fault in error.faults)
-    for symbol, words in _IN_WORDS.items():
-        text = text.replace(symbol, words)
-    return text
+    return text.replace("R2(L)", "R₂ at the tip").replace("R2(0)", "R₂ at the base")
 
 
 def _line(fault: Fault, shown: ShownParameter | None) -> str:

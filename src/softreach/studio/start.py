@@ -16,6 +16,8 @@ from softreach.studio.state import LARGEST, StudioState
 from softreach.support.errors import SoftreachError
 from softreach.support.files.text import read_text, write_text
 
+USUAL = Quality()
+
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
@@ -26,12 +28,12 @@ class Start:
     reach: Reach | None = None
 
 
-def start_on_design(arm: Manipulator, quality: Quality | None = None) -> Start:
+def start_on_design(arm: Manipulator, quality: Quality = USUAL) -> Start:
     """Begin with a design."""
-    return Start(state=StudioState(design=arm), quality=quality or Quality())
+    return Start(state=StudioState(design=arm), quality=quality)
 
 
-def start_on_state(path: str | PathLike[str], quality: Quality | None = None) -> Start:
+def start_on_state(path: str | PathLike[str], quality: Quality = USUAL) -> Start:
     """Begin with a state that a tab was saved as.
 
     Raises:
@@ -39,10 +41,10 @@ def start_on_state(path: str | PathLike[str], quality: Quality | None = None) ->
         InvalidDesign: A design in it cannot exist.
     """
     text = read_text("state file", path, LARGEST)
-    return Start(state=StudioState.from_json(text), quality=quality or Quality())
+    return Start(state=StudioState.from_json(text), quality=quality)
 
 
-def start_on_cloud(path: str | PathLike[str], quality: Quality | None = None) -> Start:
+def start_on_cloud(path: str | PathLike[str], quality: Quality = USUAL) -> Start:
     """Begin with a cloud that `save_cloud` wrote.
 
     Raises:
@@ -50,7 +52,6 @@ def start_on_cloud(path: str | PathLike[str], quality: Quality | None = None) ->
     """
     from softreach.cloud.clouds import open_cloud
 
-    quality = quality or Quality()
     reach = reached(open_cloud(path), quality)
     return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 from typing import Any, Self
@@ -18,9 +17,10 @@ from softreach.arm.manipulator import Manipulator
 from softreach.requirements import Requirements
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
+from softreach.support.arguments import as_instance, as_integer, as_number, as_one_of
 from softreach.support.arrays import as_floats
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
-from softreach.support.files.toml import tables_of
+from softreach.support.errors import InvalidDesign, InvalidInput, Range
+from softreach.support.units import UNITS
 
 TOL = 1e-5  # [L], the largest tip error: far below a pixel
 LARGEST = 2_000_000  # bytes of a file that a person opens
@@ -94,30 +94,14 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
 
     Raises:
         InvalidDesign: The text is none of requirements, or names other files: those that lie beside
-            it are not sent with it, and files of this machine are not for whoever has the page.
+            it are not sent with it, and files of this machine are not for users of the page.
         InvalidInput: It lists more places than can be shown.
     """
-    if faults := list(_foreign_files(text)):
-        raise InvalidDesign(faults, source)
-    needs = Requirements.from_toml(text, length=length, source=source)
+    needs = Requirements.from_toml(text, folder=None, length=length, source=source)
     if (count := len(needs.places)) > _MOST_PLACES:
         allowed = f"at most {_MOST_PLACES} in the studio"
         raise InvalidInput("places", f"{count:,}", allowed, "use softreach check")
     return needs
-
-
-def _foreign_files(text: str) -> Iterator[Fault]:
-    """Every place where a text of tables names another file."""
-    document: Mapping[str, Any] = {}
-    with suppress(ValueError):  # which the reader refuses
-        document = tables_of(text)
-    kinds = {"file": "places_m", "mesh": "a table of vertices_m and faces"}
-    for key, tables in document.items():
-        for k, table in enumerate(tables if isinstance(tables, list) else ()):
-            for name, instead in kinds.items():
-                if isinstance(table, dict) and isinstance(table.get(name), str):
-                    why = f"names another file, which is not sent along: write {instead} instead"
-                    yield Fault(f"{key}[{k}].{name}", None, why)
 
 
 VERSION = 4
@@ -136,8 +120,9 @@ MOST_POINTS = 2000  # of a path: each is followed, drawn and kept in the state
 
 Vector = tuple[float, float, float]
 
-_AXES = ("none", "x", "y", "z")
+AXES = ("none", "x", "y", "z")
 _FAR = 1e3  # [L], beyond which there is nothing to see
+_PLACES, _SIZES = Range(-_FAR, _FAR), Range(0.0, _FAR)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,10 +134,9 @@ class Slice:
     thickness: float = 0.05  # [L]
 
     def __post_init__(self) -> None:
-        if self.axis not in _AXES:
-            raise InvalidInput("slice.axis", self.axis, f"one of {', '.join(_AXES)}")
-        _check_number("slice.center", self.center, -_FAR, _FAR)
-        _check_number("slice.thickness", self.thickness, 0.0, _FAR)
+        as_one_of("slice.axis", self.axis, AXES)
+        as_number("slice.center", self.center, _PLACES)
+        as_number("slice.thickness", self.thickness, _SIZES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,21 +155,17 @@ class Appearance:
     section: bool = False  # plots beside the scene, each computed only while it is shown
     sweep: bool = False
     swept: str = ""  # parameter against which the volume is plotted; "" for the first there is
-
-    @property
-    def handle(self) -> bool:
-        """True if there is a ball on the tip, to be dragged."""
-        return self.mouse == "tip"
+    unit: str = ""  # of lengths, areas and volumes; "" for that of the design
 
     def __post_init__(self) -> None:
-        if self.level not in LEVELS:
-            raise InvalidInput("level", self.level, f"{LEVELS[0]} to {LEVELS[-1]}")
-        if self.mouse not in MOUSE:
-            raise InvalidInput("mouse", self.mouse, f"one of {', '.join(MOUSE)}")
+        as_integer("level", self.level, LEVELS[0], LEVELS[-1])
+        as_one_of("mouse", self.mouse, MOUSE)
+        as_one_of("unit", self.unit, ("", *UNITS))
         for each in fields(self):  # in a state that came from elsewhere too
-            content, kind = getattr(self, each.name), {"bool": bool, "str": str}.get(str(each.type))
-            if kind is not None and not isinstance(content, kind):
-                raise InvalidInput(f"appearance.{each.name}", content, f"a {kind.__name__}")
+            if each.type in ("bool", "str"):
+                kind = {"bool": bool, "str": str}[each.type]
+                name = f"appearance.{each.name}"
+                as_instance(name, getattr(self, each.name), kind, f"a {each.type}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,9 +178,10 @@ class Camera:
 
     def __post_init__(self) -> None:
         if self.aspect is not None:
-            _check_number("camera.aspect", self.aspect, 0.0, _FAR)
-        for value in (*self.position, *self.look_at):
-            _check_number("camera", value, -_FAR, _FAR)
+            as_number("camera.aspect", self.aspect, _SIZES)
+        for name in ("position", "look_at"):
+            place = (as_number("camera", value, _PLACES) for value in getattr(self, name))
+            object.__setattr__(self, name, vector(place))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,8 +198,7 @@ class TipPath:
             raise InvalidInput("path", f"{len(self.points)} points", f"2 to {MOST_POINTS}")
         if not np.isfinite(self.points).all():
             raise InvalidInput("path", "not finite", "finite numbers [m]")
-        if not isinstance(self.at, int) or not 0 <= self.at < len(self.points):
-            raise InvalidInput("path.at", self.at, f"0 to {len(self.points) - 1}")
+        as_integer("path.at", self.at, 0, len(self.points) - 1)
 
     @classmethod
     def through(cls, points: Any, start: Sequence[float] | None = None, at: int = 0) -> Self:
@@ -257,6 +237,8 @@ class StudioState:
         if self.reference is not None:
             rod_of(self.reference)
         requirements_of(self.needs)
+        if (unit := self.appearance.unit) and unit != self.design.display_unit:
+            object.__setattr__(self, "design", self.design.replace(display_unit=unit))
         box = rod_of(self.design).box
         values = np.zeros(box.bundles)
         count = min(len(self.activation), box.bundles)
@@ -304,48 +286,30 @@ class StudioState:
         if version != VERSION:
             raise InvalidInput("state file", f"version {version}", allowed)
         try:
-            return cls(**_fields(**values))
+            return cls(**{k: v if v is None else _READ[k](v) for k, v in values.items()})
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if type(error).__module__.startswith("softreach"):
                 raise
             raise InvalidInput("state file", str(error), allowed) from None
 
 
-def _fields(
-    *,
-    design: str,
-    activation: Any,
-    appearance: dict[str, Any],
-    target: Any,
-    reference: str | None,
-    camera: dict[str, Any] | None,
-    path: dict[str, Any] | None,
-    needs: Any,
-) -> dict[str, Any]:
-    look: dict[str, Any] = appearance | {"slice": Slice(**appearance["slice"])}
-    if camera is not None:
-        camera |= {name: vector(camera[name]) for name in ("position", "look_at")}
-    return {
-        "design": design_of_text(design, "state file"),
-        "activation": tuple(map(float, activation)),
-        "appearance": Appearance(**look),
-        "target": target and vector(target),
-        "reference": reference and design_of_text(reference, "state file"),
-        "camera": camera and Camera(**camera),
-        "path": path and TipPath.through(**path),
-        "needs": str(needs),
-    }
+_READ: dict[str, Callable[[Any], Any]] = {
+    "design": lambda text: design_of_text(text, "state file"),
+    "activation": lambda values: tuple(map(float, values)),
+    "appearance": lambda look: Appearance(**look | {"slice": Slice(**look["slice"])}),
+    "target": lambda place: vector(place),
+    "reference": lambda text: design_of_text(text, "state file"),
+    "camera": lambda camera: Camera(**camera),
+    "path": lambda path: TipPath.through(**path),
+    "needs": str,
+}
+"""Fields of a state from the values in its file."""
 
 
 def vector(values: Iterable[float]) -> Vector:
     """Three plain numbers."""
     x, y, z = map(float, values)
     return x, y, z
-
-
-def _check_number(name: str, value: object, low: float, high: float) -> None:
-    if not Range(low, high).admits(value):
-        raise InvalidInput(name, value, f"{low:g} to {high:g}")
 
 
 # History: states before and states undone, as values, so that going back is exact. Looks are no

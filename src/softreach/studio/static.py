@@ -38,8 +38,9 @@ from softreach.support.files.atomic import check_place, writing
 from softreach.support.progress import Progress, silent
 from softreach.support.quantity import quantity
 from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
-from softreach.workspace import ReachableSet, reachable_set
+from softreach.workspace import reachable_set
 
+Entry = dict[str, Any]
 _MOST = 1000  # designs, which are some 150 MB
 _DETAIL = Detail(triangles=13_000, sides=24, stations=41)
 _FOLDER = "designs"
@@ -96,7 +97,7 @@ def write_static(
     name = as_unit(handy_unit(base.length) if shown is None else shown, base.length).name
     paths = [place / _FOLDER / f"{number}.js" for number in range(space.size)]
     tasks = (partial(_design, space, k, name, path, overwrite) for k, path in enumerate(paths))
-    entries = list[dict[str, Any]]()
+    entries = list[Entry]()
     for entry in parallel.in_order(tasks):
         entries.append(entry)
         progress(1)
@@ -108,9 +109,7 @@ def write_static(
     return StaticPage(index, len(written), len(entries) - len(written), size)
 
 
-def _design(
-    space: DesignSpace, number: int, unit: str, path: Path, overwrite: bool
-) -> dict[str, Any]:
+def _design(space: DesignSpace, number: int, unit: str, path: Path, overwrite: bool) -> Entry:
     """Numbers and box of a design whose file is written, or the reason why there is none."""
     try:
         arm = space.design(number)
@@ -126,7 +125,7 @@ def _design(
     return {name: content[name] for name in ("numbers", "box")}
 
 
-def _content(arm: Manipulator, unit: LengthUnit) -> dict[str, Any]:
+def _content(arm: Manipulator, unit: LengthUnit) -> Entry:
     reached, scene = reachable_set(arm), Scene(unit, detail=_DETAIL)
     scene.add([reached, arm])
     box = bounding_box(*scene.points())
@@ -134,8 +133,15 @@ def _content(arm: Manipulator, unit: LengthUnit) -> dict[str, Any]:
     notes = [*scene.notes[:1], f"Places are rounded to {step:.1g} {unit.name}"]
     if reached.lost_share > 0.0:
         notes.append(f"No posture is held at {100 * reached.lost_share:.2g} % of activations")
+    numbers = {}  # name -> value and error in SI units, and both as text
+    for name, power in _NUMBERS[reached.dimension].items():
+        value, error = (float(getattr(reached, f"{name}{part}")) for part in ("", "_error"))
+        if np.isfinite(value):
+            percent = quantity(100 * value, "%", 100 * error)
+            text = unit.text(value, power, error) if power else percent
+            numbers[name] = [value, error if np.isfinite(error) else None, text]
     return {
-        "numbers": _numbers(reached, unit),
+        "numbers": numbers,
         "box": box.tolist(),
         "keys": [key._asdict() for key in scene.keys],
         "note": ". ".join(notes),
@@ -143,24 +149,8 @@ def _content(arm: Manipulator, unit: LengthUnit) -> dict[str, Any]:
     }
 
 
-def _numbers(reached: ReachableSet, unit: LengthUnit) -> dict[str, Any]:
-    """Name -> value and error in SI units, and both as text."""
-    numbers = {}
-    for name, power in _NUMBERS[reached.dimension].items():
-        value, error = (float(getattr(reached, f"{name}{part}")) for part in ("", "_error"))
-        if np.isfinite(value):
-            percent = quantity(100 * value, "%", 100 * error)
-            text = unit.text(value, power, error) if power else percent
-            numbers[name] = [value, error if np.isfinite(error) else None, text]
-    return numbers
-
-
 def _page(
-    space: DesignSpace,
-    entries: list[dict[str, Any]],
-    paths: list[Path],
-    unit: LengthUnit,
-    title: str,
+    space: DesignSpace, entries: list[Entry], paths: list[Path], unit: LengthUnit, title: str
 ) -> str:
     """The page, with the design in the middle of those that there are."""
     known = [k for k, entry in enumerate(entries) if "gap" not in entry]
@@ -195,7 +185,7 @@ def _page(
 
 def _slider(
     base: Manipulator, parameter: Parameter, values: tuple[float, ...], lengths: LengthUnit
-) -> dict[str, Any]:
+) -> Entry:
     symbol, scale = readable_unit(parameter.unit, max(map(abs, values)), lengths)
     if parameter.unit == "m" and lengths.relative:  # of which arm, if it is the length that varies?
         symbol, scale = "m", 1.0

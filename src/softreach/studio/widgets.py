@@ -74,12 +74,7 @@ class TextKind(NamedTuple):
 
 
 def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
-    """Numbers in a unit, or with another one behind them.
-
-    Args:
-        unit: Of what has none; "" for plain numbers.
-        length: L [m] of the arm, which is a unit of lengths.
-    """
+    """Numbers in a unit, "" for plain ones; L [m] of the arm is a unit of lengths, too."""
     demand = "a number" + _with_units(unit, length())
     return TextKind(demand, lambda text: read_number(text, unit, length()), "{:.12g}".format)
 
@@ -105,10 +100,8 @@ def _parts(text: str) -> list[str]:
 def read_number(text: str, unit: str, length: float) -> float | None:
     """The number that a text is in a unit, or with another one behind it; None for anything else.
 
-    Args:
-        text: As it is typed.
-        unit: Of what has none, and of what is returned; "" for plain numbers.
-        length: L [m] of the arm, which is a unit of lengths.
+    What has no unit is in the one that is given, as is what is returned; "" is for plain numbers.
+    The length L [m] of the arm is a unit of lengths.
     """
     text, units = text.strip(), _units(unit, length)
     name = next((name for name in sorted(units, key=len)[::-1] if text.endswith(name)), "")
@@ -201,7 +194,7 @@ class TypedField:
         """Bring what else shows the value in line with it."""
 
 
-class SliderField(TypedField):
+class Slider(TypedField):
     """Number that is dragged, or typed: also beyond the ends of its slider."""
 
     def __init__(

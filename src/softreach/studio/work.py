@@ -7,22 +7,17 @@ import threading
 import time
 from collections.abc import Callable
 from contextvars import ContextVar
-from functools import lru_cache
 from typing import Any
 
-import numpy as np
 from numba.core import event
-from numpy.typing import NDArray
 
 from softreach.inverse.prepared import forget_prepared
-from softreach.rod.tip_map import TipMap
-from softreach.sampling import cube_blocks
 from softreach.support.memory import free_memory, return_memory
 
 StaleCheck = Callable[[], None]
 """Raises `Dropped` if what is being done is no longer wanted."""
 
-_PATIENCE = 0.1  # [s], after which whoever waits for a turn looks whether it is still wanted
+_PATIENCE = 0.1  # [s], after which work that waits checks whether it is still wanted
 _REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
 
 
@@ -39,14 +34,11 @@ def check_wanted() -> None:
 
 
 class _Turns:
-    """A lock; whoever waits for it and is no longer wanted stops waiting."""
+    """A lock; work that waits for it and is no longer wanted stops waiting."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-
-    @property
-    def taken(self) -> bool:
-        return self._lock.locked()
+        self.is_taken = self._lock.locked
 
     def __enter__(self) -> None:
         while not self._lock.acquire(timeout=_PATIENCE):
@@ -57,7 +49,7 @@ class _Turns:
 
 
 all_cores = _Turns()
-"""Held by whoever uses every core, so that tabs take turns and do not slow each other down."""
+"""Held by work that uses every core, so that tabs take turns and do not slow each other down."""
 
 
 class Latest:
@@ -169,17 +161,15 @@ class Budget:
     """Limits of one computation, which has to call it as often as it can."""
 
     def __init__(
-        self, check: StaleCheck, seconds: float, report: Callable[[int], None] | None = None
+        self, check: StaleCheck, seconds: float, report: Callable[[int], None] = lambda _: None
     ) -> None:
         """Begin now; it may take some seconds [s].
 
         At most some times a second, `report` is called with the number of items done in all.
         """
-        self._check, self._report = check, report
-        free = free_memory()
-        self.memory = _SHARE * free
-        """Memory that it may plan with [bytes]."""
-        self._least = _LEFT * free
+        self._check, self._report, free = check, report, free_memory()
+        self.memory, self._least = _SHARE * free, _LEFT * free
+        """Memory that it may plan with, and that it leaves [bytes]."""
         self._seconds, self._end = seconds, time.monotonic() + seconds
         self._next, self._done = 0.0, 0
 
@@ -198,46 +188,7 @@ class Budget:
             self._next = now + _PAUSE
             if free_memory() < self._least:
                 raise OverBudget("more memory than is free")
-            if self._report is not None:
-                self._report(self._done)
-
-
-# Effort: the samples of an arm that there is time and memory for.
-
-
-_PILOT = 512
-_LOWEST = 10  # level below which a cloud shows no shape
-_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
-
-
-def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
-
-    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
-    """
-    affordable = math.floor(math.log2(max(seconds, 1e-9) / _seconds_each(rod)))
-    return min(wanted, max(_LOWEST, affordable))
-
-
-def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
-    """The level of the largest cloud, at most wanted, that memory [bytes] holds with its copies."""
-    each = 8.0 * (bundles + 3) * _COPIES
-    return min(wanted, max(_LOWEST, math.floor(math.log2(max(memory, 1.0) / each))))
-
-
-@lru_cache(maxsize=64)
-def _seconds_each(rod: TipMap) -> float:
-    """Cost of one sample [s], once everything is compiled and prepared."""
-    (cube,) = cube_blocks("sobol", _PILOT, rod.box.bundles, 0, _PILOT)
-    gamma = rod.box.from_cube(cube)
-
-    def seconds(gamma: NDArray[np.float64]) -> float:
-        start = time.perf_counter()
-        (rod.status if rod.supports_unstable else rod.tips)(gamma)
-        return time.perf_counter() - start
-
-    seconds(gamma[:16])
-    return max(min(seconds(gamma), seconds(gamma)), 1e-6) / _PILOT
+            self._report(self._done)
 
 
 # Compilation of kernels, for which only the first use on a machine has to wait.
@@ -248,15 +199,11 @@ _KIND = "numba:compile"
 class CompilationWatch(event.Listener):
     """Calls back when compilation begins and when all of it has ended, on a compiling thread."""
 
-    def __init__(self, changed: Callable[[bool], None]) -> None:
-        self._changed, self._running, self._lock = changed, 0, threading.Lock()
+    def __init__(self, changed: Callable[[], object]) -> None:
+        self._changed, self._lock = changed, threading.Lock()
+        self.running = 0  # compilations under way, one within another
         self.done = 0  # times that all of it has ended: of the kernels of a studio, each once
         event.register(_KIND, self)
-
-    @property
-    def running(self) -> bool:
-        """True while anything is being compiled."""
-        return self._running > 0
 
     def close(self) -> None:
         """Watch no longer."""
@@ -272,8 +219,8 @@ class CompilationWatch(event.Listener):
 
     def _count(self, change: int) -> None:
         with self._lock:
-            before, self._running = self._running, self._running + change
-            now = self._running
-            self.done += not now
-        if bool(before) != bool(now):
-            self._changed(bool(now))
+            before, self.running = self.running, self.running + change
+            is_turn = bool(before) != bool(self.running)
+            self.done += not self.running
+        if is_turn:
+            self._changed()

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
     from softreach.support.arrays import Array
 
-UNITS = ("m", "cm", "mm", "L")
+UNITS = ("m", "cm", "mm", "in", "L")
 """Names of the units; L is the length of an arm."""
 
 TYPED = ", ".join(unit_names("m"))
 """Units that lengths may be typed in, beside L where the arm is known."""
 
-_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-_VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6)}
+_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+_VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6), "in": ("in³", 0.0254**3)}
 """Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
 
 POWERS = {"m": 1, "m2": 2, "m²": 2, "m3": 3, "m³": 3}

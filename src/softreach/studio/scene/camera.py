@@ -35,7 +35,7 @@ VIEWS: dict[str, Array] = {
 UPRIGHT = 0.6  # aspect below which a window is that of a phone
 
 _PATIENCE = 30.0  # [s] for a picture
-_LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
+LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
@@ -45,13 +45,9 @@ _GRAY = 170, 170, 175  # of the axes
 
 
 def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
-    """Camera that sees all of a box [L] from a direction.
+    """Camera that sees all of a box between two corners [L], from a direction seen from its middle.
 
-    Args:
-        low: Its lowest corner.
-        high: Its highest.
-        direction: From the middle of the box to the camera.
-        aspect: Width of the picture over its height.
+    The aspect is the width of the picture over its height.
     """
     room = _ROOM_UPRIGHT if aspect < UPRIGHT else _ROOM
     middle, radius = (low + high) / 2, room * float(np.linalg.norm(high - low)) / 2
@@ -104,8 +100,7 @@ class TabCamera:
 
         Returns:
             True if the window is changing, so that one has to look again: a layout passes through
-            widths that are gone before the page has heard of a step. That of a new page, which has
-            no panel at first, takes long on a slow machine.
+            widths that are gone before the page has heard of a step, that of a new page for long.
         """
         now = self.aspect
         if now < _NARROWEST:
@@ -132,9 +127,9 @@ class TabCamera:
         """
         camera, client = self._client.camera, self._client
         size = {"height": FINER * camera.image_height, "width": FINER * camera.image_width}
-        if max(size.values()) > _LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
+        if max(size.values()) > LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
             value = f"{size['width']} by {size['height']} pixels"
-            allowed = f"at most {_LONGEST} along a side and {_MOST_PIXELS / 1e6:.0f} million"
+            allowed = f"at most {LONGEST} along a side and {_MOST_PIXELS / 1e6:.0f} million"
             raise InvalidInput("picture", value, allowed, "make the window smaller")
         try:
             return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
@@ -154,6 +149,7 @@ class NumberedBox:
         self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         self._unit, self._scale = in_lengths(1.0), 1.0  # of the numbers, and L in it
         self._camera: tuple[Array, float] = np.array([50.0, -80.0, 30.0]), np.inf
+        self._drawn: object = None  # what the numbers were drawn for
 
     @property
     def corners(self) -> tuple[Array, Array]:
@@ -164,36 +160,32 @@ class NumberedBox:
     def draw(self, *points: Array, arm: Manipulator) -> None:
         """Surround points [L], shapes (n, 3), with numbers in the unit of the arm."""
         with self._lock:
-            before = self._unit, self._scale, np.array(self._box).tolist()
             self._unit, self._scale = arm.length_unit, arm.length / arm.length_unit.size
             self._box = round_box(*(self._scale * each for each in points))
-            same = before == (self._unit, self._scale, np.array(self._box).tolist())
-            if not (same and self._is_drawn()):
-                self._draw()
+            self._draw()
 
     def turn(self, camera: Array, focal: float = np.inf) -> None:
         """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
         with self._lock:
-            before, self._camera = self._side(), (camera, focal)
-            if self._is_drawn() and self._side() != before:
+            self._camera = camera, focal
+            if self._drawn is not None:
                 self._draw()
 
-    def _is_drawn(self) -> bool:
-        return self._api.get_handle_by_name("/axes/lines") is not None
-
-    def _side(self) -> object:
-        return seen_from(self._scale * self._camera[0], *self._box, self._camera[1])
-
     def _draw(self) -> None:
-        if self._api.get_handle_by_name("/axes") is not None:
+        """Draw what is not there yet."""
+        (camera, focal), scale, label = self._camera, self._scale, self._unit.label
+        side = seen_from(scale * camera, *self._box, focal)
+        before, self._drawn = self._drawn, (self._unit, scale, np.array(self._box).tolist(), side)
+        if before == self._drawn:
+            return
+        if before is not None:
             self._api.remove_by_name("/axes")
-        (camera, focal), ends = self._camera, [corner[None] for corner in self._box]
-        label = self._unit.label
-        box = axes_box(*ends, camera=self._scale * camera, focal=focal, label=label)
-        lines = (box.lines / self._scale).astype(np.float32)
+        ends = [corner[None] for corner in self._box]
+        box = axes_box(*ends, camera=scale * camera, focal=focal, label=label)
+        lines = (box.lines / scale).astype(np.float32)
         self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
         for k, (text, at) in enumerate(box.labels):
-            add_label(self._api, f"/axes/label {k}", text, at / self._scale)
+            add_label(self._api, f"/axes/label {k}", text, at / scale)
 
 
 def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
@@ -207,11 +199,7 @@ def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
     """True if a ball stands between the camera and a point [L], other than those that touch it.
 
-    Args:
-        point: Shape (3,).
-        camera: Shape (3,).
-        centers: Of the balls, shape (n, 3).
-        radii: Shape (n,).
+    Balls have centers of shape (n, 3) and radii of shape (n,) [L].
     """
     distance = float(np.linalg.norm(point - camera))
     ahead, aside = _beside(centers, camera, (point - camera) / distance)
@@ -221,11 +209,7 @@ def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool
 def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
     """Way along a ray to the first ball that it meets [L]; infinite where it meets none.
 
-    Args:
-        centers: Of the balls, shape (n, 3).
-        radii: Shape (n,); balls are met as if they were no thinner than a pointer.
-        origin: Of the ray, shape (3,).
-        direction: Shape (3,).
+    Balls, as in `is_behind`, are met as if they were no thinner than a pointer.
     """
     ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
     met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
@@ -245,16 +229,9 @@ def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
 def picked_point(
     points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float
 ) -> int | None:
-    """The point that a ray through a pixel hits: of those close to it, the nearest to the camera.
+    """Number of the point that a ray from the camera hits; None if it passes all of them by.
 
-    Args:
-        points: Shape (n, 3), any unit.
-        origin: Where the camera is.
-        direction: Of the ray, any length.
-        tolerance: Largest angle between the ray and the point [rad].
-
-    Returns:
-        The point's number, or None if the ray passes all of them by.
+    Of the points, shape (n, 3), within an angle [rad] of the ray it is the nearest to the camera.
     """
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     depth, aside = _beside(points, np.asarray(origin, float), direction)

@@ -16,12 +16,7 @@ from softreach.plot.figure_3d import page_keys
 from softreach.rod.tip_map import has_tip
 from softreach.schema import input_symbols
 from softreach.studio import markup
-from softreach.studio.reach import (
-    Reach,
-    count_activations,
-    nearest_samples,
-    shown_samples,
-)
+from softreach.studio.reach import Reach, count_activations, nearest_samples, shown_samples
 from softreach.studio.state import LEVELS, rod_of
 from softreach.studio.work import all_cores
 
@@ -55,7 +50,7 @@ def color_names(arm: Manipulator) -> dict[str, str]:
 
 
 def shown_color(arm: Manipulator, color: str) -> str:
-    """Color of points where that name is wanted, which may be one of another arm."""
+    """The color of that name, which may be one of another arm."""
     return color if color in color_names(arm) else "rgb"
 
 
@@ -81,13 +76,9 @@ def sample_values(reach: Reach, level: int, color: str) -> str | int | xr.DataAr
 
 
 def sample_colors(reach: Reach, level: int, color: str, *, shares: bool = True) -> Coloring:
-    """Colors of the samples that are shown; an unknown name colors by all activations.
+    """Colors of the first 2^level samples; an unknown name colors by all activations.
 
-    Args:
-        reach: What has the samples.
-        level: The first 2^level samples are shown.
-        color: One of `color_names`.
-        shares: Whether a key of numbers of activations has their shares of the samples.
+    A key of numbers of activations may have their shares of the samples.
     """
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
     values = sample_values(reach, level, color)

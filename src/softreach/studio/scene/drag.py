@@ -31,12 +31,9 @@ class DragBall:
     """Nodes that move instead of being drawn anew: a node that is replaced is let go."""
 
     def __init__(self, api: SceneApi, on_drag: OnDrag, eye: Callable[[], Array]) -> None:
-        """Draw into the scene of a client once there is a tip.
+        """Draw into a scene once there is a tip; `eye` tells where the camera is [L].
 
-        Args:
-            api: The scene.
-            on_drag: Called on the event loop, so that it must not take long.
-            eye: Where the camera is [L].
+        `on_drag` is called on the event loop, so that it must not take long.
         """
         self._api, self._on_drag, self._eye = api, on_drag, eye
         self._nodes: tuple[Any, Any] | None = None
@@ -47,11 +44,7 @@ class DragBall:
     ) -> None:
         """Put the ball on the tip [L], around an arm of this radius [L]; None hides it.
 
-        Args:
-            tip: Where the ball is.
-            radius: Of the arm there.
-            dark: Whether the page is dark, and the ball light.
-            clear: Whether what is inside is seen, such as where a path begins.
+        It is light on a dark page; what is inside a clear one is seen, such as where a path begins.
         """
         if self._nodes is None and tip is not None:
             self._nodes = self._drawn(tip)
@@ -123,14 +116,8 @@ class DragBall:
 def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:
     """Place on an axis that is nearest to a line of sight, as the distance from its origin.
 
-    Args:
-        origin: Of the axis, shape (3,).
-        axis: Its direction, of length 1.
-        eye: Where the line of sight begins.
-        seen: Another place on it.
-
-    Returns:
-        The distance along the axis; 0 where it is seen end on, so that no distance is told.
+    The direction of the axis has length 1, the line of sight leads from the eye to a place that is
+    seen. The distance is 0 where the axis is seen end on.
     """
     sight = (seen - eye) / np.linalg.norm(seen - eye)
     across = axis - (axis @ sight) * sight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,18 +17,16 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.kinematics import configuration, rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.reach import Reach, cloud_points, shown_samples
-from softreach.studio.scene.camera import NumberedBox, add_label, way_to
+from softreach.studio.scene.camera import NumberedBox, way_to
 from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
 from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
-from softreach.support import palette
 from softreach.support.palette import bundle_color, eight_bit
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
     from softreach.plot.coloring import BundleKey, ScalarKey
-    from softreach.requirements import Check
     from softreach.rod.tip_map import TipMap
 
 Array = NDArray[np.float64]
@@ -45,22 +43,11 @@ _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST = 0.35
 _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which the arm is seen
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
-VERDICTS = {
-    "met": eight_bit(palette.MET),
-    "missed": eight_bit(palette.MISSED),
-    "undecided": (200, 130, 0),
-}
-"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
-_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
-_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
-_MOST_LABELS = 20  # more would hide each other
 _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
 """Color and opacity of the reach without loads, and of the one of the kept design."""
-_MARK: Color = (235, 90, 0)
-_PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
-_DARK: Color = (30, 30, 30)
-_TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
-_MARKER, _MEASURED = 0.016, 0.03  # edges of dots [L]
+MARK: Color = (235, 90, 0)
+DARK: Color = (30, 30, 30)
+MARKER = 0.016  # edge of the dot of a marker [L]
 _USUAL, _POINT, _POINTS = 1 << 17, 0.007, (0.003, 0.01)  # points of a cloud, and their edges [L]
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 _AROUND_TIP = 0.06  # [L], where a click means no ghost: all shapes meet there
@@ -99,24 +86,16 @@ class Scene:
             for known in [k for k in list(self._arms) if k == path or k.startswith(f"{path}/")]:
                 self._arms.pop(known, None)  # workers draw at the same time
             self._clouds.pop(path, None)
-            self._drop(path)
-
-    def _drop(self, path: str) -> None:
-        if self.api.get_handle_by_name(path) is not None:
-            self.api.remove_by_name(path)
+            if self.api.get_handle_by_name(path) is not None:
+                self.api.remove_by_name(path)
 
     def dots(
-        self,
-        path: str,
-        points: Array,
-        color: Color | NDArray[np.uint8],
-        size: float,
-        shape: Literal["circle", "diamond"] = "circle",
+        self, path: str, points: Array, color: Any, size: float, shape: str = "circle"
     ) -> None:
         """Dots at places [L], shape (n, 3); in viser's float16 they would be off by 1e-4 L."""
         points = points[np.isfinite(points).all(axis=1)]
         if not len(points):
-            self._drop(path)
+            self.remove(path)
             return
         look: Any = {"point_size": size, "point_shape": shape, "precision": "float32"}
         self.api.add_point_cloud(path, points.astype(np.float32), color, **look)
@@ -125,9 +104,13 @@ class Scene:
         """Pieces of lines between places [L], shape (n, 2, 3); a piece with NaN is left out."""
         pieces = pieces[np.isfinite(pieces).all(axis=(1, 2))]
         if not len(pieces):
-            self._drop(path)
+            self.remove(path)
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
+
+    def ball(self, path: str, radius: float, color: Color, place: Array) -> None:
+        """A ball at a place, with a radius [L]."""
+        self.api.add_icosphere(path, radius, color, position=place)
 
     def _mesh(
         self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
@@ -140,13 +123,10 @@ class Scene:
     # Clouds, of which the half in front of the arm is cut away.
 
     def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
-        """Cut away the half in front of the arm; nothing is sent of a cloud that keeps its points.
+        """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
-        Args:
-            ahead: Where the camera looks, level with the ground, shape (3,); None for no cut.
-            base: Of the arm [L], shape (3,).
-            most: How many points to draw of a cloud, the first of it, which then stay the same
-                until another number is wanted; None for all.
+        Nothing is sent of a cloud that keeps its points. Of each the first `most` are drawn, which
+        stay the same until another number is wanted; None is for all, as for no cut.
         """
         is_thin = most is not None and most == self._most
         self._ahead, self._base, self._most = ahead, base, most
@@ -166,19 +146,11 @@ class Scene:
     def _kept(self, points: Array) -> NDArray[np.bool_]:
         return ~self.hidden(points) & (np.arange(len(points)) < (self._most or len(points)))
 
-    def _cut_dots(
-        self,
-        path: str,
-        points: Array,
-        colors: NDArray[np.uint8],
-        size: float,
-        shape: Literal["circle", "diamond"] = "circle",
-    ) -> None:
+    def _cut_dots(self, path: str, points: Array, colors: NDArray[np.uint8], *look: Any) -> None:
         with self._lock:
             kept = self._kept(points)
-            self._clouds[path] = kept, (points, colors, size, shape)
-            shown = colors[kept] if colors.ndim == 2 else colors
-            self.dots(path, points[kept], shown, size, shape)
+            self.dots(path, points[kept], colors[kept] if colors.ndim == 2 else colors, *look)
+            self._clouds[path] = kept, (points, colors, *look)
 
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
@@ -192,35 +164,25 @@ class Scene:
         stable, size = kept & ~unstable, _point_size(len(points))
         self._cut_dots("/cloud", points[stable], coloring.rgb[stable], size)
         marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
-        self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, shape="diamond")
+        self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, "diamond")
         return coloring.key
 
     # Surfaces.
 
     def draw_surface(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
-        """The exact boundary, if it is shown; slow the first time.
-
-        Returns:
-            The key to the colors of the boundary; None where it has none of its own.
-        """
+        """The exact boundary, if it is shown, slow the first time; the key to its own colors."""
         if not (look.surface and reach.has_surface):
             self.remove("/surface")
             return None
         if shows_cloud(reach, look):  # whose colors it would hide
-            self._draw_boundary("/surface", reach, look.slice, _SURFACE, 0.35)
+            self._draw_boundary("/surface", reach, look.slice, _SURFACE, 0.35, None)
             return None
         coloring, ink = surface_colors(reach, look.color), _INK[look.dark]
         self._draw_boundary("/surface", reach, look.slice, coloring.rgb, _CLEAR_SURFACE, ink)
         return coloring.key
 
     def _draw_boundary(
-        self,
-        path: str,
-        reach: Reach,
-        cut: Slice,
-        rgb: ArrayLike,
-        opacity: float,
-        ink: Color | None = None,
+        self, path: str, reach: Reach, cut: Slice, rgb: ArrayLike, opacity: float, ink: Color | None
     ) -> None:
         """What a slice shows of a boundary in RGB of shape (v, 3) or (3,); its lines with ink."""
         faces, vertices = reach.sheets.faces, reach.sheets.vertices / reach.arm.length
@@ -233,7 +195,7 @@ class Scene:
         lines = vertices[reach.sheets.lines]
         drawn = in_slice(lines.reshape(-1, 3), cut).reshape(-1, 2).all(axis=1) & (ink is not None)
         opened = cut.axis != "none" or reach.exact is None or reach.exact.dimension < 3
-        data = glb(skin, opacity, lines[drawn], ink or _DARK, both_sides=opened)
+        data = glb(skin, opacity, lines[drawn], ink or DARK, both_sides=opened)
         self.api.add_glb(path, data, cast_shadow=False, receive_shadow=False)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
@@ -246,7 +208,7 @@ class Scene:
         if reach is None:
             return
         if reach.has_surface:
-            self._draw_boundary(path, reach, cut, color, opacity)
+            self._draw_boundary(path, reach, cut, color, opacity, None)
             return
         points = cloud_points(reach, 15)
         size = 0.4 * _point_size(len(points))
@@ -289,7 +251,7 @@ class Scene:
         length: float | None = None,
         rod: TipMap | None = None,
     ) -> Array:
-        """The body, its fibers and markers; returns the tip. Redrawn by moving what there is.
+        """The body, its fibers and markers, moved if they are there; returns the tip, shape (3,).
 
         Nothing is drawn of an arm without equilibrium, and the tip is NaN. Lengths are over
         `length` [m], by default that of the arm; `rod` is its tip map in another posture.
@@ -329,7 +291,7 @@ class Scene:
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
         markers = marker_points(arm.markers, shape) / length
-        self.dots(f"{path}/markers", markers, _DARK, _MARKER)
+        self.dots(f"{path}/markers", markers, DARK, MARKER)
         return centers[-1] / length
 
     def see_through_arm(self, clear: bool) -> None:
@@ -340,73 +302,10 @@ class Scene:
                 if handle.opacity != (target := _HIDING if clear else opacity):
                     handle.opacity = target
 
-    def draw_ghosts(self, arm: Manipulator, activations: Array) -> None:
-        """Many shapes at once, transparent."""
-        self.remove("/ghosts")
-        for k, activation in enumerate(activations):
-            self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
 
-    # Marks.
-
-    def draw_path(self, points: Array, followed: Array) -> None:
-        """A path [L], pale, and as far as the arm can follow it, dark; a ball where that ends."""
-        self.remove("/path")
-        for name, line, color in (("all", points, _PALE), ("followed", followed, _MARK)):
-            self.lines(f"/path/{name}", np.stack([line[:-1], line[1:]], axis=1), color, 0.006)
-        if len(followed) and not np.array_equal(followed[-1], points[-1]):
-            self.api.add_icosphere("/path/end", _END, _DARK, position=followed[-1])
-
-    def draw_target(self, target: Array | None, nearest: Array | None = None) -> None:
-        """A mark where the tip should go [L], and a line to the nearest place in reach."""
-        self.remove("/target", "/gap")
-        if target is not None:
-            self.api.add_icosphere("/target", _TARGET, _MARK, position=target)
-        if target is not None and nearest is not None:
-            self.lines("/gap", np.stack([target, nearest])[None], _MARK, 0.004)
-            self.api.add_icosphere("/gap/nearest", _NEAREST, _DARK, position=nearest)
-
-    def draw_sample(self, measured: Array, predicted: Array) -> None:
-        """Measured and predicted markers [L], shapes (marker, 3), and lines between them."""
-        self.dots("/sample/measured", measured, _MARK, _MEASURED)
-        self.dots("/sample/predicted", predicted, _DARK, _MARKER)
-        pairs = np.stack([measured, predicted], axis=1)
-        self.lines("/sample/residuals", pairs, _MARK, 0.005)
-
-    def draw_needs(self, check: Check | None) -> None:
-        """Draw the places and regions of a design that was judged; None takes them away."""
-        self.remove("/needs")
-        if check is None:
-            return
-        if len(check.places):
-            self._draw_places(check)
-        length, around = check.arm.length, np.array(self.axes.corners)
-        verdicts = {(f.kind, f.name): f.verdict for f in check.findings}
-        needs = check.requirements
-        named = [(keep.kind, keep.name, keep.region) for keep in needs.keeps]
-        named += [("cover", t.name, t.region) for t in needs.targets if t.region is not None]
-        for k, (kind, name, region) in enumerate(named):
-            verdict = verdicts.get((kind, name), "met")
-            lines = [line / length for line in region.wireframe(around * length)]
-            pieces = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
-            is_met = verdict == "met"
-            color, width = (_REGION[kind], _FINE) if is_met else (VERDICTS[verdict], _BROAD)
-            self.lines(f"/needs/region {k}", pieces, color, width)
-
-    def _draw_places(self, check: Check) -> None:
-        length, rows = check.arm.length, np.arange(len(check.places))
-        places, met = check.places / length, check.reached.all(axis=0)
-        worst = check.gaps.argmax(axis=0)  # of the payloads
-        gaps, nearest = check.gaps[worst, rows], check.nearest[worst, rows] / length
-        self.dots("/needs/reached", places[met], VERDICTS["met"], _BALL)
-        missed = np.flatnonzero(~met)
-        arms = _CROSS * np.array([[1, 0, 1], [1, 0, -1], [0, 1, 0]]) / np.sqrt([[2], [2], [1]])
-        cross = places[missed][:, None, None] + np.stack([-arms, arms], axis=1)
-        self.lines("/needs/missed", cross.reshape(-1, 2, 3), VERDICTS["missed"], _BROAD)
-        ways = np.stack([places, nearest], axis=1)[missed]
-        self.lines("/needs/gaps", ways, VERDICTS["missed"], _FINE)
-        for k in missed[:_MOST_LABELS]:
-            text = check.arm.length_unit.rounded(float(gaps[k]), digits=".3g")
-            add_label(self.api, f"/needs/label {k}", text, places[k] + [0.0, 0.0, 2.0 * _CROSS])
+def pieces(line: Array) -> Array:
+    """The straight pieces between points in order, shape (n, 3), as shape (n - 1, 2, 3)."""
+    return np.stack([line[:-1], line[1:]], axis=1)
 
 
 def shows_cloud(reach: Reach, look: Appearance) -> bool:

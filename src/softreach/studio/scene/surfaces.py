@@ -65,14 +65,8 @@ def glb(
     """A surface and lines on it as binary glTF, in their colors as they are.
 
     viser's own meshes have one color each, its lines are slow, and so is light without a graphics
-    card.
-
-    Args:
-        skin: The surface.
-        opacity: Of it.
-        lines: Their ends [L], shape (n, 2, 3).
-        ink: Color of the lines, RGB from 0 to 255.
-        both_sides: Whether it is seen from inside too, which takes a page twice as long.
+    card. Lines have ends [L] of shape (n, 2, 3) and a color, RGB from 0 to 255. A surface that is
+    seen from inside too takes a page twice as long.
     """
     from trimesh import Scene, Trimesh
     from trimesh.exchange.gltf import export_glb

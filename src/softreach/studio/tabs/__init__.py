@@ -32,10 +32,9 @@ JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)
 
 def furnish(session: Session) -> None:
     """Add all panels to the page of a session."""
-    gui = session.client.gui
     panels = [Fields(session)]
     status(panels[0])
-    tabs = gui.add_tab_group()
+    tabs = session.client.gui.add_tab_group()
     for name, declared in TABS.items():
         with tabs.add_tab(name):
             for declare in declared:

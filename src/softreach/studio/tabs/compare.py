@@ -29,21 +29,13 @@ def compare(panel: Fields) -> None:
     """Keeps a design, and compares the design with it."""
     known = "design", "reference", "found.reach", "found.reference"
     panel.html(*known, content=_compared)
-    panel.change("Keep this design", kept, "Draws its boundary in gray from now on")
+    keep = lambda state: state.replace(reference=state.design)
+    panel.change("Keep this design", keep, "Draws its boundary in gray from now on")
     with panel.folder("kept design", "reference"):
-        panel.change("Swap", swapped, "Makes the kept design the design, and back")
+        swap = lambda s: s.replace(design=s.reference or s.design, reference=s.design)
+        panel.change("Swap", swap, "Makes the kept design the design, and back")
         forget = "Compares no more, and takes the gray boundary away"
         panel.change("Forget", lambda state: state.replace(reference=None), forget, **GRAY)
-
-
-def kept(state: StudioState) -> StudioState:
-    """The state that keeps its design."""
-    return state.replace(reference=state.design)
-
-
-def swapped(state: StudioState) -> StudioState:
-    """The state with both designs exchanged."""
-    return state.replace(design=state.reference or state.design, reference=state.design)
 
 
 def _compared(state: StudioState, found: Found) -> str:
@@ -51,8 +43,8 @@ def _compared(state: StudioState, found: Found) -> str:
     if reference is None:
         return markup.paragraph(_HINT)
     is_known = before is not None and before.fine and before.arm == reference
-    now = design, found.complete_reach(design)
-    return comparison_html(compared((reference, before if is_known else None), now))
+    kept = reference, before if is_known else None
+    return comparison_html(kept, (design, found.complete_reach(design)))
 
 
 class Row(NamedTuple):
@@ -69,38 +61,28 @@ class Row(NamedTuple):
         return None if self.kept is None or self.now is None else self.now - self.kept
 
 
-class Comparison(NamedTuple):
-    """What differs between two designs."""
-
-    rows: tuple[Row, ...]
-    is_complete: bool  # the designs differ in these numbers alone
-
-
-def compared(kept: Candidate, now: Candidate) -> Comparison:
-    """Compare what two designs reach, and the parameters in which they differ."""
+def compared(kept: Candidate, now: Candidate) -> tuple[list[Row], bool]:
+    """What two designs reach and the parameters in which they differ; True if that is all."""
     rows = _differing(slider_parameters(kept[0]), slider_parameters(now[0]))
     is_complete = _explained(kept[0], now[0], list(rows))
     if not is_complete:
         rows = rows | _differing(named_parameters(kept[0]), named_parameters(now[0])) | rows
-    return Comparison((*_reach_rows(kept, now), *[*rows.values()][:_MOST]), is_complete)
+    return [*_reach_rows(kept, now), *[*rows.values()][:_MOST]], is_complete
 
 
-def comparison_html(comparison: Comparison) -> str:
+def comparison_html(kept: Candidate, now: Candidate) -> str:
     """A row for each quantity: kept, now, and the change."""
-    rows = []
-    for row in comparison.rows:
-        values = zip((row.kept, row.now), row.errors, strict=True)
-        known = ["–" if value is None else _digits(value, error) for value, error in values]
-        rows.append([(text,) for text in (row.title, *known, _change_text(row))])
+    rows, is_complete = compared(kept, now)
+    cells = [(row.title, *map(_digits, row[1:3], row.errors), _change_text(row)) for row in rows]
     others = "The designs differ in more than these numbers."
-    more = "" if comparison.is_complete else markup.paragraph(others)
-    return markup.table(["", "kept", "now", "change"], rows) + more
+    more = "" if is_complete else markup.paragraph(others)
+    return markup.table(["", "kept", "now", "change"], cells) + more
 
 
 def _change_text(row: Row) -> str:
-    if row.change is None or row.change == 0:
-        return "–" if row.change is None else "="
     before, now = row.errors
+    if not row.change:
+        return "–" if row.change is None else "="
     if before is None or now is None:
         return _digits(row.change, None, "+")
     error = before + now
@@ -110,8 +92,10 @@ def _change_text(row: Row) -> str:
     return f"{text} ({_digits(100 * row.change / row.kept, 100 * error / row.kept, '+')} %)"
 
 
-def _digits(value: float, error: Value, sign: str = "") -> str:
+def _digits(value: Value, error: Value, sign: str = "") -> str:
     """A number to the first digit of its error; to five digits without one."""
+    if value is None:
+        return "–"
     usual = f"{sign}.5g"
     if error is not None and 0 < error < math.inf:
         usual = f"{sign}.{max(0, -math.floor(math.log10(error)))}f"
@@ -124,17 +108,16 @@ def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
     sizes = [reach.size if reach else None for reach in reaches]
     for name in dict.fromkeys(size.name for size in sizes if size) or ("volume",):
         same = [size if size and size.name == name else None for size in sizes]
-        latest = next((size for size in reversed(same) if size), None)
-        power = 3 if latest is None else latest.power
-        unit = arm.length_unit if latest is None else size_unit(latest, arm)
+        latest = same[1] or same[0]
+        power = latest.power if latest else 3
+        unit = size_unit(latest, arm) if latest else arm.length_unit
         scale, title = (unit.scale(power), unit.label(name, power)) if power else (1.0, name)
         before, after = (size and size.value / scale for size in same)
         first, second = (size and told_error(size, arm) / scale for size in same)
         rows.append(Row(title, before, after, (first, second)))
     shares = [_finite(100 * reach.unreachability) if reach else None for reach in reaches]
     if shares != [None, None]:
-        before, after = (share and round(share, 2) for share in shares)
-        rows.append(Row("UNR [%]", before, after))
+        rows.append(Row("UNR [%]", *(share and round(share, 2) for share in shares)))
     return rows
 
 
@@ -143,15 +126,10 @@ def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) ->
     before, after = ({each.name: each for each in shown} for shown in (kept, now))
     rows = {}
     for name in before | after:
-        first, second = (
-            _finite(each[name].shown) if name in each else None for each in (before, after)
-        )
-        if first is None or second is None:
-            same = first is second
-        else:
-            same = math.isclose(first, second, rel_tol=_EQUAL)
-        if not same:
-            rows[name] = Row((after.get(name) or before[name]).label, first, second)
+        both = [_finite(each[name].shown) if name in each else None for each in (before, after)]
+        known = [value for value in both if value is not None]
+        if len(known) == 1 or (known and not math.isclose(*known, rel_tol=_EQUAL)):
+            rows[name] = Row((after.get(name) or before[name]).label, *both)
     return rows
 
 
@@ -168,9 +146,8 @@ def _explained(kept: Manipulator, now: Manipulator, names: Sequence[str]) -> boo
 
 def _shape(arm: Manipulator) -> object:
     """Kinds and names of the parts: all that is no number."""
-    rings = tuple((ring.name, ring.material) for ring in arm.section.rings)
-    parts = tuple((type(actuator), actuator.name) for actuator in arm.actuators)
-    return type(arm.profile), rings, parts, arm.loads is None
+    rings = [(ring.name, ring.material) for ring in arm.section.rings]
+    return type(arm.profile), rings, [(type(a), a.name) for a in arm.actuators], arm.loads is None
 
 
 def _finite(value: float) -> Value:

@@ -16,6 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import GRAY, Attribute, Fields, of_design
+from softreach.studio.figures import NO_BAR, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import (
     Part,
@@ -26,11 +27,12 @@ from softreach.studio.shown_parameters import (
     parts,
     refusal,
     slider_parameters,
+    typed_unit,
 )
-from softreach.studio.slopes import NO_BAR, slope_bars
 from softreach.studio.state import StudioState, rod_of, vector
-from softreach.studio.widgets import Line, SliderField, TextKind, number_kind, vector_kind
+from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector_kind
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
+from softreach.support.units import LengthUnit
 
 # Sliders, numbers that have none, and named designs to start from
 
@@ -40,13 +42,8 @@ _ABOUT_START = "Replaces the whole design by an arm of the literature or an exam
 
 def design(panel: Fields) -> None:
     """Sliders of a design, each with the change of the volume by it."""
-    with panel.folder("design") as folder:
-        about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
-        panel.text("design", "found.slopes", content=about)
-    _numbers(panel, folder, slider_parameters, _sliders)
-    with panel.folder("body") as folder:
-        pass
-    _numbers(panel, folder, body_numbers, _typed)
+    _numbers(panel, "design", slider_parameters, _sliders)
+    _numbers(panel, "body", body_numbers, _typed)
     names = {"": "this design"} | {name: name for name in designs.__all__}
     named = Attribute(
         lambda state: next((name for name, arm in _designs().items() if arm == state.design), ""),
@@ -57,7 +54,7 @@ def design(panel: Fields) -> None:
 
 def _numbers(
     panel: Fields,
-    folder: Any,
+    label: str,
     shown: Callable[[Manipulator], Sequence[ShownParameter]],
     build: Callable[[Fields, Sequence[ShownParameter]], object],
 ) -> None:
@@ -72,7 +69,7 @@ def _numbers(
 
     key = lambda state, _: [each[:2] for each in shown(state.design)]
     remake = lambda fields, _: build(fields, shown(arm()))
-    panel.anew(folder, "design", key=key, build=remake, words=words)
+    panel.anew(label, "design", key=key, build=remake, words=words)
 
 
 def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
@@ -81,7 +78,9 @@ def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
 
 
 def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
-    rows, bars = dict[str, SliderField](), dict[str, Line]()
+    about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
+    panel.text("design", "found.slopes", content=about)
+    rows, bars = dict[str, Slider](), dict[str, Line]()
     before = panel.session.found.ends  # of a design with other sliders
     for each in shown:
         at = of_design(each.read, each.write)
@@ -121,12 +120,11 @@ def _designs() -> dict[str, Manipulator]:
 
 # Rings and actuators
 
-_AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
+_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
 _NEW_RING = "ring"
-_ABOUT_MADE_OF = "Material of all rings, which an actuator that pulls with a force needs"
-_OFFER = (
-    "A {kind} needs Young's modulus E, which this arm leaves open: choose what it is made of, and "
-    "press Add again."
+_ABOUT_MADE_OF = (
+    "Material that all rings get: an actuator that pulls with a force needs Young's modulus E, "
+    "which some arms leave open"
 )
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
@@ -139,30 +137,24 @@ def arm_parts(panel: Fields) -> None:
         kinds = (*edits.ACTUATOR_KINDS, _NEW_RING)
         hint = "An actuator, or a ring of the cross-section"
         kind = panel.gui.add_dropdown("kind", kinds, hint=hint)
-        made_of = panel.gui.add_dropdown(
-            "made of", tuple(material_names()), hint=_ABOUT_MADE_OF, visible=False
-        )
+        matters = (_AS_IT_IS, *material_names())
+        made_of = panel.gui.add_dropdown("made of", matters, hint=_ABOUT_MADE_OF)
 
         def add() -> None:
-            """Where the arm lacks the modulus for it, offer a material first."""
-            arm = session.state.design
-            lacking = _lacks_material(arm, kind.value)
-            made_of.visible = lacking and not made_of.visible
-            offer.warn(_OFFER.format(kind=kind.value) if made_of.visible else "")
-            if not made_of.visible:
-                matter = made_of.value if lacking else ""
-                new = lambda state: _with_part(state.design, kind.value, matter)
-                panel.apply(lambda state: state.replace(design=new(state)))
-            if session.state.design != arm:
-                known, is_ring = _listed(session.state.design).values(), kind.value == _NEW_RING
+            before, is_ring, matter = session.state.design, kind.value == _NEW_RING, made_of.value
+
+            def grown(arm: Manipulator) -> Manipulator:
+                arm = arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
+                return edits.with_ring(arm) if is_ring else edits.with_actuator(arm, kind.value)
+
+            panel.apply(lambda state: state.replace(design=grown(state.design)))
+            if session.state.design != before:
+                known = _listed(session.state.design).values()
                 like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
                 session.learn({"part": like[-1]})
+                made_of.value = _AS_IT_IS
 
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
-        offer = Line(panel.gui)
-    with panel.folder("part") as folder:
-        pass
-    message = panel.kept(Line(panel.gui))
 
     def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
         fields.message = message
@@ -172,22 +164,9 @@ def arm_parts(panel: Fields) -> None:
         arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
         return refusal(error, part_parameters(arm, known[label]), arm)
 
+    panel.anew("part", "design", "found.part", key=_chosen, build=build, words=words)
+    message = panel.kept(Line(panel.gui))
     panel.message, panel.words = message, words
-    panel.anew(folder, "design", "found.part", key=_chosen, build=build, words=words)
-
-
-def _with_part(arm: Manipulator, kind: str, matter: str = "") -> Manipulator:
-    arm = edits.with_material(arm, matter) if matter else arm
-    return edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
-
-
-def _lacks_material(arm: Manipulator, kind: str) -> bool:
-    try:
-        _with_part(arm, kind)
-    except InvalidDesign as error:
-        lacking = [fault.path for fault in error.faults if fault.value is None]
-        return any(path.endswith("young_modulus") for path in lacking)
-    return False
 
 
 def _listed(arm: Manipulator) -> dict[str, Part]:
@@ -212,20 +191,14 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     )
     hint = "The part whose numbers are below"
     panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
-    own = (ring := part.ring) is not None or bool(part.actuator)
-    if ring is not None:
-        renamed = lambda arm, name: edits.with_changed_ring(arm, ring, name=name)
-        without = lambda arm: edits.without_ring(arm, ring)
-    else:
-        renamed = lambda arm, name: edits.with_changed_actuator(arm, part.actuator, name=name)
-        without = lambda arm: edits.without_actuator(arm, part.actuator)
+    own = part.ring is not None or bool(part.actuator)
     if own:
-        at = of_design(lambda _: part.name, renamed)
+        at = of_design(lambda _: part.name, lambda arm, name: part.changed(arm, name=name))
         panel.typed("name", at, "What tables and files call it", lambda *_: _NAME)
     _add_matter(panel, part)
     _typed(panel, part_parameters(session.state.design, part))
     if own:
-        remove = lambda state: state.replace(design=without(state.design))
+        remove = lambda state: state.replace(design=part.removed(state.design))
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
 
 
@@ -235,7 +208,7 @@ def _add_matter(panel: Fields, part: Part) -> None:
     if ring is not None:
         of_ring = of_design(
             lambda arm: arm.section.rings[ring].material.name,
-            lambda arm, name: edits.with_changed_ring(arm, ring, material=name) if name else arm,
+            lambda arm, name: part.changed(arm, material=name) if name else arm,
         )
         _material(panel, "material", _AS_TYPED, of_ring)
     if ring == 0:
@@ -243,11 +216,10 @@ def _add_matter(panel: Fields, part: Part) -> None:
         _material(panel, "core", _AS_INNERMOST, of_design(core, edits.with_core))
     if part.home is not None and len(arm.section.rings) > 1:
         rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}
-        name = part.actuator
-        homes = lambda arm: {one.actuator: one.home or 0 for one in parts(arm).values()}
+        home = lambda arm: next(p.home for p in parts(arm).values() if p.actuator == part.actuator)
         at = of_design(
-            lambda arm: arm.section.rings.index(arm.section.ring(homes(arm)[name])),
-            lambda arm, ring: edits.with_changed_actuator(arm, name, ring=ring),
+            lambda arm: arm.section.rings.index(arm.section.ring(home(arm) or 0)),
+            lambda arm, ring: part.changed(arm, ring=ring),
         )
         panel.dropdown("in ring", rings, at, "The ring that it lies in")
 
@@ -273,58 +245,52 @@ _LOADS = {
     "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
     "payload_arm": (
         "lever arm",
-        "mm",
-        1e-3,
+        "",
+        0.0,
         "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
     ),
     "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
 }
-"""Loads that are typed: field -> label, unit, SI units per unit, and meaning."""
+"""Loads that are typed: field -> label, unit ("" for that of lengths), its size, and meaning."""
 
 
 def loads(panel: Fields) -> None:
     """Base, gravity, a payload and a force on the tip, as they are typed."""
     loaded = panel.session.state.design.loads is not None
-    with panel.folder("base and loads", expanded=loaded):
-        _base(panel)
-        names = {name: name for name in GRAVITIES} | {"": "as typed"}
-        gravity = load_field("gravity")
-        fall = Attribute(
-            gravity_name,
-            lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
-        )
-        falls = "Which way things fall in the world; the base says how the arm stands in it"
-        panel.dropdown("gravity", names, fall, falls)
-        for name, (label, unit, _, hint) in _LOADS.items():
-            kind = number_kind if name == "payload" else vector_kind
-            panel.typed(f"{label} [{unit}]", load_field(name), hint, kind)
-        panel.message = panel.kept(Line(panel.gui))
-        about, off = (
-            "Gravity, payload and all forces",
-            lambda s: s.replace(design=s.free or s.design),
-        )
-        panel.change("Take all loads off", off, about, "design.loads", **GRAY)
-        follows = "design", "found.tip", "found.pointing", "found.posture"
-        rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
-        panel.text(*follows, content=rests)
-        more = lambda s, _: ", ".join(other_loads(s.design))
-        panel.text(
-            "design",
-            content=lambda *k: [f"From the design file act too: {more(*k)}."] * bool(more(*k)),
-        )
+    unit = lambda state, _: typed_unit(state.design)
+    panel.anew("base and loads", "design", key=unit, build=_base_and_loads, expanded=loaded)
 
 
-def _base(panel: Fields) -> None:
-    way = "Which way the straight arm points from its base, in the world"
+def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     points = of_design(
         lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
         lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
     )
+    way = "Which way the straight arm points from its base, in the world"
     panel.dropdown("base", _WAYS, points, way)
     where = "r(0): where the arm is clamped, as x, y, z in the world"
-    panel.typed("base at [mm]", base_field("position"), where, vector_kind)
+    panel.typed(unit.label("base at"), base_field("position"), where, vector_kind)
     turn = "ψ: turn of the base about the way the arm points"
     panel.typed("turn [deg]", base_field("turn"), turn)
+    gravity, names = load_field("gravity"), {name: name for name in GRAVITIES} | {"": "as typed"}
+    fall = Attribute(
+        gravity_name,
+        lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
+    )
+    falls = "Which way things fall in the world; the base says how the arm stands in it"
+    panel.dropdown("gravity", names, fall, falls)
+    for name, (label, symbol, _, hint) in _LOADS.items():
+        kind = number_kind if name == "payload" else vector_kind
+        panel.typed(f"{label} [{symbol or unit.name}]", load_field(name), hint, kind)
+    panel.message = panel.kept(Line(panel.gui))
+    off, about = lambda s: s.replace(design=s.free or s.design), "Gravity, payload and all forces"
+    panel.change("Take all loads off", off, about, "design.loads", **GRAY)
+    follows = "design", "found.tip", "found.pointing", "found.posture"
+    rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+    panel.text(*follows, content=rests)
+    more = lambda s, _: ", ".join(other_loads(s.design))
+    act = lambda *known: [f"From the design file act too: {more(*known)}."] * bool(more(*known))
+    panel.text("design", content=act)
 
 
 def other_loads(arm: Manipulator) -> list[str]:
@@ -343,11 +309,11 @@ def gravity_name(state: StudioState) -> str:
 
 
 def base_field(name: str) -> Attribute:
-    """Position in mm, or turn in degrees."""
-    scale = math.radians(1.0) if name == "turn" else 1e-3
+    """Position in the unit of lengths that are typed, or turn in degrees."""
+    scale = lambda arm: math.radians(1.0) if name == "turn" else typed_unit(arm).size
     return of_design(
-        lambda arm: _over(getattr(arm.base, name), scale),
-        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale)})),
+        lambda arm: _over(getattr(arm.base, name), scale(arm)),
+        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale(arm))})),
     )
 
 
@@ -358,21 +324,23 @@ def load_field(name: str) -> Attribute:
         InvalidInput: A number that no load can have.
         InvalidDesign: Matter that lacks what loads need, and where to give it.
     """
-    label, unit, scale, _ = _LOADS[name]
+    label, symbol, size, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
+    scale = lambda arm: size or typed_unit(arm).size
 
     def write(arm: Manipulator, value: Any) -> Manipulator:
+        unit = symbol or typed_unit(arm).name
         for number in value if isinstance(value, tuple) else (value,):
             if not low <= number <= _MOST:
                 allowed = f"{low:,.0f} to {_MOST:,.0f} {unit}"
                 raise InvalidInput(label, f"{number:g} {unit}", allowed)
-        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale)})
+        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale(arm))})
         try:
             return arm.replace(loads=None if loads == _NONE else loads)
         except InvalidDesign as error:
             raise _in_words(error) from None
 
-    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale), write)
+    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale(arm)), write)
 
 
 def _times(value: Any, scale: float) -> Any:

@@ -1,8 +1,7 @@
-"""Export of the state, design, cloud, surface and pictures; and states that are loaded again."""
+"""Export of the state, design, cloud, surface, arm and pictures; and states loaded again."""
 
 from __future__ import annotations
 
-import io
 import tempfile
 import textwrap
 from collections.abc import Callable, Mapping
@@ -10,62 +9,36 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.export import export_cloud, export_mesh
+from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
 from softreach.plot.coloring import draw_figure_key
 from softreach.rod.kinematics import configuration
 from softreach.studio.captions import legend_text, reach_text
-from softreach.studio.fields import GRAY, Fields
+from softreach.studio.fields import GRAY, Fields, file_text
+from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.colors import sample_values
 from softreach.studio.scene.surfaces import in_slice
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import LARGEST, Appearance, StudioState, design_of_text
+from softreach.studio.state import StudioState, design_of_text
 from softreach.support.errors import InvalidInput
-from softreach.support.files.text import text_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.plot.coloring import BundleKey, ScalarKey
+Write = Callable[[Session, Path], object]
+"""Writes what a tab shows to a file, whose suffix chooses the format."""
 
-File = tuple[str, Callable[[Session], bytes]]
-"""Name and content."""
-
-_DATA: Mapping[str, File] = {
-    "design (.toml)": ("design.toml", lambda s: s.state.design.file_text.encode()),
-    **{
-        f"cloud ({kind})": (f"cloud{kind}", lambda s, kind=kind: cloud_file(_reach(s), kind))
-        for kind in CLOUD_FILES
-    },
-    **{
-        f"exact surface ({kind})": (
-            f"surface{kind}", lambda s, kind=kind: surface_file(_reach(s), kind)
-        )
-        for kind in SURFACE_FILES
-    },
-}  # fmt: skip
-_ABOUT_DATA = (
-    "The design alone, which the command line reads too; all samples of the cloud, tips [m] and "
-    "activations; or the exact boundary of the reachable set [m]"
-)
-_PICTURES: Mapping[str, File] = {
-    "as it is seen (.png)": (
-        "studio.png",
-        lambda s: picture_file(s.camera.picture(), s.state, _reach(s), s.found.key),
-    ),
-    "four views (.png)": ("reachability.png", lambda s: figure_file(_reach(s), s.state)),
-    "web page (.html)": ("reachability.html", lambda s: page_file(_reach(s), s.state)),
+_ABOUT = {
+    "data": "The design alone, which the command line reads too; all samples of the cloud; the "
+    "exact boundary of the reachable set; or the arm as it is. Lengths are in the unit of the page",
+    "picture": "The scene as it is seen, with legend and design; three views and an oblique one of "
+    "the points that are shown; or the scene in one file, to be turned without a studio",
 }
-_ABOUT_PICTURES = (
-    "The scene as it is seen, with legend and design; three views and an oblique one of the points "
-    "that are shown; or the scene in one file, to be turned without a studio"
-)
 
 
 def export(panel: Fields) -> None:
@@ -79,28 +52,15 @@ def export(panel: Fields) -> None:
         read = lambda file: session.restore(state_from(file.name, file.content, session.state))
         hint = "A state (.json) or a design (.toml) that was saved"
         panel.upload("Load state or design", read, hint, **GRAY)
-    for folder, kind, files, about in (
-        ("design and data", "data", _DATA, _ABOUT_DATA),
-        ("pictures", "picture", _PICTURES, _ABOUT_PICTURES),
-    ):
+    for folder, kind in (("design and data", "data"), ("pictures", "picture")):
         with panel.folder(folder):
-            menu = panel.gui.add_dropdown(kind, tuple(files), hint=about)
+            menu = panel.gui.add_dropdown(kind, tuple(FILES[kind]), hint=_ABOUT[kind])
 
-            def save(menu: Any = menu, files: Mapping[str, File] = files) -> None:
-                name, content = files[menu.value]
-                session.send(name, lambda: content(session))
+            def save(menu: Any = menu, kind: str = kind) -> None:
+                name, write = FILES[kind][menu.value]
+                session.send(name, lambda: content_of(session, name, write))
 
             panel.button(f"Save {kind}", save, "As a file of this type")
-
-
-def _reach(session: Session) -> Reach:
-    reach = session.found.complete_reach(session.state.design)
-    if reach is None:
-        raise InvalidInput("cloud", "still being computed", "complete", "try again soon")
-    return reach
-
-
-# What is in the files
 
 
 def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
@@ -110,77 +70,95 @@ def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
         InvalidInput: Neither of them.
         InvalidDesign: The design in it cannot exist.
     """
-    text = text_of("file", name, content, LARGEST)
+    text = file_text(name, content)
     if name.lower().endswith(".toml"):
         return state.replace(design=design_of_text(text, name))
     return StudioState.from_json(text)
 
 
-def cloud_file(reach: Reach, suffix: str) -> bytes:
-    """All samples."""
-    return _written(f"cloud{suffix}", lambda path: export_cloud(reach.cloud, path))
+def content_of(session: Session, name: str, write: Write) -> bytes:
+    """Content that a writer puts into a file of this name."""
+    with tempfile.TemporaryDirectory(prefix="softreach-") as folder:
+        path = Path(folder) / name
+        write(session, path)
+        return path.read_bytes()
 
 
-def surface_file(reach: Reach, suffix: str) -> bytes:
-    """The exact boundary of the reachable set [m].
+def _reach(session: Session) -> Reach:
+    reach = session.found.complete_reach(session.state.design)
+    if reach is None:
+        raise InvalidInput("cloud", "still being computed", "complete", "try again soon")
+    return reach
 
-    Raises:
-        InvalidInput: A curve or a point has none.
-    """
+
+# Data, in the unit of the page
+
+
+def _write_design(session: Session, path: Path) -> None:
+    path.write_text(session.state.design.file_text, encoding="utf-8")
+
+
+def _write_cloud(session: Session, path: Path) -> None:
+    export_cloud(_reach(session).cloud, path, unit=session.state.design.length_unit)
+
+
+def _write_surface(session: Session, path: Path) -> None:
+    reach, unit = _reach(session), session.state.design.length_unit
     if reach.refusal:
         raise InvalidInput("surface", "unknown", "that of an exact set", reach.refusal)
     if reach.exact is None or reach.exact.dimension < 2:
         raise InvalidInput("design", "too few free bundles", "one whose tip reaches a surface")
-    surface = reach.exact.surface()
-    return _written(f"surface{suffix}", lambda path: export_mesh(surface, path))
+    export_mesh(reach.exact.surface(), path, unit=unit)
 
 
-def figure_file(reach: Reach, state: StudioState) -> bytes:
-    """Three views and an oblique one of the points that are shown, in their colors, as PNG."""
+def _write_arm(session: Session, path: Path) -> None:
+    arm = session.state.design
+    if not np.isfinite((shape := _shape(session.state)).position.values).all():
+        raise InvalidInput("activation", session.state.activation, "one with an equilibrium")
+    export_arm(arm, shape, path, unit=arm.length_unit)
+
+
+def _shape(state: StudioState) -> xr.Dataset:
+    return configuration(state.design, np.asarray(state.activation))
+
+
+# Pictures
+
+
+def _write_views(session: Session, path: Path) -> None:
+    """Three views and an oblique one of the points that are shown, in their colors."""
     from softreach import plot
     from softreach.plot.style import pyplot
 
-    look, shape = state.appearance, configuration(state.design, np.asarray(state.activation))
-    cloud, color = _shown(reach, look)
-
-    def write(path: Path) -> None:
-        figure = plot.plot_views(cloud, state.design, shape, color=color)
-        plot.save_figure(figure, path)
-        pyplot().close(figure)
-
-    return _written("figure.png", write)
+    cloud, color = _shown(session)
+    figure = plot.plot_views(cloud, session.state.design, _shape(session.state), color=color)
+    plot.save_figure(figure, path)
+    pyplot().close(figure)
 
 
-def page_file(reach: Reach, state: StudioState) -> bytes:
+def _write_page(session: Session, path: Path) -> None:
     """A web page to be turned: the boundary or the points that are shown, and the arm as it is."""
     from softreach import plot
 
-    look, shape = state.appearance, configuration(state.design, np.asarray(state.activation))
-    cloud, color = _shown(reach, look)
-    what = reach.exact if reach.has_surface and look.surface and not look.cloud else cloud
-    unit, text = state.design.length_unit.name, ". ".join(_caption(state, reach))
-    return plot.plot_3d([what, shape], color=color, unit=unit, caption=text).html.encode()
+    reach, state, (cloud, color) = _reach(session), session.state, _shown(session)
+    is_surface = reach.has_surface and state.appearance.surface and not state.appearance.cloud
+    shown = [reach.exact if is_surface else cloud, _shape(state)]
+    look = {"color": color, "unit": state.design.length_unit.name}
+    page = plot.plot_3d(shown, **look, caption=". ".join(_caption(state, reach)))
+    path.write_text(page.html, encoding="utf-8")
 
 
-def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.DataArray]:
+def _shown(session: Session) -> tuple[xr.Dataset, str | int | xr.DataArray]:
+    """The points that are shown, and their colors."""
+    reach, look = _reach(session), session.state.appearance
     known = [name for name in ("tip", "activation", "status") if name in reach.cloud]
     cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))
     color = sample_values(reach, look.level, look.color)
     kept = in_slice(cloud_points(reach, look.level), look.slice)
-    if not isinstance(color, str | int):
-        color = color.isel(sample=kept)
-    return cloud.isel(sample=kept), color
+    return cloud.isel(sample=kept), (
+        color if isinstance(color, str | int) else color.isel(sample=kept)
+    )
 
-
-def _written(name: str, write: Callable[[Path], object]) -> bytes:
-    """Content that the library's own writers put into a file of this name."""
-    with tempfile.TemporaryDirectory(prefix="softreach-") as folder:
-        path = Path(folder) / name
-        write(path)
-        return path.read_bytes()
-
-
-# What a tab shows as a picture that explains itself: key over the scene, numbers and design below.
 
 _PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
 """Of a light page and of a dark one."""
@@ -189,20 +167,13 @@ _KEY, _LINE, _EDGE = 62, 17, 14  # pixels: height of the key and of a line of te
 _CHARACTER = 6.4  # pixels
 
 
-def picture_file(
-    scene: NDArray[np.uint8], state: StudioState, reach: Reach, key: BundleKey | ScalarKey | None
-) -> bytes:
-    """The picture as PNG.
-
-    Args:
-        scene: What the canvas shows, RGBA on a transparent ground, finer than the page.
-        state: What it shows.
-        reach: Of its design.
-        key: To its colors.
-    """
+def _write_picture(session: Session, path: Path) -> None:
+    """The scene as it is seen, with its key above, numbers and design below."""
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
+    state, reach, key = session.state, _reach(session), session.found.key
+    scene = session.camera.picture()
     height, width = (size / FINER for size in scene.shape[:2])
     room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
     lines = [line for text in _caption(state, reach) for line in textwrap.wrap(text, room)]
@@ -218,16 +189,37 @@ def picture_file(
         text.set_color(ink)
     for legend in figure.legends:
         legend.set_frame_on(False)
-    file = io.BytesIO()
-    figure.savefig(file, format="png", facecolor=paper)
-    return file.getvalue()
+    figure.savefig(path, facecolor=paper)
 
 
 def _caption(state: StudioState, reach: Reach) -> list[str]:
     """Numbers and marks of a reach, parameters of its design, and how hard each bundle pulls."""
-    numbers = "".join(part for part in reach_text(reach) if isinstance(part, str))
-    marks = "".join(part for part in legend_text(reach, free=False) if isinstance(part, str))
+    numbers, marks = (
+        "".join(part for part in parts if not isinstance(part, Swatch)).strip()
+        for parts in (reach_text(reach), legend_text(reach, free=False))
+    )
     values = ", ".join(f"{c.label} {c.shown:g}" for c in slider_parameters(state.design))
     pulls = ", ".join(f"{value:.3g}" for value in state.activation)
     design = f"{values}; L = {state.design.length:g} m. Activation ({pulls})."
-    return [numbers, *([marks.strip()] if marks else []), design]
+    return [numbers, *([marks] if marks else []), design]
+
+
+_WRITERS: Mapping[str, tuple[Mapping[str, object], Write]] = {
+    "design": ({".toml": None}, _write_design),
+    "cloud": (CLOUD_FILES, _write_cloud),
+    "exact surface": (SURFACE_FILES, _write_surface),
+    "arm": (SURFACE_FILES, _write_arm),
+}
+FILES: Mapping[str, Mapping[str, tuple[str, Write]]] = {
+    "data": {
+        f"{what} ({suffix})": (f"{what.split()[-1]}{suffix}", write)
+        for what, (formats, write) in _WRITERS.items()
+        for suffix in formats
+    },
+    "picture": {
+        "as it is seen (.png)": ("studio.png", _write_picture),
+        "four views (.png)": ("reachability.png", _write_views),
+        "web page (.html)": ("reachability.html", _write_page),
+    },
+}
+"""What can be saved, by kind and by what the menu calls it: name of the file and its writer."""

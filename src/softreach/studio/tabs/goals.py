@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -17,17 +18,19 @@ from softreach.calibration.model import MarkerModel
 from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target, check
 from softreach.requirements.checks import checked
 from softreach.studio import markup
-from softreach.studio.fields import GRAY, Attribute, Fields
+from softreach.studio.fields import GRAY, Attribute, Fields, file_text
 from softreach.studio.found import Bench, Found, Sample
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.scene.scene import VERDICTS
+from softreach.studio.scene.camera import add_label
+from softreach.studio.scene.scene import DARK, MARK, MARKER, Scene, pieces
 from softreach.studio.session import Session
-from softreach.studio.state import LARGEST, StudioState, needs_of_text, requirements_of
+from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
+from softreach.support import palette
 from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
-from softreach.support.files.text import text_of
+from softreach.support.palette import eight_bit
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -54,9 +57,11 @@ def needs(panel: Fields) -> None:
         about = "A place for the tip, a box for the arm at these places, or a limit"
         kind = gui.add_dropdown("add", tuple(_EMPTY), hint=about)
         field = gui.add_text("numbers", "", hint="Numbers with commas between them")
-        unit = lambda: session.state.design.length_unit.name
-        expected = panel.text("design", content=lambda *_: [_EMPTY[kind.value].format(unit=unit())])
-        kind.on_update(lambda _: expected.say(_EMPTY[kind.value].format(unit=unit())))
+        unit = lambda: session.state.design.length_unit
+        expected = panel.text(
+            "design", content=lambda *_: [_EMPTY[kind.value].format(unit=unit().name)]
+        )
+        kind.on_update(lambda _: expected.say(_EMPTY[kind.value].format(unit=unit().name)))
 
         def add() -> None:
             add_need(session, kind.value, field.value)
@@ -68,20 +73,15 @@ def needs(panel: Fields) -> None:
         panel.html("found.check_refusal", content=refused)
         one = "One of the needs, or all of them"
         part: Any = gui.add_dropdown("remove", (_ALL,), hint=one, visible=False)
+        parts = lambda: needs_parts(requirements_of(session.state.needs), unit())
 
-        def offer(state: StudioState, _: Found) -> None:
-            parts = tuple(needs_parts(requirements_of(state.needs), state.design.length_unit))
-            part.visible = bool(parts)
-            if tuple(part.options) != (*parts, _ALL):
-                part.options = (*parts, _ALL)
-                part.value = part.options[0]
-
-        def remove() -> None:
-            needs = requirements_of(session.state.needs)
-            parts = needs_parts(needs, session.state.design.length_unit)
-            _keep(session, parts[part.value]() if part.value in parts else Requirements())
+        def offer(*_: object) -> None:
+            part.visible = bool(session.state.needs)
+            if tuple(part.options) != (options := (*parts(), _ALL)):
+                part.options, part.value = options, options[0]
 
         panel.follow("design", "needs", show=offer)
+        remove = lambda: _keep(session, parts().get(part.value, Requirements()))
         panel.button("Remove", remove, one, "needs")
         read = lambda file: read_needs(session, file.name, file.content)
         about = "Requirements as softreach check and softreach search read them"
@@ -93,9 +93,10 @@ def needs(panel: Fields) -> None:
 
 def verdict(found: Found, state: StudioState) -> str:
     """What is met and what is missed, as HTML."""
-    check = found.check
-    lines = [] if check is None else [_line(check, finding) for finding in check.findings]
-    if check is not None and check.arm != state.design:
+    if (check := found.check) is None:
+        return ""
+    lines = [_line(check, finding) for finding in check.findings]
+    if check.arm != state.design:
         lines.append(("of the design before, computing ...",))
     return "".join(markup.paragraph(*parts) for parts in lines)
 
@@ -111,17 +112,12 @@ def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
 
 def _reach_text(check: Check, finding: Finding) -> str:
     """A target in words: reached, or missed by its largest gap."""
-    targets, unit = check.requirements.targets, check.arm.length_unit
-    index = next(k for k, target in enumerate(targets) if target.name == finding.name)
-    own = check.target_of == index
-    gap = float(check.gaps[:, own].max()) - targets[index].within
-    reached = int(check.reached[:, own].all(axis=0).sum())
-    many = f"{reached} of {int(own.sum())} places, " if own.sum() > 1 else ""
+    count, _, worst = finding.text.partition("; ")
     if finding.met:
-        return f"{many}reached"
-    if "not held" in finding.text:
-        return f"{many}not held: no stable equilibrium"
-    return f"{many}missed by {gap / unit.size:.3g} {unit.name}"
+        return "reached"
+    gap = check.arm.length_unit.rounded(finding.excess * check.arm.length, digits=".3g")
+    why = "not held: no stable equilibrium" if "not held" in worst else f"missed by {gap}"
+    return why if count.startswith("0 of 1 ") else f"{count}, {why}"
 
 
 def verdict_text(check: Check) -> str:
@@ -132,8 +128,7 @@ def verdict_text(check: Check) -> str:
         return text
     worst = max(missed, key=lambda finding: finding.excess)
     more = f" {_reach_text(check, worst)}" if worst.kind == "reach" else ""
-    more += " undecided" if worst.verdict == "undecided" else ""
-    return f"{text} · {worst.name}{more}"
+    return f"{text} · {worst.name}{more}{' undecided' * (worst.verdict == 'undecided')}"
 
 
 # Needs that are added and removed
@@ -146,14 +141,14 @@ def add_need(session: Session, kind: str, text: str) -> None:
         InvalidInput: The text has other numbers than this kind of need.
     """
     state, needs = session.state, requirements_of(session.state.needs)
-    (unit, size), empty = state.design.length_unit, not text.strip()
-    numbers = lambda count, unit=unit: _numbers(text, count, unit, state.design.length)
-    if kind == "place to reach" and empty:
-        if session.found.tip is None:
+    (unit, size), length = state.design.length_unit, state.design.length
+    is_empty, numbers = not text.strip(), partial(_numbers, text, length=length)
+    if kind == "place to reach" and is_empty:
+        if (tip := session.found.tip) is None:
             raise InvalidInput("tip", "nowhere", "in equilibrium, or type a place")
-        add_place(session, session.found.tip * state.design.length)
+        add_place(session, length * tip)
     elif kind == "place to reach":
-        add_place(session, [size * x for x in numbers(3)])
+        add_place(session, [size * x for x in numbers(3, unit)])
     elif kind == "place at the target":
         if state.target is None:
             raise InvalidInput("target", "none", "set in the tab Move")
@@ -165,9 +160,9 @@ def add_need(session: Session, kind: str, text: str) -> None:
         _keep(session, _limited(needs, shortening=numbers(1, "%")[0] / 100.0))
     else:
         inside = kind == "box to stay inside"
-        corners = np.array(session.scene.axes.corners) * state.design.length
-        if not (inside and empty):
-            corners = size * np.array(numbers(6)).reshape(2, 3)
+        corners = np.array(session.scene.axes.corners) * length
+        if not (inside and is_empty):
+            corners = size * np.array(numbers(6, unit)).reshape(2, 3)
         low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
         keep = Keep(Box(tuple(low), tuple(high)), inside, name=_unused("box", needs.keeps))
         _keep(session, needs.replace(keeps=(*needs.keeps, keep)))
@@ -187,8 +182,8 @@ def read_needs(session: Session, name: str, content: bytes) -> None:
         InvalidInput: The file is too large, no text, or lists too many places.
         InvalidDesign: It has no requirements, or names other files.
     """
-    text, length = text_of("file", name, content, LARGEST), session.state.design.length
-    _keep(session, needs_of_text(text, length=length, source=name))
+    length = session.state.design.length
+    _keep(session, needs_of_text(file_text(name, content), length=length, source=name))
 
 
 def _keep(session: Session, needs: Requirements) -> None:
@@ -198,14 +193,14 @@ def _keep(session: Session, needs: Requirements) -> None:
     session.update(lambda state: state.replace(needs=text))
 
 
-def needs_parts(needs: Requirements, unit: LengthUnit) -> dict[str, Callable[[], Requirements]]:
+def needs_parts(needs: Requirements, unit: LengthUnit) -> dict[str, Requirements]:
     """Every part in words -> the requirements without it."""
 
-    def without(field: str, out: object) -> Callable[[], Requirements]:
+    def without(field: str, out: object) -> Requirements:
         rest = tuple(each for each in getattr(needs, field) if each is not out)
-        return lambda: needs.replace(**{field: rest})
+        return needs.replace(**{field: rest})
 
-    parts: dict[str, Callable[[], Requirements]] = {}
+    parts: dict[str, Requirements] = {}
     for target in needs.targets:
         where = f" {unit.place(target.points[0])}" if len(target.points) == 1 else ""
         parts[target.name + where] = without("targets", target)
@@ -214,11 +209,10 @@ def needs_parts(needs: Requirements, unit: LengthUnit) -> dict[str, Callable[[],
     for mass in needs.payloads:
         parts[f"payload {1e3 * mass:.6g} g"] = without("payloads", mass)
     for name in needs.limits.given:
-        words = f"limit of {name.replace('_', ' ')}"
-        parts[words] = lambda name=name: _limited(needs, **{name: None})
+        parts[f"limit of {name.replace('_', ' ')}"] = _limited(needs, **{name: None})
     for name in needs.measures:
         rest = {each: ends for each, ends in needs.measures.items() if each != name}
-        parts[f"measure {name}"] = lambda rest=rest: needs.replace(measures=rest)
+        parts[f"measure {name}"] = needs.replace(measures=rest)
     return parts
 
 
@@ -265,13 +259,15 @@ def measured(panel: Fields) -> None:
     """Measured poses: their markers over the arm, a fit to them, and the calibrated design."""
     session = panel.session
     with panel.folder("measured poses", expanded=False):
-        panel.upload(
-            "Load measured poses (CSV)", lambda file: _read_poses(session, file), _ABOUT_LOAD
-        )
+        read = lambda file: _read_poses(session, file)
+        panel.upload("Load measured poses (CSV)", read, _ABOUT_LOAD)
         panel.text("found.bench", content=lambda _, found: _bench_text(found.bench))
         with panel.folder("samples", "found.bench"):
-            move = lambda number: _step_to(session, number)
-            panel.steps("sample", "found.bench", at=_at_sample, move=move, hint=_ABOUT_SAMPLE)
+            at = lambda _, found: (
+                (found.bench.number, len(found.bench.data) - 1) if found.bench else (0, 1)
+            )
+            move = partial(_step_to, session)
+            panel.steps("sample", "found.bench", at=at, move=move, hint=_ABOUT_SAMPLE)
             follows = "design", "found.bench", "found.sample"
             panel.text(*follows, content=lambda state, found: [_residuals_text(state, found)])
             for name, label in _FREE.items():
@@ -283,10 +279,6 @@ def measured(panel: Fields) -> None:
             panel.button("Apply", lambda: _apply(session), about, fitted)
 
 
-def _at_sample(_: StudioState, found: Found) -> tuple[int, int]:
-    return (found.bench.number, len(found.bench.data) - 1) if found.bench else (0, 1)
-
-
 def _is_free(name: str) -> Attribute:
     """Whether a fit may change a number; that of the pose before there are data."""
 
@@ -296,9 +288,7 @@ def _is_free(name: str) -> Attribute:
         free = tuple(each for each in _FREE if (on if each == name else each in found.bench.free))
         return replace(found, bench=replace(found.bench, free=free))
 
-    def read(found: Found) -> bool:
-        return name in (found.bench.free if found.bench is not None else ("pose",))
-
+    read = lambda found: name in (found.bench.free if found.bench else ("pose",))
     return Attribute(read, write, "found")
 
 
@@ -357,15 +347,12 @@ def _summary(bench: Bench | None) -> str:
     if result is None:
         return ""
     report = result.report()
-    parts, lines = [], []
-    for part in report.sections:
-        if part.rows and part.printed:
-            parts.append(markup.table(part.head, [[(cell,) for cell in row] for row in part.rows]))
-        lines += part.points
-    lines.append(report.verdict)
+    printed = [part for part in report.sections if part.rows and part.printed]
+    tables = [markup.table(part.head, part.rows) for part in printed]
+    lines = [*(line for part in report.sections for line in part.points), report.verdict]
     if not result.fit.converged:
         lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
-    return "".join([*parts, *map(markup.paragraph, lines)])
+    return "".join([*tables, *map(markup.paragraph, lines)])
 
 
 # Jobs
@@ -375,6 +362,16 @@ _ACCURACY = 0.03  # of shares that are covered, and of distances between station
 _PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
 _POSES = ("reach", "cover", "stay_inside", "avoid")
 """Kinds of findings that other poses may change."""
+VERDICTS = {
+    "met": eight_bit(palette.MET),
+    "missed": eight_bit(palette.MISSED),
+    "undecided": (200, 130, 0),
+}
+"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
+_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
+_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
+_MOST_LABELS = 20  # more would hide each other
+_MEASURED = 0.03  # edge of a dot [L]
 
 
 def _check(given: Given) -> Results:
@@ -390,13 +387,52 @@ def _check(given: Given) -> Results:
         yield Learned({"check": None, "check_refusal": str(error)})
         return
     yield Learned({"check": quick, "check_refusal": ""})
-    if all(finding.met or finding.kind not in _POSES for finding in quick.findings):
+    if any(not finding.met and finding.kind in _POSES for finding in quick.findings):
+        rest(given.check, _PAUSE)
+        progress = lambda _: given.check()
+        with no_warnings():
+            made = check(quick.arm, quick.requirements, accuracy=_ACCURACY, progress=progress)
+        yield Learned({"check": made})
+
+
+def _draw_needs(given: Given) -> None:
+    """The places and regions of a design that was judged."""
+    check, scene = given.found.check, given.scene
+    scene.remove("/needs")
+    if check is None:
         return
-    rest(given.check, _PAUSE)
-    progress = lambda _: given.check()
-    with no_warnings():
-        made = check(quick.arm, quick.requirements, accuracy=_ACCURACY, progress=progress)
-    yield Learned({"check": made})
+    if len(check.places):
+        _draw_places(check, scene)
+    length, needs = check.arm.length, check.requirements
+    around, verdicts = (
+        length * np.array(scene.axes.corners),
+        {(f.kind, f.name): f.verdict for f in check.findings},
+    )
+    named = [(keep.kind, keep.name, keep.region) for keep in needs.keeps]
+    named += [("cover", t.name, t.region) for t in needs.targets if t.region is not None]
+    for k, (kind, name, region) in enumerate(named):
+        verdict = verdicts.get((kind, name), "met")
+        lines = np.concatenate([pieces(line / length) for line in region.wireframe(around)])
+        is_met = verdict == "met"
+        color, width = (_REGION[kind], _FINE) if is_met else (VERDICTS[verdict], _BROAD)
+        scene.lines(f"/needs/region {k}", lines, color, width)
+
+
+def _draw_places(check: Check, scene: Scene) -> None:
+    length, rows = check.arm.length, np.arange(len(check.places))
+    places, met = check.places / length, check.reached.all(axis=0)
+    worst = check.gaps.argmax(axis=0)  # of the payloads
+    gaps, nearest = check.gaps[worst, rows], check.nearest[worst, rows] / length
+    scene.dots("/needs/reached", places[met], VERDICTS["met"], _BALL)
+    missed = np.flatnonzero(~met)
+    arms = _CROSS * np.array([[1, 0, 1], [1, 0, -1], [0, 1, 0]]) / np.sqrt([[2], [2], [1]])
+    cross = places[missed][:, None, None] + np.stack([-arms, arms], axis=1)
+    scene.lines("/needs/missed", cross.reshape(-1, 2, 3), VERDICTS["missed"], _BROAD)
+    ways = np.stack([places, nearest], axis=1)[missed]
+    scene.lines("/needs/gaps", ways, VERDICTS["missed"], _FINE)
+    for k in missed[:_MOST_LABELS]:
+        text = check.arm.length_unit.rounded(float(gaps[k]), digits=".3g")
+        add_label(scene.api, f"/needs/label {k}", text, places[k] + [0.0, 0.0, 2.0 * _CROSS])
 
 
 def _predict(given: Given) -> Results:
@@ -414,11 +450,15 @@ def _predict(given: Given) -> Results:
 
 
 def _draw_sample(given: Given) -> None:
+    """Measured and predicted markers, lines between them, and the arm that predicts."""
     sample, design, scene = given.found.sample, given.state.design, given.scene
     if sample is None:
         scene.remove("/sample")
         return
-    scene.draw_sample(sample.measured / design.length, sample.predicted / design.length)
+    measured, predicted = sample.measured / design.length, sample.predicted / design.length
+    scene.dots("/sample/measured", measured, MARK, _MEASURED)
+    scene.dots("/sample/predicted", predicted, DARK, MARKER)
+    scene.lines("/sample/residuals", np.stack([measured, predicted], axis=1), MARK, 0.005)
     if sample.arm == design:
         scene.remove("/sample/arm")
     else:
@@ -444,21 +484,12 @@ def _fit(given: Given) -> Results:
 JOBS = (
     Job(
         "needs",
-        "design needs",
+        "design design.display_unit needs",
         _check,
-        lambda given: given.scene.draw_needs(given.found.check),
+        _draw_needs,
         wanted="needs",
         makes="check",
-        draws="/needs",
     ),
-    Job(
-        "sample",
-        "design activation found.bench",
-        _predict,
-        _draw_sample,
-        wanted="found.bench",
-        makes="sample",
-        draws="/sample",
-    ),
+    Job("sample", "design activation found.bench", _predict, _draw_sample, wanted="found.bench"),
     Job("fit", "", _fit, doing="calibrating"),
 )

@@ -18,25 +18,15 @@ from softreach.inverse.path import PathStatus, end_text, track_path
 from softreach.inverse.request import positions_in
 from softreach.schema import input_symbols
 from softreach.studio.captions import place_text, tip_text
-from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
+from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute, file_text
 from softreach.studio.found import Found, Lag, Pull
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
-from softreach.studio.scene.scene import MOST_BUNDLES
+from softreach.studio.scene.scene import DARK, MARK, MOST_BUNDLES, pieces
 from softreach.studio.session import Session
-from softreach.studio.state import (
-    LARGEST,
-    MOST_POINTS,
-    MOUSE,
-    StudioState,
-    TipPath,
-    rod_of,
-    solvable_rod,
-    vector,
-)
+from softreach.studio.state import MOUSE, StudioState, TipPath, rod_of, solvable_rod, vector
 from softreach.studio.widgets import TypedField, vector_kind
 from softreach.support.errors import InvalidInput
-from softreach.support.files.text import text_of
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -69,7 +59,7 @@ def drag(panel: Fields) -> None:
 
     def place(state: StudioState, found: Found) -> None:
         arm, look, lag = state.design, state.appearance, found.lag
-        grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
+        grasped = look.mouse == "tip" and look.arm and rod_of(arm).box.dimension > 0
         grasped = grasped and found.sample is None  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
         clear = state.path is not None
@@ -79,7 +69,7 @@ def drag(panel: Fields) -> None:
 
     def text(state: StudioState, found: Found) -> list[str]:
         gap = _gap(state, found)
-        if gap or not state.appearance.handle:
+        if gap or state.appearance.mouse != "tip":
             return [f"This branch ends {gap} short of the pointer."] if gap else []
         return [_DRAG_HINT]
 
@@ -105,9 +95,8 @@ def activation(panel: Fields) -> None:
     """Activations of the bundles within their bounds, and the place of the tip."""
     follows = "design", "found.tip", "found.pointing", "found.posture"
     panel.text(*follows, content=lambda state, found: tip_text(found, state.design))
-    with panel.folder("activation") as folder:
-        ends = lambda state, _: _slider_ends(state.design)
-        panel.anew(folder, "design", key=ends, build=_sliders)
+    ends = lambda state, _: _slider_ends(state.design)
+    panel.anew("activation", "design", key=ends, build=_sliders)
     rest = "Sets every activation to 0, or the nearest to it"
     panel.change("Rest", lambda state: state.replace(activation=()), rest, **GRAY)
 
@@ -131,13 +120,12 @@ def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
 
 def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
     """Label and bounds of every bundle."""
-    symbols, units = input_symbols(arm), arm.input_units
-    kinds = [_KINDS.get(unit) for unit in units]
-    labels = [
-        (f"{kind} of {name}" if kind else f"{symbol} {name}") + (unit != "1") * f" [{unit}]"
-        for kind, symbol, name, unit in zip(kinds, symbols, arm.input_names, units, strict=True)
-    ]
-    return [(label, *ends) for label, ends in zip(labels, rod_of(arm).box.bounds, strict=True)]
+    ends = []
+    numbers = input_symbols(arm), arm.input_names, arm.input_units, rod_of(arm).box.bounds
+    for symbol, name, unit, (low, high) in zip(*numbers, strict=True):
+        label = f"{_KINDS[unit]} of {name}" if unit in _KINDS else f"{symbol} {name}"
+        ends.append((label + (unit != "1") * f" [{unit}]", low, high))
+    return ends
 
 
 # A target, and every activation that reaches it
@@ -148,9 +136,8 @@ _NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solut
 
 def target(panel: Fields) -> None:
     """The target, and the activations that reach it, in the unit of the design."""
-    with panel.folder("reach a place") as folder:
-        unit = lambda state, _: state.design.length_unit
-        panel.anew(folder, "design", key=unit, build=_target)
+    unit = lambda state, _: state.design.length_unit
+    panel.anew("reach a place", "design", key=unit, build=_target)
 
 
 def _target(panel: Fields, unit: LengthUnit) -> None:
@@ -168,8 +155,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
 
     panel.follow("target", show=follow)
     some = lambda _, found: found.answer is not None and len(found.answer) > 0
-    with panel.folder("activations that reach it", some) as solutions:
-        panel.anew(solutions, "found.answer", build=_solutions)
+    panel.anew("activations that reach it", "found.answer", build=_solutions, shown=some)
     about, off = "Takes target and solutions away", lambda state: state.replace(target=None)
     panel.change("Clear the target", off, about, "target", **GRAY)
 
@@ -232,13 +218,13 @@ def path(panel: Fields) -> None:
         about, off = "and what was found along it", lambda state: state.replace(path=None)
         panel.change("Remove the path", off, about, "path", **GRAY)
         panel.text("design", "path", "found.track", content=_path_text)
-        with panel.folder("along it", lambda state, found: _followed(state, found) > 0):
+        with panel.folder("along it", lambda *known: len(_followed(*known)) > 0):
             plays = {"Play": lambda: session.follow("play"), "Stop": lambda: session.stop("play")}
             panel.choices("", plays, "the arm along the path, from the point that is chosen")
-            at = lambda s, found: (s.path.at if s.path else 0, max(_followed(s, found) - 1, 0))
-            move = lambda point: _step_to(session, point)
+            at = lambda s, found: (s.path.at if s.path else 0, max(len(_followed(s, found)) - 1, 0))
             hint = "point of the path where the arm is"
-            panel.steps("point", "path", "found.track", at=at, move=move, hint=hint)
+            follows = "path", "found.track"
+            panel.steps("point", *follows, at=at, move=partial(_step_to, session), hint=hint)
 
             def save() -> None:
                 if (track := _track(session.state, session.found)) is not None:
@@ -254,10 +240,11 @@ def _track(state: StudioState, found: Found) -> xr.Dataset | None:
     return track if fits else None
 
 
-def _followed(state: StudioState, found: Found) -> int:
-    """Number of points of the path that are followed."""
-    track = _track(state, found)
-    return 0 if track is None else int((track.status == PathStatus.FOLLOWED).sum())
+def _followed(state: StudioState, found: Found) -> np.ndarray:
+    """Activations at the points of the path as far as the arm follows it, shape (k, bundles)."""
+    if (track := _track(state, found)) is None:
+        return np.empty((0, len(state.activation)))
+    return track.activation.values[track.status.values == PathStatus.FOLLOWED]
 
 
 def _path_text(state: StudioState, found: Found) -> list[str]:
@@ -278,9 +265,7 @@ def extend_path(session: Session, point: np.ndarray) -> None:
 
 
 def _read_path(session: Session, file: UploadedFile) -> None:
-    points = positions_in(text_of("file", file.name, file.content, LARGEST), file.name)
-    if not 2 <= len(points) <= MOST_POINTS:
-        raise InvalidInput(file.name, f"{len(points)} points", f"2 to {MOST_POINTS} points")
+    points = positions_in(file_text(file.name, file.content), file.name)
     state = session.state
     near = np.linalg.norm(_tip(state) - points[0]) < 1e-3 * state.design.length
     read = TipPath.through(points, state.activation if near else None)
@@ -288,9 +273,8 @@ def _read_path(session: Session, file: UploadedFile) -> None:
 
 
 def _step_to(session: Session, point: int) -> None:
-    track = _track(session.state, session.found)
-    if track is not None:
-        session.update(lambda state: at_point(state, track.activation.values, point))
+    activations = _followed(session.state, session.found)
+    session.update(lambda state: _at_point(state, activations, point))
 
 
 def _tip(state: StudioState) -> np.ndarray:
@@ -308,6 +292,8 @@ _FAMILY = 6  # shapes offered where infinitely many reach the target
 _DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
 _RESIDUAL = 1e-8  # [L]
 _STEP = 0.05  # [s] between points that are played
+_TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
+_PALE = (240, 175, 205)  # of a path, where the arm does not follow it
 
 
 def _solve(given: Given) -> Results:
@@ -329,15 +315,19 @@ def _solve(given: Given) -> Results:
 
 
 def _draw_answer(given: Given) -> None:
+    """The shapes that reach the target, a ball there, or a line to the nearest place in reach."""
     answer, design, scene = given.found.answer, given.state.design, given.scene
-    scene.remove("/ghosts")
+    scene.remove("/ghosts", "/target", "/gap")
     if answer is None:
-        scene.draw_target(None)
         return
-    nearest = None if len(answer) else answer.nearest / design.length
-    scene.draw_target(answer.target / design.length, nearest)
+    target, nearest = answer.target / design.length, answer.nearest / design.length
+    scene.ball("/target", _TARGET, MARK, target)
+    if not len(answer):
+        scene.lines("/gap", pieces(np.stack([target, nearest])), MARK, 0.004)
+        scene.ball("/gap/nearest", _NEAREST, DARK, nearest)
     shapes = answer.activations if len(answer) else answer.nearest_activation[None]
-    scene.draw_ghosts(design, shapes)
+    for k, activation in enumerate(shapes):
+        scene.draw_arm(design, activation.tolist(), f"/ghosts/{k}")
 
 
 def _follow_tip(given: Given) -> Results:
@@ -381,42 +371,36 @@ def _follow(given: Given) -> Results:
 
 
 def _draw_path(given: Given) -> None:
-    path, track, length = given.state.path, given.found.track, given.state.design.length
+    """The path, pale, and as far as the arm follows it, dark; a ball where that ends."""
+    path, scene, length = given.state.path, given.scene, given.state.design.length
+    scene.remove("/path")
     if path is None:
-        given.scene.remove("/path")
         return
-    points, done = np.array(path.points), np.empty((0, 3))
-    if track is not None and track.sizes["point"] == len(points):
-        done = points[track.status.values == PathStatus.FOLLOWED]
-        if len(done) and len(done) < len(points):
-            done = np.concatenate([done, track.end_position.values[None]])
-    given.scene.draw_path(points / length, done / length)
+    points, track = np.array(path.points), _track(given.state, given.found)
+    done = points[: len(_followed(given.state, given.found))]
+    if track is not None and 0 < len(done) < len(points):
+        end = track.end_position.values
+        done = np.concatenate([done, end[None]])
+        scene.ball("/path/end", _END, DARK, end / length)
+    for name, line, color in (("all", points, _PALE), ("followed", done, MARK)):
+        scene.lines(f"/path/{name}", pieces(line / length), color, 0.006)
 
 
 def _play(given: Given) -> Results:
-    track, path = given.found.track, given.state.path
-    if track is None or path is None:
-        return
-    count = int((track.status == PathStatus.FOLLOWED).sum())
-    activations = track.activation.values
-    for point in range(path.at if path.at < count - 1 else 0, count):
+    path, activations = given.state.path, _followed(given.state, given.found)
+    start = path.at if path is not None and path.at < len(activations) - 1 else 0
+    for point in range(start, len(activations)):
         given.check()
-        yield Learned(change=lambda now, k=point: at_point(now, activations, k))
+        yield Learned(change=lambda now, k=point: _at_point(now, activations, k))
         time.sleep(_STEP)
 
 
-def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioState:
-    """The arm at a point of its path, with one of the activations there, shape (k, bundles).
-
-    The state stays as it is where the path is not followed.
-    """
-    if state.path is None or point >= len(state.path.points) or point >= len(activations):
-        return state
-    there = activations[point]
-    if not np.isfinite(there).all():
+def _at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioState:
+    """The arm at a point of its path; the state as it is if the path is another one by now."""
+    if state.path is None or point >= min(len(state.path.points), len(activations)):
         return state
     path = replace(state.path, at=point)
-    return state.replace(path=path, activation=tuple(there.tolist()))
+    return state.replace(path=path, activation=tuple(activations[point].tolist()))
 
 
 JOBS = (
@@ -439,7 +423,6 @@ JOBS = (
         _draw_path,
         wanted="path",
         makes="track",
-        draws="/path",
         doing="following the path",
     ),
     Job("play", "", _play),

@@ -19,9 +19,9 @@ from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.colors import color_names, key_html, shown_color
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
-from softreach.studio.state import StudioState
+from softreach.studio.state import AXES, StudioState
 from softreach.studio.tabs.goals import verdict_text
-from softreach.support.units import LengthUnit
+from softreach.support.units import UNITS, LengthUnit
 
 _HISTORY_HINT = (
     "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
@@ -30,7 +30,7 @@ _HISTORY_HINT = (
 _NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
 _ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
-_WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.compiled", "tab.canceled"
+_WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.canceled"
 
 
 def status(panel: Fields) -> None:
@@ -44,10 +44,9 @@ def status(panel: Fields) -> None:
     def offer(_: StudioState, found: Found) -> None:
         lacking = is_behind(session) and not found.refusal
         label = _GO_ON if lacking and not session.busy else _CANCEL
-        if cancel.label != label:
-            cancel.label = label
-        if cancel.visible != (session.busy or lacking):
-            cancel.visible = not cancel.visible
+        shown = lacking or session.busy
+        if (cancel.label, cancel.visible) != (label, shown):
+            cancel.label, cancel.visible = label, shown
 
     panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
     toast: Any = None
@@ -71,16 +70,16 @@ def status(panel: Fields) -> None:
 def _numbers(session: Session, found: Found) -> str:
     """What is known, and whether it is about to change."""
     check, reach = found.check, found.reach
-    lines = [_reach_line(session), [verdict_text(check)] if check is not None else []]
-    marks: list[list[Part]] = []
+    above = [_reach_line(session), [verdict_text(check)] if check is not None else []]
+    below: list[list[Part]] = []
     if reach is not None:
-        marks.append(legend_text(reach, free=found.free is not None))
+        below.append(legend_text(reach, free=found.free is not None))
         if reach.refusal:
-            marks.append([f"No exact volume: {reach.refusal}"])
+            below.append([f"No exact volume: {reach.refusal}"])
         if reach.fine and reach.notes:
-            marks.append([f"{'; '.join(reach.notes)}."])
-    above, below = ([markup.paragraph(*line) for line in each] for each in (lines, marks))
-    return markup.status(*above, key_html(found.key), *below)
+            below.append([f"{'; '.join(reach.notes)}."])
+    lines = [markup.paragraph(*line) for line in (*above, *below)]
+    return markup.status(*lines[:2], key_html(found.key), *lines[2:])
 
 
 def is_behind(session: Session) -> bool:
@@ -92,29 +91,25 @@ def _reach_line(session: Session) -> list[Part]:
     found, design, work = session.found, session.state.design, _work(session)
     if found.reach is None:
         return [found.refusal or work]
-    parts = reach_text(found.reach, loaded_share(found, design))
-    if found.reach.arm != design:
-        parts = [Strong("of the design before: "), *parts]
-    return [*parts, *([f" · {work}"] if work else [])]
+    before = [Strong("of the design before: ")] * (found.reach.arm != design)
+    numbers = reach_text(found.reach, loaded_share(found, design))
+    return [*before, *numbers, *([f" · {work}"] if work else [])]
 
 
 def _work(session: Session) -> str:
-    if session.compiling:
-        done = f", {session.compiled} kernels so far" if session.compiled else ""
-        return f"compiling, once on this machine{done} ..."
+    if words := session.compiling:
+        return words
     if session.doing:
         return f"{session.doing} ..."
     if not is_behind(session):
         return ""
-    if session.busy:
-        return "computing ..."
-    return "canceled" if session.canceled else "not computed"
+    idle = "canceled" if session.canceled else "not computed"
+    return "computing ..." if session.busy else idle
 
 
 # Looks
 
 
-_ACROSS = {axis: axis for axis in ("none", "x", "y", "z")}
 _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, from the map itself"),
@@ -133,16 +128,22 @@ def view(panel: Fields) -> None:
     )
     about = "What the color of a point says; the key is above the tabs"
     panel.dropdown("color by", offered, color, about)
+    lengths = Attribute(
+        lambda state: state.design.length_unit.name, lambda state, name: state.showing(unit=name)
+    )
+    about = "Unit of lengths, and those of areas and volumes beside it: here and in saved files"
+    panel.dropdown("unit", {name: name for name in UNITS}, lengths, about)
     with panel.folder("show"):
         for name, (label, hint) in _TOGGLES.items():
             panel.checkbox(label, attribute(f"appearance.{name}"), hint)
     looks = {name: lambda name=name: panel.session.look_from(name) for name in VIEWS}
     panel.choices("look from", looks, "Along an axis of the world, or between them")
     axis = attribute("appearance.slice.axis")
-    panel.dropdown("slice across", _ACROSS, axis, "Hides all but a slab across this axis")
-    with panel.folder("slab", lambda state, _: axis.read(state) != "none") as slab:
-        size = lambda state, _: (state.design.length_unit, state.design.length)
-        panel.anew(slab, "design", key=size, build=_center)
+    across = {axis: axis for axis in AXES}
+    panel.dropdown("slice across", across, axis, "Hides all but a slab across this axis")
+    size = lambda state, _: (state.design.length_unit, state.design.length)
+    is_cut = lambda state, _: axis.read(state) != "none"
+    panel.anew("slab", "design", key=size, build=_center, shown=is_cut)
 
 
 def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
@@ -215,11 +216,10 @@ def _figure(panel: Fields, name: str) -> None:
             image.image, image.visible = picture.image, True
 
     def text(state: StudioState, found: Found) -> tuple[str, ...]:
-        picture = known(found)
-        if picture is None:
+        if (picture := known(found)) is None:
             return ("computing ...",)
-        old = picture.arm != state.design
-        return (picture.text, " · of the design before, computing ..." if old else "")
+        before = " · of the design before, computing ..."
+        return (picture.text, before * (picture.arm != state.design))
 
     with panel.folder(_PLOTS[name][0], f"appearance.{name}"):
         image = panel.gui.add_image(_NOTHING, format="png", visible=False)
