@@ -10,7 +10,14 @@ from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.rod.kinematics import marker_positions
-from tests.calibration.arms import MODULUS, hanging_tentacle, measured, pulled_wire, random_inputs
+from tests.calibration.arms import (
+    MODULUS,
+    hanging_tentacle,
+    measured,
+    pulled_wire,
+    random_inputs,
+    table,
+)
 
 
 def test_poses_without_noise_lead_back_to_the_arm():
@@ -97,11 +104,51 @@ def test_bands_are_those_of_the_arms_that_are_as_likely():
     arm = hanging_tentacle()
     result = sr.calibrate(arm, measured(arm, 20, noise=1e-3), free=FREE[:2], rivals=False)
     inputs = random_inputs(arm, 3, seed=9)
-    places, sigma = result.predict(inputs)
+    places, sigma = result.predict(inputs, numbers_only=True)
     np.testing.assert_allclose(places, marker_positions(result.arm, inputs, 1e-9), atol=1e-7)
     best, spread = result.band(lambda other: marker_positions(other, inputs), count=200)
     np.testing.assert_allclose(best, places, atol=1e-6)
     np.testing.assert_allclose(spread, sigma, rtol=0.3, atol=1e-6)
+
+
+def test_predictions_hold_measured_places_as_often_as_they_say():
+    """Markers differ in noise, and so do directions."""
+    arm, rng = hanging_tentacle(), np.random.default_rng(5)
+    noise = np.array([[4e-4, 8e-4, 2e-3], [3e-3, 1e-3, 5e-4]])
+    inputs, later = random_inputs(arm, 60), random_inputs(arm, 500, seed=9)
+    places = marker_positions(arm, inputs, 1e-9)
+    places += noise * rng.standard_normal(places.shape)
+    data = table(places, inputs, arm.input_names, ["half", "tool"])
+    for out in (0.0, 0.5):
+        result = sr.calibrate(arm, data, free=FREE, rivals=False, hold_out=out)
+        predicted, sigma = result.predict(later)
+        measured = marker_positions(arm, later, 1e-9)
+        measured += noise * rng.standard_normal(measured.shape)
+        # 95 % of a normal distribution; of 30 poses σ itself is known to 13 %.
+        held = (np.abs(predicted - measured) <= 2 * sigma).mean(axis=0)
+        assert held.min() > 0.88
+        assert held.max() < 0.99
+
+
+def test_whole_runs_are_held_out_where_there_are_eight():
+    arm = hanging_tentacle()
+
+    def fit(runs, **options):
+        data = measured(arm, 32, runs=runs)
+        options = {"free": [MODULUS], "rivals": False, "hold_out": 0.25} | options
+        return sr.calibrate(arm, data, **options)
+
+    many, few, chosen, single = fit(8), fit(4), fit(4, hold_out_runs=True), fit(1)
+    assert many.held_runs
+    assert chosen.held_runs
+    assert not few.held_runs
+    assert many.held.sum() == chosen.held.sum() == few.held.sum() == 8
+    assert "8 of other motions" in str(many)
+    assert "rows of one motion are neighbors" in str(few)
+    for result in (many, chosen, single):
+        assert "rows of one motion" not in str(result)
+    with pytest.raises(sr.NotPossible, match="two runs or more"):
+        fit(1, hold_out_runs=True)
 
 
 def test_a_row_that_names_no_run_leaves_the_others_theirs():

@@ -44,6 +44,7 @@ def calibrate(
     free: Free,
     prior: list[str] | None = None,
     hold_out: Number = 0.0,
+    hold_out_runs: Annotated[bool | None, Parameter(negative="--no-hold-out-runs")] = None,
     noise: str | None = None,
     robust: Annotated[bool, Parameter(negative="--no-robust")] = True,
     rivals: Annotated[bool, Parameter(negative="--no-rivals")] = True,
@@ -74,6 +75,7 @@ def calibrate(
             as in taper=1deg, or NAME=MEAN:WIDTH, as in
             rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
         hold_out: Fraction of samples held out at random.
+        hold_out_runs: Hold out whole runs. By default where the data has eight or more.
         noise: Standard deviation of a measured coordinate, which decides how much priors count:
             0.2mm. Estimated from the residuals if left out.
         robust: Down-weight outliers.
@@ -101,6 +103,7 @@ def calibrate(
             free=free_names(arm, free),
             prior=priors(arm, prior or ()),
             hold_out=hold_out,
+            hold_out_runs=hold_out_runs,
             noise=None if noise is None else _noise(noise),
             robust=robust,
             rivals=rivals,
@@ -140,6 +143,7 @@ def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
             {"law": row.law, "samples": row.samples, **_errors(row.errors)} for row in result.errors
         ],
         "correlated": result.correlated,
+        "doubts": result.doubts,
         "outlier_rows": result.outliers,
         "repeatability_rms_m": result.repeatability.rms,
         "repeated_samples": result.repeatability.pairs,
