@@ -6,6 +6,7 @@ import pytest
 import softreach as sr
 from softreach.calibration.calibration import leave_one_run_out
 from softreach.calibration.errors import judged, repeatability
+from softreach.calibration.fit import identifiable
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import read_measurements
 from softreach.calibration.model import MarkerModel
@@ -35,6 +36,19 @@ def test_poses_without_noise_lead_back_to_the_arm():
     assert result.values["t.distance"] == pytest.approx(0.009, rel=1e-3)
     assert result.values["rest.curvature_x"] == pytest.approx(0.0, abs=1e-2)
     np.testing.assert_allclose(result.arm.base.rotation, truth.base.rotation, atol=1e-3)
+
+
+def test_data_of_a_camera_without_a_scale_lead_back_to_the_arm():
+    truth = hanging_tentacle()
+    data = measured(truth, 12, noise=0.0)
+    data |= {name: 0.37 * x for name, x in data.items() if name.endswith("_mm")}
+    free = ["scale", "pose", "t.distance"]
+    start = truth.replace(actuators=(truth.actuators[0].replace(distance=0.008),))
+    result = sr.calibrate(start, data, free=free, rivals=False, robust=False)
+    assert result.train.rms < 1e-6
+    assert result.values["scale"] == pytest.approx(0.37, rel=1e-4)
+    assert result.values["t.distance"] == pytest.approx(0.009, rel=1e-3)
+    assert result.errors_on(data).rms < 1e-6
 
 
 def test_tendons_driven_by_length_are_found_with_their_slack():
@@ -207,6 +221,16 @@ def test_places_are_those_of_the_markers_or_of_the_tip(arm):
         np.testing.assert_allclose(places[:, 0], sr.tip_positions(arm, inputs, 1e-9), atol=2e-7)
 
 
+def test_only_the_numbers_that_trade_are_refused(rng):
+    free = free_numbers(hanging_tentacle(), [MODULUS, "t.distance", "pose"])
+    slopes = rng.standard_normal((60, len(free))) / free.scale
+    identifiable(free, slopes)
+    slopes[:, 3] = (slopes[:, 2] * free.scale[2] - slopes[:, 4] * free.scale[4]) / free.scale[3]
+    slopes[:, 7] = -2.0 * slopes[:, 6] * free.scale[6] / free.scale[7]
+    with pytest.raises(sr.InvalidInput, match="^free = pose.ry, pose.rz: must be numbers that"):
+        identifiable(free, slopes)
+
+
 def by_differences(model, values, way):
     """Derivative of places along a direction of the values, of fourth order."""
     step = 2e-3
@@ -216,6 +240,7 @@ def by_differences(model, values, way):
 
 TENTACLE = [
     "pose",
+    "scale",
     "rings[0].material.young_modulus",
     "rings[0].material.density",
     "rings[0].material.poisson_ratio",
@@ -262,7 +287,7 @@ WIRE = [
 def test_derivatives_are_those_of_differences(arm, free, share, each, rng):
     """By each number, or along two directions in which all of them change."""
     model = model_of(arm, free, share * random_inputs(arm, 2, seed=3))
-    values = model.free.start
+    values = model.free.start * np.where(np.array(model.free.names) == "scale", 1.3, 1.0)
     slopes = model.predict(values, slopes=True).slopes
     assert slopes is not None
     count = len(values)

@@ -29,6 +29,9 @@ from softreach.support.errors import InvalidDesign, InvalidInput, Range
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
 
+SCALE = "scale"
+"""Lengths of the data over those of the arm, seen from its base: of a camera without a scale."""
+
 _PLACES = ("station", "start", "end")  # Numbers in m that lie on the arm
 _UNFIT = re.compile(r"(.*\.)?(lower|upper)(\[\d+\])?|base\..*|loads\.(follower|tip_moment).*")
 """Numbers that no wildcard frees: bounds, what the pose frees, loads without a derivative."""
@@ -93,21 +96,25 @@ class FreeNumbers:
         for number, value in zip(self.numbers, values.tolist(), strict=True):
             if number.name in POSE:
                 pose[number.name] = value
-            else:
+            elif number.name != SCALE:
                 paths |= dict.fromkeys(_tied(number.name), value)
         arm = with_values(self.arm, {each: paths[x] for x, each in self._parameters.items()})
         return arm.replace(base=_moved(arm.base, pose)) if pose else arm
 
     @cached_property
     def _parameters(self) -> dict[str, Parameter]:
-        names = [number.name for number in self.numbers if number.name not in POSE]
+        names = [number.name for number in self.numbers if number.name not in (*POSE, SCALE)]
         return find_parameters(self.arm, tuple(path for name in names for path in _tied(name)))
 
-    def neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator | Base]]:
+    def scaled(self, values: Array) -> float:
+        """Lengths of the data over those of the arm at these values, 1 unless that is free."""
+        return float(values[self.names.index(SCALE)]) if SCALE in self.names else 1.0
+
+    def neighbors(self, values: Array, k: int) -> list[tuple[float, Manipulator | Base | float]]:
         """Arms around these values along one number, with the factors of a derivative by it.
 
         Differences of fourth order, inside the range of the number; of a number of the pose the
-        bases alone.
+        bases alone, of the scale its values.
         """
         number, value, (low, high) = self.numbers[k], float(values[k]), self.bounds
         step, points = _STEP * max(number.scale, abs(value)), _CENTRAL
@@ -115,11 +122,13 @@ class FreeNumbers:
             points = _FORWARD
         elif value + 2 * step > high[k]:
             points, step = _FORWARD, -step
-        result: list[tuple[float, Manipulator | Base]] = []
+        result: list[tuple[float, Manipulator | Base | float]] = []
         for offset, factor in points:
             other = values.copy()
             other[k] = value + offset * step
-            if number.name in POSE:
+            if number.name == SCALE:
+                made = float(other[k])
+            elif number.name in POSE:
                 pairs = zip(self.names, other.tolist(), strict=True)
                 made = _moved(self.arm.base, {name: x for name, x in pairs if name in POSE})
             else:
@@ -142,7 +151,8 @@ def free_numbers(
     Args:
         arm: The design.
         free: Paths of parameters, with `*` for any text; several tied by "=" have one value;
-            "pose" for the base; "pose.position" and "pose.rotation" for parts of it.
+            "pose" for the base; "pose.position" and "pose.rotation" for parts of it; "scale" for
+            the lengths of the data.
         prior: Mean and width of what is known of a number, by its name; a width alone is about the
             value of the design.
 
@@ -174,6 +184,9 @@ def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
     for name in free:
         if name == "pose" or name.startswith("pose."):
             yield from _of_pose(arm, name)
+            continue
+        if name == SCALE:
+            yield FreeNumber(name=SCALE, unit="1", start=1.0, range=Range(1e-3, 1e3), scale=0.02)
             continue
         paths = _tied(name)
         if "*" in name:

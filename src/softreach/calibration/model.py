@@ -60,6 +60,7 @@ class _Explicit(NamedTuple):
     table: NodeTables
     rotation: Array
     position: Array
+    scale: float | Array  # Of the data
     offsets: Array
     bundles: Array  # Activations of all bundles, displacements among them, (n, bundle)
     taut_from: Array
@@ -109,18 +110,21 @@ class MarkerModel:
         Raises:
             InvalidDesign: No such arm can exist.
         """
-        return self.of_arm(self.free.made(values), values if slopes else None)
+        arm, scale = self.free.made(values), self.free.scaled(values)
+        return self.of_arm(arm, scale, values if slopes else None)
 
-    def of_arm(self, arm: Manipulator, values: Array | None = None) -> Prediction:
-        """Places of the markers of an arm that has these values."""
+    def of_arm(
+        self, arm: Manipulator, scale: float = 1.0, values: Array | None = None
+    ) -> Prediction:
+        """Places of the markers of an arm, in data of a scale; derivatives where it has values."""
         free, stations = self.free, marker_stations(arm)[0][self.markers]
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
-        neighbors: list[list[tuple[float, Manipulator | Base]]] = []
+        neighbors: list[list[tuple[float, Manipulator | Base | float]]] = []
         if values is not None:
             neighbors = [free.neighbors(values, k) for k in range(len(free))]
         blocks = [
-            self._block(arm, neighbors, grid, rows, values is not None)
+            self._block(arm, scale, neighbors, grid, rows, values is not None)
             for rows in parallel.blocks(len(self.inputs), _BLOCK)
         ]
         places, slopes, status = zip(*blocks, strict=True)
@@ -130,7 +134,7 @@ class MarkerModel:
             np.concatenate(status),
         )
 
-    def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
+    def _explicit(self, arm: Manipulator, scale: float, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm)
         body, driving = body_of(arm), Driving(arm)
         law = driving.law
@@ -148,6 +152,7 @@ class MarkerModel:
             table,
             arm.base.rotation,
             np.array(arm.base.position),
+            scale,
             offsets[self.markers],
             driving.bundles(inputs),
             law.taut_from,
@@ -159,13 +164,14 @@ class MarkerModel:
     def _block(
         self,
         arm: Manipulator,
-        neighbors: list[list[tuple[float, Manipulator | Base]]],
+        scale: float,
+        neighbors: list[list[tuple[float, Manipulator | Base | float]]],
         grid: StepGrid,
         rows: slice,
         slopes: bool,
     ) -> tuple[Array, Array | None, NDArray[np.int8]]:
         inputs = self.inputs[rows]
-        at = self._explicit(arm, grid, inputs)
+        at = self._explicit(arm, scale, grid, inputs)
         body = body_of(arm)
         bounds = body.bounds * 0.0  # which decide nothing
         bounds[arm.bundles :] = 1.0
@@ -179,7 +185,7 @@ class MarkerModel:
         gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
         state = rod_state(rod, gamma, at.table)
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
-        places = at.position + _beyond(at, state)[1] @ at.rotation.T
+        places = at.position + at.scale * _beyond(at, state)[1] @ at.rotation.T
         places[lost] = np.nan
         if not slopes:
             return places, None, state.status
@@ -194,19 +200,21 @@ class MarkerModel:
         self,
         arm: Manipulator,
         at: _Explicit,
-        neighbors: list[tuple[float, Manipulator | Base]],
+        neighbors: list[tuple[float, Manipulator | Base | float]],
         grid: StepGrid,
         inputs: Array,
     ) -> _Explicit:
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
-            if isinstance(other, Base):  # gravity alone is another one in its frame
+            if isinstance(other, float):
+                each.append(at._replace(scale=other))
+            elif isinstance(other, Base):  # gravity alone is another one in its frame
                 force = dead_force(arm, other, at.table.stations, at.table.length)
                 table = replace(at.table, force=force, weight=payload_weight(arm, other))
                 place = np.array(other.position)
                 each.append(at._replace(table=table, rotation=other.rotation, position=place))
             elif any(getattr(arm, part) != getattr(other, part) for part in _BODY):
-                each.append(self._explicit(other, grid, inputs))
+                each.append(self._explicit(other, at.scale, grid, inputs))
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([one.table for one in each], factors)
@@ -243,9 +251,10 @@ def _slopes(
     slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
     for k, change in enumerate(changes):
         slopes[..., k] += np.einsum("mk,nmka->nma", change.offsets, state.asked_directors)
-    slopes = np.einsum("ab,nmbk->nmak", at.rotation, slopes)
+    slopes = at.scale * np.einsum("ab,nmbk->nmak", at.rotation, slopes)
     for k, change in enumerate(changes):
-        slopes[..., k] += change.position + place @ change.rotation.T
+        turned = change.scale * at.rotation + at.scale * change.rotation
+        slopes[..., k] += change.position + place @ turned.T
     return slopes
 
 

@@ -120,7 +120,7 @@ class Calibration(Reported):
     @cached_property
     def residuals(self) -> Array:
         """Predicted minus measured places of all samples [m], (n, marker, 3)."""
-        return self._model(self.data).of_arm(self.arm).places - self.data.places
+        return self.residuals_on(self.data)
 
     @property
     def train(self) -> PlacementErrors:
@@ -203,7 +203,8 @@ class Calibration(Reported):
     def residuals_on(self, data: Any, **columns: Any) -> Array:
         """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
         table = read_measurements(self.start, data, **columns)
-        return self._model(table).of_arm(self.arm).places - table.places
+        scale = self.fit.free.scaled(self.fit.values)
+        return self._model(table).of_arm(self.arm, scale).places - table.places
 
     def predict(self, inputs: ArrayLike, *, numbers_only: bool = False) -> tuple[Array, Array]:
         """Places of the markers and the standard deviations to expect of measured ones.

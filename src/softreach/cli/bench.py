@@ -31,7 +31,7 @@ Free = Annotated[
     Parameter(
         help="Numbers that may change, comma-separated: names of softreach list parameters DESIGN, "
         "with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for "
-        "the base. May be repeated.",
+        "the base; scale for data of a camera without one. May be repeated.",
     ),
 ]
 
@@ -258,13 +258,14 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
         InvalidInput: Text that is anything else, or no such number.
     """
     from softreach.arm.written import Written
-    from softreach.calibration.free_numbers import POSE
+    from softreach.calibration.free_numbers import POSE, SCALE
 
     names, result = Written.of(arm), {}
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
     for name, text in pairs_in("prior", texts, allowed).items():
         first = name.split("=")[0].strip()
-        unit = None if first not in POSE else "m" if POSE.index(first) < 3 else "rad"
+        own = (*POSE, SCALE)
+        unit = dict(zip(own, ["m"] * 3 + ["rad"] * 3 + ["1"], strict=True)).get(first)
         if unit is None and first not in names.by_key:
             raise InvalidInput("prior", name, "NAME=WIDTH with the full name of a free number")
         try:
