@@ -227,7 +227,7 @@ def test_only_the_numbers_that_trade_are_refused(rng):
     identifiable(free, slopes)
     slopes[:, 3] = (slopes[:, 2] * free.scale[2] - slopes[:, 4] * free.scale[4]) / free.scale[3]
     slopes[:, 7] = -2.0 * slopes[:, 6] * free.scale[6] / free.scale[7]
-    with pytest.raises(sr.InvalidInput, match="^free = pose.ry, pose.rz: must be numbers that"):
+    with pytest.raises(sr.InvalidInput, match=r"^free = pose.ry, pose.rz: must be numbers that"):
         identifiable(free, slopes)
 
 
