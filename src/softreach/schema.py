@@ -29,17 +29,15 @@ _CELL = 1 / 20  # of the arm's length
 _EDGES = POSITIVE._replace(unit="m")
 
 # variable -> (dimensions, unit, meaning); that of an activation follows from the arm
-_CLOUD = {
-    "tip": (("sample", "axis"), "m", "tip position"),
-    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
-}
+_ACTIVATION = (("sample", "bundle"), None, "activation of each bundle; negative γ contracts")
+_CLOUD = {"tip": (("sample", "axis"), "m", "tip position"), "activation": _ACTIVATION}
 _CONFIGURATION = {
     "position": (("sample", "station", "axis"), "m", "centerline r"),
     "directors": (("sample", "station", "director", "axis"), "1", "directors d1, d2, d3"),
     "curvature": (("sample", "station", "component"), "1/m", "Darboux vector u in the directors"),
     "extension": (("sample", "station"), "1", "axial extension ζ"),
     "radius": (("station",), "m", "outer radius R2 before activation"),
-    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
+    "activation": _ACTIVATION,
 }
 _OTHERS = {  # where they are asked for
     "line_length": (("sample", "line"), "m", "length of the middle line of each bundle"),
@@ -121,12 +119,9 @@ def configuration_dataset(
 
 def a_cloud(name: str, value: object) -> xr.Dataset:
     """A dataset that looks like a cloud; `check_cloud` looks closer."""
-    return _along_axes(name, as_dataset(name, value, "tip", "activation", what="a cloud"))
-
-
-def _along_axes(name: str, cloud: xr.Dataset) -> xr.Dataset:
-    labels = tuple(map(str, cloud["axis"].values))
-    if "axis" in cloud.coords and labels != AXES:
+    cloud = as_dataset(name, value, "tip", "activation", what="a cloud")
+    labels = tuple(map(str, cloud["axis"].values)) if "axis" in cloud.coords else AXES
+    if labels != AXES:
         raise InvalidInput(f"{name}.axis", ", ".join(labels), "x, y, z in this order")
     return cloud
 
@@ -143,18 +138,14 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     Raises:
         InvalidInput: What is missing, or of another shape or version.
     """
-    import xarray as xr
-
-    if not isinstance(cloud, xr.Dataset):
-        raise InvalidInput("cloud", as_given(cloud), "a cloud: a dataset from compute_cloud")
+    a_cloud("cloud", cloud)
     for name, (dims, _, _) in _CLOUD.items():
-        if name not in cloud or cloud[name].dims != dims:
-            actual = cloud[name].dims if name in cloud else "missing"
-            raise InvalidInput(f"cloud.{name}", actual, f"a variable over {dims}")
+        if cloud[name].dims != dims:
+            raise InvalidInput(f"cloud.{name}", cloud[name].dims, f"a variable over {dims}")
     version = cloud.attrs.get("schema_version")
     if version != SCHEMA_VERSION:
         raise InvalidInput("cloud.attrs['schema_version']", version, str(SCHEMA_VERSION))
-    return _along_axes("cloud", cloud)
+    return cloud
 
 
 def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
@@ -239,7 +230,7 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
     of_name = dict(zip(arm.input_names, arm.input_units, strict=True))
-    return arm.input_units if names is None else tuple(of_name[name] for name in names)
+    return tuple(of_name[name] for name in (of_name if names is None else names))
 
 
 _SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}

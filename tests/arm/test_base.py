@@ -13,8 +13,7 @@ import softreach as sr
 from softreach.arm import PointLoad
 from softreach.arm.base import POINTS
 from softreach.arm.design_file.keys import keys_of
-from softreach.arm.parameters import changed, find_parameter
-from softreach.arm.written import Written
+from softreach.arm.parameters import Written, changed, find_parameter
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber

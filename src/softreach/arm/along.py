@@ -6,7 +6,6 @@ Stations count from 0 at the base to 1 at the tip, so that an arm of another len
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -93,11 +92,18 @@ class Samples(AlongArm):
         if self.interpolation == "linear":
             slopes = np.diff(self.values) / np.diff(self.stations_over_length)
             return slopes[np.searchsorted(self.breaks, np.asarray(x, float), "right")]
-        return self._curve.derivative()(np.asarray(x, float))
+        return self._slope(np.asarray(x, float))
 
     @lazy
     def _curve(self) -> Any:
-        return monotone_cubic(self.stations_over_length, self.values)
+        """The monotone piecewise cubic as SciPy's PCHIP [FritschCarlson1980]."""
+        from scipy.interpolate import PchipInterpolator
+
+        return PchipInterpolator(self.stations_over_length, self.values)
+
+    @lazy
+    def _slope(self) -> Any:
+        return self._curve.derivative()
 
     def _faults(self) -> list[Fault]:
         if isinstance(self.interpolation, str) and self.interpolation in _INTERPOLATIONS:
@@ -109,10 +115,3 @@ class Samples(AlongArm):
 def values_along(value: float | AlongArm, x: ArrayLike) -> Array:
     """A number, or a function along the arm, at x = Z/L."""
     return value(x) if isinstance(value, AlongArm) else np.full(np.shape(x), value)
-
-
-def monotone_cubic(places: Sequence[float], values: Sequence[float]) -> Any:
-    """The monotone piecewise cubic through samples as SciPy's PCHIP [FritschCarlson1980]."""
-    from scipy.interpolate import PchipInterpolator
-
-    return PchipInterpolator(places, values)

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.number import as_numbers, number
+from softreach.arm.number import Triple, as_numbers, number
 from softreach.arm.part import Part
 from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault
 from softreach.support.lazy import lazy
 
-Triple = tuple[float, float, float]
 Matrix = tuple[Triple, Triple, Triple]
 
 POINTS: Mapping[str, Matrix] = MappingProxyType(

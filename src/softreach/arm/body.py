@@ -21,7 +21,7 @@ from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN, Actuator, 
 from softreach.arm.along import Samples, values_along
 from softreach.arm.loads import Loads
 from softreach.arm.number import number
-from softreach.arm.part import Part, faults_under
+from softreach.arm.part import Part, faults_under, gathered, kind_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section, Stiffness, name_faults
 from softreach.arm.stations import Located, RigidPiece, Stations, placed
@@ -122,15 +122,13 @@ class Body:
 
     def _faults(self) -> list[Fault]:
         kinds = {
-            "profile": (Profile, "must be a Profile, such as LinearTaper"),
-            "section": (Section, "must be a Section"),
-            "rest": (RestShape, "must be a RestShape, such as RestShape(curvature_x=2.0)"),
-            "loads": (Loads | None, "must be Loads or None"),
+            "profile": (Profile, "a Profile, such as LinearTaper"),
+            "section": (Section, "a Section"),
+            "rest": (RestShape, "a RestShape, such as RestShape(curvature_x=2.0)"),
+            "loads": (Loads | None, "Loads or None"),
+            "rigid_pieces": ([RigidPiece], "RigidPieces"),
         }
-        given = [(field, getattr(self, field), *kind) for field, kind in kinds.items()]
-        wrong = [Fault(name, x, text) for name, x, kind, text in given if not isinstance(x, kind)]
-        pieces = kinds_in_a_sequence("rigid_pieces", self.rigid_pieces, RigidPiece)
-        return [*wrong, *pieces, *kind_faults(self.actuators)]
+        return kind_faults(self, kinds) + actuator_faults(self.actuators)
 
     def _settle(self) -> list[Fault]:
         """Give actuators names, and parts the places of the stations that they name."""
@@ -144,13 +142,10 @@ class Body:
 
     def _place(self, field: str, parts: Sequence[tuple[str, Located]]) -> list[Fault]:
         """Put parts where the stations that they name are; faults begin with their owners."""
-        made, faults = [], []
+        made, faults = list[Located](), list[Fault]()
         for owner, part in parts:
-            try:
-                with faults_under(owner):
-                    made.append(placed(part, self.stations))
-            except InvalidDesign as error:
-                faults += error.faults
+            with gathered(faults, owner):
+                made.append(placed(part, self.stations))
         object.__setattr__(self, field, tuple(made))
         return faults
 
@@ -283,36 +278,27 @@ def _far_faults(actuator: Actuator, profile: Profile) -> Iterator[Fault]:
             yield Fault(name, values, allowed)
 
 
-def kinds_in_a_sequence(field: str, parts: Any, kind: type) -> Iterator[Fault]:
-    """A fault for what is no sequence of parts of a kind."""
-    if not isinstance(parts, tuple | list) or not all(isinstance(x, kind) for x in parts):
-        yield Fault(field, parts, f"must be {kind.__name__}s")
-
-
-def kind_faults(actuators: Any) -> Iterator[Fault]:
+def actuator_faults(actuators: Any) -> list[Fault]:
     """Faults of what is no sequence of actuators, or holds too many bundles."""
     if not isinstance(actuators, Sequence) or isinstance(actuators, str):
-        yield Fault("actuators", actuators, "must be a sequence of actuators")
-        return
-    wrong = [k for k, part in enumerate(actuators) if not isinstance(part, Actuator)]
-    for k in wrong:
-        allowed = "must be an actuator, such as FiberArchitecture"
-        yield Fault(f"actuators[{k}]", actuators[k], allowed)
-    if not wrong and (count := sum(part.bundles for part in actuators)) > MOST_BUNDLES:
-        yield Fault("actuators", f"{count} bundles", f"must be at most {MOST_BUNDLES} in all")
+        return [Fault("actuators", actuators, "must be a sequence of actuators")]
+    allowed = "must be an actuator, such as FiberArchitecture"
+    wrong = [(k, part) for k, part in enumerate(actuators) if not isinstance(part, Actuator)]
+    if wrong:
+        return [Fault(f"actuators[{k}]", part, allowed) for k, part in wrong]
+    if (count := sum(part.bundles for part in actuators)) > MOST_BUNDLES:
+        return [Fault("actuators", f"{count} bundles", f"must be at most {MOST_BUNDLES} in all")]
+    return []
 
 
 def named_actuators(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
     """The actuators, those without a name called "fiber 1", "fiber 2", ... by their places."""
     taken = {actuator.name for actuator in actuators}
     for place, actuator in enumerate(actuators, start=1):
-        if actuator.name:
-            yield actuator
-            continue
         names = (f"{actuator.default_name} {number}" for number in itertools.count(place))
-        name = next(name for name in names if name not in taken)
+        name = actuator.name or next(name for name in names if name not in taken)
         taken.add(name)
-        yield actuator.replace(name=name)
+        yield actuator if actuator.name else actuator.replace(name=name)
 
 
 def mass(arm: Body) -> float:

@@ -95,17 +95,15 @@ def redundant_trunk(
             incompressible one whose Young's modulus cancels.
     """
     arm = minimal_trunk(revolution, taper, length=length, material=material)
-    pair = (
-        _fiber("longitudinal 1", 246, helical_angle=0.0),
-        _fiber("longitudinal 2", 294, helical_angle=0.0),
-    )
+    angles = {"longitudinal 1": 246, "longitudinal 2": 294}
+    pair = (_fiber(name, angle, helical_angle=0.0) for name, angle in angles.items())
     return arm.replace(actuators=(*arm.actuators[:2], *pair))
 
 
-def _fiber(name: str, offset_deg: float, **winding: Any) -> FiberArchitecture:
-    return FiberArchitecture(
-        name=name, offset=math.radians(offset_deg), extent=math.radians(48), **winding
-    )
+def _fiber(name: str, offset_deg: float, **others: Any) -> FiberArchitecture:
+    """A fiber of 48°."""
+    offset = math.radians(offset_deg)
+    return FiberArchitecture(name=name, offset=offset, extent=math.radians(48), **others)
 
 
 def _arm(
@@ -116,7 +114,6 @@ def _arm(
 
 
 _LCE_LENGTH = 0.09  # m
-_LCE_EXTENT = math.radians(48)
 _LCE_FAMILIES = (("left", -108, 66), ("right", 108, 114), ("longitudinal", 0, 270))  # Ω, θ0 [deg]
 
 
@@ -130,28 +127,20 @@ def lce_arm() -> Manipulator:
     density, 1000 kg/m³, for all of the arm; here a third of it goes to each of the three rings.
     """
     fibers = named_material("liquid_crystal_elastomer")
-    share = _LCE_EXTENT / (2 * math.pi)
+    share = math.radians(48) / (2 * math.pi)
     matter = fibers.replace(
         young_modulus=share * (fibers.young_modulus or 0.0),
         density=(fibers.density or 0.0) / len(_LCE_FAMILIES),
         name="fibers",
     )
     core = Material(young_modulus=0.1278e6, poisson_ratio=0.5, density=1000.0, name="core")
-    rings = tuple(
-        Ring(inner_ratio=5 / 6, material=matter, name=name) for name, _, _ in _LCE_FAMILIES
+    rings = (Ring(inner_ratio=5 / 6, material=matter, name=name) for name, _, _ in _LCE_FAMILIES)
+    bounds = (-5.0, 0.0)
+    actuators = tuple(
+        _fiber(name, offset, ring=name, revolution=math.radians(turn), activation_bounds=bounds)
+        for name, turn, offset in _LCE_FAMILIES
     )
     profile = LinearTaper(length=_LCE_LENGTH, outer_radius=_LCE_LENGTH / 20)
-    actuators = tuple(
-        FiberArchitecture(
-            name=name,
-            ring=name,
-            revolution=math.radians(revolution),
-            offset=math.radians(offset),
-            extent=_LCE_EXTENT,
-            activation_bounds=(-5.0, 0.0),
-        )
-        for name, revolution, offset in _LCE_FAMILIES
-    )
     return _arm(profile, actuators, *rings, core=core)
 
 
@@ -278,15 +267,10 @@ def elephant_trunk() -> Manipulator:
 
 def _muscles() -> Iterator[Actuator]:
     for group, ring, (start, end), angle in _TRUNK_GROUPS:
-        middle = (start + end) / 2
+        middle, extent = (start + end) / 2, math.radians(end - start)
         for side, offset, hand in (("right", middle, 1), ("left", (180.0 - middle) % 360.0, -1)):
-            sector: dict[str, Any] = {
-                "name": f"{group} {side}",
-                "ring": ring,
-                "offset": math.radians(offset),
-                "extent": math.radians(end - start),
-                "activation_bounds": (-0.5, 0.0),
-            }
+            sector: dict[str, Any] = {"name": f"{group} {side}", "ring": ring, "extent": extent}
+            sector |= {"offset": math.radians(offset), "activation_bounds": (-0.5, 0.0)}
             if angle is None:
                 yield RadialMuscle(**sector)
             else:

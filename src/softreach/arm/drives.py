@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from softreach.arm.number import MOST, NamedFloats, Number, is_path_name, number
+from softreach.arm.number import MOST, NamedFloats, Number, as_numbers, is_path_name, number
 from softreach.arm.part import Part
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import Array
@@ -50,8 +50,7 @@ class Drive(Part):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        low, high = (float(plain(bound)) for bound in self.bounds)
-        object.__setattr__(self, "bounds", (low, high))
+        object.__setattr__(self, "bounds", tuple(as_numbers(self.bounds).tolist()))
         for field in ("gains", "offsets"):
             object.__setattr__(self, field, NamedFloats(getattr(self, field)))
 
@@ -112,26 +111,16 @@ class Drive(Part):
             return (sizes.pop() if len(sizes) == 1 else math.nan,)
         if name in ("lower", "upper"):
             return (self.bounds[name == "upper"],)
-        owner, _, bundle = name.partition("[")
-        if not bundle:
-            return super().values_of(name, profile, section)
-        return (float(getattr(self, owner)[bundle.removesuffix("]")]),)
+        return super().values_of(name, profile, section)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, or with numbers by the names in `numbers`."""
-        own = [name for name in self.numbers if name != "dead_zone" and name in changes]
-        for field in own:  # the size of all gains before one
-            value = changes.pop(field)
-            if field == "gain":
-                gains = changes.get("gains", self.gains).items()
-                changes["gains"] = {name: math.copysign(value, gain) for name, gain in gains}
-            elif field in ("lower", "upper"):
-                low, high = changes.get("bounds", self.bounds)
-                changes["bounds"] = (low, value) if field == "upper" else (value, high)
-            else:
-                owner, _, bundle = field.partition("[")
-                before = changes.get(owner, getattr(self, owner))
-                changes[owner] = {**before, bundle.removesuffix("]"): value}
+        if "gain" in changes:
+            size, gains = changes.pop("gain"), changes.get("gains", self.gains)
+            changes["gains"] = {name: math.copysign(size, gain) for name, gain in gains.items()}
+        if changes.keys() & {"lower", "upper"}:
+            low, high = changes.get("bounds", self.bounds)
+            changes["bounds"] = (changes.pop("lower", low), changes.pop("upper", high))
         return super().replace(**changes)
 
     def _faults(self) -> list[Fault]:
@@ -143,9 +132,8 @@ class Drive(Part):
         return [*faults, *self._number_faults()]
 
     def _number_faults(self) -> Iterator[Fault]:
-        is_pair = isinstance(self.bounds, Sequence | np.ndarray) and len(self.bounds) == 2
-        bounds = [plain(bound) for bound in self.bounds] if is_pair else []
-        if not is_pair or not all(map(_FINITE.admits, bounds)) or bounds[0] > bounds[1]:
+        pair = as_numbers(self.bounds)
+        if pair.shape != (2,) or not (np.abs(pair) <= MOST).all() or pair[0] > pair[1]:
             allowed = f"must be a pair (lower, upper) of numbers up to {MOST:g}, lower <= upper"
             yield Fault("bounds", self.bounds, allowed)
         bundles = self.gains if isinstance(self.gains, Mapping) else self.offsets
@@ -161,11 +149,10 @@ class Drive(Part):
                     yield Fault(f"offsets[{name}]", value, "must be that of a bundle in gains")
 
 
-def drive_faults(drives: Any, actuators: Sequence[str], bundles: Sequence[str]) -> Iterator[Fault]:
+def drive_faults(
+    drives: Sequence[Drive], actuators: Sequence[str], bundles: Sequence[str]
+) -> Iterator[Fault]:
     """Faults of the drives of an arm with these actuators and bundles."""
-    if not isinstance(drives, Sequence) or not all(isinstance(each, Drive) for each in drives):
-        yield Fault("drives", drives, "must be a sequence of Drive")
-        return
     taken = [*actuators, *bundles]
     for k, drive in enumerate(drives):
         name = drive.name

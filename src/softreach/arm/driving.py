@@ -218,20 +218,13 @@ def _inner_arm(arm: Manipulator) -> Manipulator:
     least = float(1.0 + (gamma @ rates.T).min())
     if not least > 0.0:
         allowed = f"reaches extension ζ = {least:.4g}; must keep ζ > 0: narrow the bounds"
-        pulled = bounds[driving.law.columns].tolist()
-        raise InvalidDesign([Fault("displacement_bounds", pulled, allowed)])
+        given = bounds[driving.law.columns].tolist()
+        raise InvalidDesign([Fault("displacement_bounds", given, allowed)])
     most = _SAFETY * gamma.max(axis=0) + _against_loads(arm)
     columns = driving.law.columns
     bounds[columns] = np.stack([np.zeros(len(columns)), most[columns]], axis=1)
-    ends = np.cumsum([each.bundles for each in body.actuators])
-    shares = zip(body.actuators, np.split(_fitting(bounds, columns, rates), ends), strict=False)
-    actuators = (
-        each.by_tension(own)
-        if isinstance(each, LengthTendon)
-        else each.replace(activation_bounds=own)
-        for each, own in shares
-    )
-    return body.replace(actuators=tuple(actuators))
+    pulled = (x.by_tension() if isinstance(x, LengthTendon) else x for x in body.actuators)
+    return body.replace(actuators=tuple(pulled)).with_bounds(_fitting(bounds, columns, rates))
 
 
 def _against_loads(arm: Manipulator) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -95,7 +95,7 @@ def with_ring(arm: Manipulator) -> Manipulator:
         low, high = first.inner_ratio, 0.5 * (first.inner_ratio + first.outer_ratio)
     name = _new_name("ring", [ring.name for ring in section.rings])
     ring = Ring(inner_ratio=low, outer_ratio=high, material=section.core_material, name=name)
-    return arm.replace(section=section.replace(rings=(*section.rings, ring)))
+    return _with_rings(arm, (*section.rings, ring))
 
 
 def without_ring(arm: Manipulator, index: int) -> Manipulator:
@@ -105,25 +105,16 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
         InvalidInput: It is the last one, or actuators are in it.
         InvalidDesign: The others do not reach the surface of the arm.
     """
-    rings, gone = arm.section.rings, arm.section.rings[index]
+    rings, label = arm.section.rings, ring_label(arm, index)
     if len(rings) == 1:
-        raise InvalidInput("rings", ring_label(arm, index), "more than one to remove one of them")
-    inside = [
-        part.name
-        for part in arm.actuators
-        if isinstance(part, SectorActuator) and arm.section.ring(part.ring) is gone
-    ]
+        raise InvalidInput("rings", label, "more than one to remove one of them")
+    sectors = [part for part in arm.actuators if isinstance(part, SectorActuator)]
+    inside = [part.name for part in sectors if arm.section.ring_index(part.ring) == index]
     if inside:
         hint = f"move or remove {', '.join(inside)} first"
-        raise InvalidInput("rings", ring_label(arm, index), "without actuators to be removed", hint)
-    kept = tuple(ring for k, ring in enumerate(rings) if k != index)
-    actuators = tuple(
-        part.replace(ring=part.ring - (part.ring > index))
-        if isinstance(part, SectorActuator) and isinstance(part.ring, int)
-        else part
-        for part in arm.actuators
-    )
-    return arm.replace(section=arm.section.replace(rings=kept), actuators=actuators)
+        raise InvalidInput("rings", label, "without actuators to be removed", hint)
+    moved: dict[int | str, int] = {k: k - 1 for k in range(index + 1, len(rings))}
+    return _with_rings(arm, rings[:index] + rings[index + 1 :], moved)
 
 
 def with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Manipulator:
@@ -135,20 +126,25 @@ def with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Manipulat
     """
     rings, old = [*arm.section.rings], arm.section.rings[index]
     rings[index] = old.replace(**changes)
-    section, is_renamed = arm.section.replace(rings=tuple(rings)), rings[index].name != old.name
-    actuators = tuple(
-        part.replace(ring=index)
-        if is_renamed and isinstance(part, SectorActuator) and part.ring == old.name
-        else part
-        for part in arm.actuators
-    )
-    return arm.replace(section=section, actuators=actuators)
+    return _with_rings(arm, rings, {} if rings[index].name == old.name else {old.name: index})
 
 
 def with_material(arm: Manipulator, material: str) -> Manipulator:
     """The arm with all of its rings made of one named material."""
-    rings = tuple(ring.replace(material=material) for ring in arm.section.rings)
-    return arm.replace(section=arm.section.replace(rings=rings))
+    return _with_rings(arm, [ring.replace(material=material) for ring in arm.section.rings])
+
+
+def _with_rings(
+    arm: Manipulator, rings: Sequence[Ring], moved: Mapping[int | str, int] = {}
+) -> Manipulator:
+    """The arm with other rings; of actuators, `moved` has the new ring by the old index or name."""
+    actuators = tuple(
+        part.replace(ring=moved[part.ring])
+        if isinstance(part, SectorActuator) and part.ring in moved
+        else part
+        for part in arm.actuators
+    )
+    return arm.replace(section=arm.section.replace(rings=tuple(rings)), actuators=actuators)
 
 
 def with_core(arm: Manipulator, material: str) -> Manipulator:
@@ -170,7 +166,6 @@ def _widest_gap(arm: Manipulator) -> float:
     return float(np.mod(angles[widest] + gaps[widest] / 2, 2 * np.pi))
 
 
-def _new_name(kind: str, taken: Iterable[str]) -> str:
-    known = set(taken)
+def _new_name(kind: str, taken: Sequence[str]) -> str:
     names = (f"{kind} {number}" for number in itertools.count(1))
-    return next(name for name in names if name not in known)
+    return next(name for name in names if name not in taken)

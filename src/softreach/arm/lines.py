@@ -51,7 +51,6 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     zeta = 1.0 + gamma @ table.extension.T
     eta = 1.0 + gamma @ table.rest_length_factor.T if table.has_forces else zeta
     turn = eta[..., None] * np.einsum("nb,scb->nsc", gamma, table.curvature)
-
     return lengths_of_strains(arm, turn, zeta)
 
 
@@ -68,14 +67,16 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
     """
     z, weights, half = quadrature(body_of(arm))
     step = _STEP * half
-    place = _places(arm, z)
-    along = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
-    (x, y), (dx, dy) = place, along
-    one, two, three = (turn[..., k, None] for k in range(3))
-    speed = np.sqrt(
-        (dx - three * y) ** 2 + (dy + three * x) ** 2 + (zeta[..., None] + one * y - two * x) ** 2
-    )
+    slopes = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
+    speed = np.linalg.norm(_tangents(_places(arm, z), slopes, turn, zeta), axis=0)
     return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
+
+
+def _tangents(places: Array, slopes: Array, turn: Array, zeta: Array) -> Array:
+    """dp/dZ of lines in the directors [-], shape (3, n, node, bundle)."""
+    (x, y), (dx, dy) = places, slopes
+    one, two, three = (turn[..., k, None] for k in range(3))
+    return np.stack([dx - three * y, dy + three * x, zeta[..., None] + one * y - two * x])
 
 
 def line_strains(arm: Manipulator) -> Array:
@@ -149,8 +150,9 @@ def pull_error(arm: Manipulator) -> float:
     z = np.linspace(0.5 * step, arm.length - 0.5 * step, _SECTIONS)
     table, acts = tables(body, z), body.outline(z).acts[:, pulls, None]
     places = _places(body, z)
-    slopes = np.gradient(places, step, axis=1, edge_order=2)
-    (x, y), (dx, dy) = places[..., pulls], slopes[..., pulls]
+    slopes = np.gradient(places, step, axis=1, edge_order=2)[..., pulls]
+    places = places[..., pulls]
+    x, y = places
     stiffness = body.stiffness_at(z)
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     shares = np.rint(2.0 * np.random.default_rng(0).random((_SAMPLES, arm.inputs))) / 2.0
@@ -159,8 +161,7 @@ def pull_error(arm: Manipulator) -> float:
     zeta, eta = 1.0 + gamma @ table.extension.T, 1.0 + gamma @ table.rest_length_factor.T
 
     def moments(omega: Array, zeta: Array) -> Array:
-        one, two, three = (omega[..., k, None] for k in range(3))
-        along = np.stack([dx - three * y, dy + three * x, zeta[..., None] + one * y - two * x])
+        along = _tangents(places, slopes, omega, zeta)
         t1, t2, t3 = along / np.linalg.norm(along, axis=0)
         moment = np.stack([-y * t3, x * t3, y * t1 - x * t2], axis=-1)
         return np.einsum("nb,nsbk->nsk", gamma[:, pulls], np.where(acts, moment, 0.0))

@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
-from softreach.arm.number import number
-from softreach.arm.part import Part
+from softreach.arm.number import Triple, number
+from softreach.arm.part import Part, kind_faults
 from softreach.support.errors import Fault
 
 if TYPE_CHECKING:
     from softreach.arm.base import Base
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
-
-Triple = tuple[float, float, float]
 
 GRAVITY = 9.81
 """g, standard acceleration of what falls [m/s²]."""
@@ -91,10 +89,7 @@ class Loads(Part):
         object.__setattr__(self, "point_loads", tuple(self.point_loads))
 
     def _faults(self) -> list[Fault]:
-        points = self.point_loads
-        if isinstance(points, tuple | list) and all(isinstance(x, PointLoad) for x in points):
-            return super()._faults()
-        return [*super()._faults(), Fault("point_loads", points, "must be PointLoads")]
+        return super()._faults() + kind_faults(self, {"point_loads": ([PointLoad], "PointLoads")})
 
     def section_faults(self, section: Section, length: float) -> list[Fault]:
         """Faults that keep them from acting on an arm: moduli, densities, places off the arm."""

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from os import PathLike
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +14,10 @@ from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
-from softreach.arm.body import Body, behind, kind_faults, kinds_in_a_sequence, mass
+from softreach.arm.body import Body, actuator_faults, behind, mass
 from softreach.arm.drives import Drive, drive_faults
 from softreach.arm.material import Material
+from softreach.arm.part import gathered, kind_faults
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import Marker
@@ -66,20 +66,20 @@ class Manipulator(Body):
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
 
     def _faults(self) -> list[Fault]:
-        faults = super()._faults()
-        if not isinstance(self.base, Base):
-            faults.append(Fault("base", self.base, 'must be a Base, such as Base(points="down")'))
-        unit = self.display_unit
-        if unit is not None and not (isinstance(unit, str) and unit in UNITS):
-            faults.append(Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}"))
-        return faults + [*kinds_in_a_sequence("markers", self.markers, Marker)]
+        kinds = {
+            "base": (Base, 'a Base, such as Base(points="down")'),
+            "markers": ([Marker], "Markers"),
+            "drives": ([Drive], "a sequence of Drive"),
+        }
+        faults, unit = super()._faults() + kind_faults(self, kinds), self.display_unit
+        if unit is None or (isinstance(unit, str) and unit in UNITS):
+            return faults
+        return [*faults, Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")]
 
     def _settle(self) -> list[Fault]:
-        faults = super()._settle()
-        if isinstance(self.drives, list):
-            object.__setattr__(self, "drives", tuple(self.drives))
+        object.__setattr__(self, "drives", tuple(self.drives))
         markers = [(f"markers.{marker.name}", marker) for marker in self.markers]
-        return faults + self._place("markers", markers)
+        return super()._settle() + self._place("markers", markers)
 
     def _fit_faults(self) -> list[Fault]:
         faults = [*name_faults([each.name for each in self.markers], "markers")]
@@ -153,28 +153,27 @@ class Manipulator(Body):
         Raises:
             InvalidDesign: The arm cannot exist; the error names every fault.
         """
-        faults = list(kind_faults(actuators))
+        faults = actuator_faults(actuators)
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
         inner, outer, allowed = plain(inner_radius), plain(outer_radius), Range(0.0, unit="m")
         if not allowed.admits(inner):
             faults.append(Fault("inner_radius", inner, allowed))
         elif allowed.admits(outer) and inner >= outer:
             faults.append(Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m"))
-        radii = {"outer_radius": outer_radius, "tip_radius": tip_radius}
-        profile = partial(LinearTaper, length=length, taper=taper, **radii)
-        matter = {"poisson_ratio": poisson_ratio, "density": density}
-        material = partial(Material, young_modulus=young_modulus, **matter)
-        for part in (profile, material):
-            try:
-                part()
-            except InvalidDesign as error:
-                faults += error.faults
+        parts: dict[str, Any] = {}
+        with gathered(faults):
+            radii = {"outer_radius": outer_radius, "tip_radius": tip_radius}
+            parts["profile"] = LinearTaper(length=length, taper=taper, **radii)
+        with gathered(faults):
+            parts["material"] = Material(
+                young_modulus=young_modulus, poisson_ratio=poisson_ratio, density=density
+            )
         if activation_bounds is not None:
             faults += bounds_faults(activation_bounds, bundles)
         if faults:
             raise InvalidDesign(faults)
-        section = Section(rings=(Ring(inner_ratio=inner / outer, material=material()),))
-        arm = cls(profile=profile(), section=section, actuators=tuple(actuators))
+        section = Section(rings=(Ring(inner_ratio=inner / outer, material=parts["material"]),))
+        arm = cls(profile=parts["profile"], section=section, actuators=tuple(actuators))
         return arm if activation_bounds is None else arm.with_bounds(activation_bounds)
 
     def with_bounds(self, activation_bounds: ArrayLike) -> Self:

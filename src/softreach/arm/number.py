@@ -76,6 +76,9 @@ def unit_suffix(unit: str) -> str:
     return _SUFFIXES.get(unit, f"_{unit}")
 
 
+Triple = tuple[float, float, float]
+
+
 class Station(float):
     """Z [m] of a named station, as a part of an arm has it that begins, ends or stands there."""
 
@@ -170,49 +173,49 @@ class Number:
         """Everything wrong with a value by itself, but for what `series_faults` judges."""
         if self.shape == "stations" or (value is None and self.optional) or self._is_name(value):
             return []
-        if self.shape in ("series", "several", "triple"):
-            return self._faults_of_several(value)
-        if self.along is not None and isinstance(value, self.along):
-            return self._refused((None, each) for each in value.values)  # pyright: ignore
-        if self._is_pair(value):
-            return self._refused((None, end) for end in as_numbers(value).tolist())
-        single = plain(value)
-        limits = self.refusal(single)
-        if self.shape == "single" and limits is None:
-            return []
-        return [Fault(self.field, single, self._allowed_instead_of(single, limits))]
-
-    def _faults_of_several(self, value: Any) -> list[Fault]:
         each = as_numbers(value)
         if self.shape == "triple" and not (each.shape == (3,) and np.isfinite(each).all()):
             return [Fault(self.field, value, "must be three finite numbers")]
         if self.shape == "several" and not (each.ndim == 1 and each.shape == np.shape(value)):
             return [Fault(self.field, value, "must be a sequence of numbers")]
-        elements = enumerate(each.ravel().tolist() if each.ndim else ())
-        judged = self.shape == "several"  # of a series the others are judged with its stations
-        return self._refused((k, x) for k, x in elements if judged or math.isfinite(x))
+        if self.shape in ("series", "several", "triple"):
+            judged = self.shape == "several"  # of a series the others are judged with its stations
+            elements = enumerate(each.ravel().tolist() if each.ndim else ())
+            return self._refused((f"[{k}]", x) for k, x in elements if judged or math.isfinite(x))
+        if self.along is not None and isinstance(value, self.along):
+            return self._refused(("", x) for x in value.values)  # pyright: ignore
+        if self._is_pair(value):
+            return self._refused(("", x) for x in each.tolist())
+        return self._faults_of_one(plain(value))
+
+    def _refused(self, elements: Iterable[tuple[str, float]]) -> list[Fault]:
+        judged = ((place, x, self.refusal(x)) for place, x in elements)
+        return [Fault(self.field + place, x, limits) for place, x, limits in judged if limits]
+
+    def _faults_of_one(self, value: Any) -> list[Fault]:
+        allowed, is_single = self.refusal(value), self.shape == "single"
+        if is_single and allowed is None:
+            return []
+        if self.along is not None and not (is_single and isinstance(value, int | float)):
+            ways = [self.allowed.text] if is_single else []
+            ways += ["two at its ends"] if self.pair else []
+            ways += [f"{self.along.__name__} along the arm", *(["None"] if self.optional else [])]
+            allowed = f"must be {', or '.join(ways)}"
+        return [Fault(self.field, value, allowed or self.allowed)]
 
     def elements(self, value: Any) -> dict[str, Number]:
         """Numbers in a series or a function along the arm; the ends of stations stay."""
         if self.along is not None and isinstance(value, self.along):
-            places = fields_of(type(value))["stations_over_length"]
-            inner = places.elements(value.stations_over_length)  # pyright: ignore
             values = {f"values[{k}]": self._element(k) for k in range(len(value.values))}  # pyright: ignore
-            return {f"{self.field}.{name}": each for name, each in (inner | values).items()}
+            return {f"{self.field}.{name}": x for name, x in (value.numbers | values).items()}  # pyright: ignore
         if not isinstance(value, tuple):
             return {}
         first = 1 if self.shape == "stations" else 0
         return {f"{self.field}[{k}]": self._element(k) for k in range(first, len(value) - first)}
 
     def _element(self, k: int) -> Number:
-        return dataclasses.replace(
-            self,
-            symbol=f"{self.symbol}[{k}]",
-            meaning=f"{self.meaning}, number {k}",
-            shape="single",
-            along=None,
-            pair=False,
-        )
+        called = {"symbol": f"{self.symbol}[{k}]", "meaning": f"{self.meaning}, number {k}"}
+        return dataclasses.replace(self, shape="single", along=None, pair=False, **called)
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
@@ -230,23 +233,6 @@ class Number:
 
     def _is_pair(self, value: Any) -> bool:
         return self.pair and as_numbers(value).shape == (2,)
-
-    def _refused(self, elements: Iterable[tuple[int | None, float]]) -> list[Fault]:
-        """A fault for each element that is beyond limits, with its place if that has a number."""
-        return [
-            Fault(self.field if k is None else f"{self.field}[{k}]", element, limits)
-            for k, element in elements
-            if (limits := self.refusal(element))
-        ]
-
-    def _allowed_instead_of(self, value: Any, limits: Range | None) -> Range | str:
-        is_number = self.shape == "single" and isinstance(value, int | float)
-        if self.along is None or (is_number and limits):
-            return limits or self.allowed
-        functions = f"{self.along.__name__} along the arm"
-        functions = f"two at its ends, or {functions}" if self.pair else functions
-        single = f"{self.allowed.text}, or " if self.shape == "single" else ""
-        return f"must be {single}{functions}{', or None' if self.optional else ''}"
 
 
 def stations(meaning: str) -> Any:
@@ -291,12 +277,12 @@ def number(
 def fields_of(kind: type) -> Mapping[str, Number]:
     """Numbers of a kind of part by their fields, those of the kind itself before inherited ones."""
     numbers: dict[str, Number] = {}
-    inherited: dict[str, dataclasses.Field[Any]] = getattr(kind, "__dataclass_fields__", {})
+    own = [(owner, vars(owner).get("__dataclass_fields__", {})) for owner in kind.__mro__]
     fields = [
-        (owner, vars(owner)["__dataclass_fields__"][name])
-        for owner in kind.__mro__
+        (owner, known[name])
+        for owner, known in own
         for name in inspect.get_annotations(owner)
-        if name in vars(owner).get("__dataclass_fields__", {})
+        if name in known
     ]
     known = {field.name for owner, field in fields if "number" in field.metadata or _is_ours(owner)}
     for owner, field in fields:
@@ -304,7 +290,7 @@ def fields_of(kind: type) -> Mapping[str, Number]:
         if declared is None and field.name not in known:
             declared = _plain_number(owner, field)
         if declared and field.name not in numbers:
-            optional = declared.optional or inherited[field.name].default is None
+            optional = declared.optional or default_of(kind, field.name) is None
             numbers[field.name] = dataclasses.replace(declared, field=field.name, optional=optional)
     return MappingProxyType(numbers)
 
@@ -328,27 +314,18 @@ def own_fields(kind: type) -> frozenset[str]:
 
 
 def series_faults(values: Mapping[str, Any], field: str, per_station: bool = True) -> list[Fault]:
-    """Everything wrong with values given along the arm.
-
-    Args:
-        values: `stations_over_length` and the values themselves.
-        field: Name of the values.
-        per_station: One for each station; else one for each gap between them.
-    """
+    """Everything wrong with `stations_over_length` and a field with a value for each, or a gap."""
     stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])
     ends = stations.ndim == 1 and len(stations) > 1 and stations[0] == 0.0 and stations[-1] == 1.0
     if not ends or not np.isfinite(stations).all() or (np.diff(stations) < _NEAREST).any():
-        allowed = (
-            "must be two or more numbers that rise from 0 (base) to 1 (tip), "
-            f"each by {_NEAREST:g} or more"
-        )
+        rise = "must be two or more numbers that rise from 0 (base) to 1 (tip), each by"
+        allowed = f"{rise} {_NEAREST:g} or more"
         return [Fault("stations_over_length", values["stations_over_length"], allowed)]
     count = len(stations) if per_station else len(stations) - 1
     if along.shape != (count,) or not np.isfinite(along).all():
         where = "station" if per_station else "gap between stations"
-        return [
-            Fault(field, values[field], f"must be {count} finite numbers, one for each {where}")
-        ]
+        allowed = f"must be {count} finite numbers, one for each {where}"
+        return [Fault(field, values[field], allowed)]
     return []
 
 

@@ -14,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.along import monotone_cubic
+from softreach.arm.along import Samples
 from softreach.arm.number import number, series_faults, stations
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
@@ -281,18 +281,14 @@ class SampledTaper(_RadiiAtStations):
     """
 
     def radius(self, z: ArrayLike) -> Array:
-        return self._curve(np.asarray(z, float) / self.length)
+        return self._along(np.asarray(z, float) / self.length)
 
     def slope(self, z: ArrayLike) -> Array:
-        return -self._curve_slope(np.asarray(z, float) / self.length) / self.length
+        return -self._along.derivative(np.asarray(z, float) / self.length) / self.length
 
     @lazy
-    def _curve(self) -> Any:
-        return monotone_cubic(self.stations_over_length, self.radii)
-
-    @lazy
-    def _curve_slope(self) -> Any:
-        return self._curve.derivative()
+    def _along(self) -> Samples:
+        return Samples(stations_over_length=self.stations_over_length, values=self.radii)
 
 
 def _integral(function: Any, start: Array, gap: Array) -> Array:

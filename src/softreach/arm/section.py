@@ -271,28 +271,17 @@ class Section(Part):
         return np.pi * density * np.asarray(radius, float) ** 2
 
     def modulus_faults(self, why: str) -> list[Fault]:
-        """A fault for each material whose Young's modulus is needed and left out.
+        """A fault for each material without Young's modulus, unless all stiffnesses were measured.
 
-        None is needed where all stiffnesses were measured.
-
-        Args:
-            why: Ends the sentence "must be given in Pa ...".
+        It "must be given in Pa", and `why` ends the sentence.
         """
-        if self.measured is not None and None not in self.measured.stiffnesses:
-            return []
-        return list(_missing(self, "young_modulus", "Pa", why))
+        known = self.measured is not None and None not in self.measured.stiffnesses
+        return [] if known else list(_missing(self, "young_modulus", "Pa", why))
 
     def density_faults(self, why: str) -> list[Fault]:
-        """A fault for each material whose density is needed and left out.
-
-        None is needed where the mass per length was measured.
-
-        Args:
-            why: Ends the sentence "must be given in kg/m³ ...".
-        """
-        if self.measured is not None and self.measured.mass_per_length is not None:
-            return []
-        return list(_missing(self, "density", "kg/m³", why))
+        """A fault for each material without a density, unless the mass per length was measured."""
+        known = self.measured is not None and self.measured.mass_per_length is not None
+        return [] if known else list(_missing(self, "density", "kg/m³", why))
 
     def _sum(self, factor: Callable[[Material], float], power: int) -> float:
         """Σ factor · (b^n - a^n) over the layers between the ratios a and b."""
@@ -328,11 +317,9 @@ _RESERVED = ("actuators", "core", "loads", "profile", "rings", "section")
 
 
 def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
-    """Names given twice, or ambiguous in names of parameters; an empty one does not count.
+    """Names in a sequence at a path that are given twice, or ambiguous in names of parameters.
 
-    Args:
-        names: Of all parts of a sequence.
-        path: The sequence: `rings` or `actuators`.
+    An empty one does not count.
     """
     for k, name in enumerate(names):
         if isinstance(name, str) and (allowed := _allowed_name(name, path)):

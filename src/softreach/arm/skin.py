@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -108,23 +108,16 @@ class Centerline:
 Shape: TypeAlias = "xr.Dataset | Centerline"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Span:
+class _Span(NamedTuple):
     """Stretch of an arm on which one bundle acts without a gap: stations along the first axis."""
 
-    shape: str
     extent: float
     position: Array
-    """Centers of the sections [m], shape (station, 3)."""
     directors: Array
     center: Array
-    """Polar angle of the middle of the bundle [rad], shape (station,)."""
     inner_ratio: Array
-    """Inner radius of the bundle over R2 [-], shape (station,)."""
     outer_ratio: Array
-    """Outer radius of the bundle over R2 [-], shape (station,)."""
     arm_radius: Array
-    """R2 [m], shape (station,)."""
 
     def points(self, angles: Array, radius: Array) -> Array:
         """At polar angles (station, across) and radii (station,), shape (station, across, 3)."""
@@ -183,7 +176,7 @@ def bundle_skins(
         # along x across is d3 x e_θ = -e_R: turned, so that faces point outwards
         return Surface(vertices=band.reshape(-1, 3), faces=grid_faces(*band.shape[:2])[:, ::-1])
 
-    return _skins(arm, _drawn_line(arm, shape), sector)
+    return _skins(arm, shape, sector)
 
 
 def bundle_surfaces(arm: Body, shape: Shape) -> list[Surface]:
@@ -202,7 +195,7 @@ def bundle_surfaces(arm: Body, shape: Shape) -> list[Surface]:
         upper, lower = (span.band(lift, np.pi / 32) for lift in (_THICKNESS / 2, -_THICKNESS / 2))
         return ribbon_surface(upper, lower)
 
-    return _skins(arm, _drawn_line(arm, shape), sector)
+    return _skins(arm, shape, sector)
 
 
 def marker_points(markers: Sequence[Marker], shape: Shape) -> Array:
@@ -252,30 +245,21 @@ def _drawn_line(arm: Body, shape: Shape) -> Centerline:
     return Centerline.of(shape).with_stations(arm.breakpoints)
 
 
-def _skins(arm: Body, line: Centerline, sector: Callable[[_Span], Surface]) -> list[Surface]:
-    width = _LINE * arm.length
-    make = {"sector": sector, "line": lambda span: _line_tube(span, width), "lumen": _lumen}
-    return [joined([make[span.shape](span) for span in spans]) for spans in _spans(arm, line)]
-
-
-def _spans(arm: Body, line: Centerline) -> list[list[_Span]]:
+def _skins(arm: Body, shape: Shape, sector: Callable[[_Span], Surface]) -> list[Surface]:
+    line, width = _drawn_line(arm, shape), _LINE * arm.length
     outline, radius = arm.outline(line.z), arm.profile.radius(line.z)
     acts = arm.outline(0.5 * (line.z[1:] + line.z[:-1])).acts
+    make = {"sector": sector, "line": lambda span: _line_tube(span, width), "lumen": _lumen}
+
+    def span(k: int, part: slice) -> _Span:
+        along = (outline.center, outline.inner_ratio, outline.outer_ratio)
+        bundle = (values[part, k] for values in along)
+        extent = float(outline.extent[k])
+        return _Span(extent, line.position[part], line.directors[part], *bundle, radius[part])
+
     return [
-        [
-            _Span(
-                shape=outline.shape[k],
-                extent=float(outline.extent[k]),
-                position=line.position[part],
-                directors=line.directors[part],
-                center=outline.center[part, k],
-                inner_ratio=outline.inner_ratio[part, k],
-                outer_ratio=outline.outer_ratio[part, k],
-                arm_radius=radius[part],
-            )
-            for part in _runs(acts[:, k])
-        ]
-        for k in range(arm.bundles)
+        joined([make[kind](span(k, part)) for part in _runs(acts[:, k])])
+        for k, kind in enumerate(outline.shape)
     ]
 
 

@@ -6,7 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from softreach.arm.number import NamedFloats, Number, Station, fields_of, is_path_name, number
+from softreach.arm.number import (
+    NamedFloats,
+    Number,
+    Station,
+    Triple,
+    fields_of,
+    is_path_name,
+    number,
+)
 from softreach.arm.part import Part
 from softreach.support.arguments import plain
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
@@ -14,8 +22,6 @@ from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
-
-Triple = tuple[float, float, float]
 
 PLACE = Number(symbol="Z", meaning="place along the arm", allowed=Range(0.0, unit="m"))
 """Declaration of the place of a named station."""

@@ -191,8 +191,7 @@ def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, .
 
 def _values(arm: sr.Manipulator, written: Sequence[tuple[str, object]]) -> dict[str, float]:
     """Name of a parameter -> value in its unit, from what was written under any of its names."""
-    from softreach.arm.parameters import find_parameter
-    from softreach.arm.written import Written
+    from softreach.arm.parameters import Written, find_parameter
 
     values: dict[str, float] = {}
     if not written:

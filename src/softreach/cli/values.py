@@ -190,7 +190,7 @@ _PLAIN = str.maketrans({"³": "3", "²": "2", "/": "_per_", " ": "_"})
 
 def key(name: str, unit: str) -> str:
     """The key of a value in JSON: its name with its unit, as in `convex_volume_L3`."""
-    from softreach.arm.written import written_name
+    from softreach.arm.parameters import written_name
 
     bare = name.replace(" ", "_").replace("/", "_per_").replace("(", "").replace(")", "")
     return written_name(bare, _SUFFIX.get(unit, unit)).translate(_PLAIN)

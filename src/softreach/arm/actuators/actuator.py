@@ -214,12 +214,11 @@ class PolarActuator(Actuator):
         """θ0 + 2πj/n, polar angle of each bundle where it begins [rad], shape (bundle,)."""
         return self.offset + 2.0 * np.pi * np.arange(self.bundles) / self.bundles
 
-    def length_at(self, field: str, profile: Profile, z: Array) -> Array:
-        """A length that is given in m, or over R2(Z) under `FIELD_ratio` [m], of the shape of z."""
-        return self.length_and_slope(field, profile, z)[0]
+    def length_along(self, field: str, profile: Profile, z: Array) -> tuple[Array, Array]:
+        """A length [m] and its slope along Z [-], both of the shape of z.
 
-    def length_and_slope(self, field: str, profile: Profile, z: Array) -> tuple[Array, Array]:
-        """The same [m], and its slope along Z [-]; in m it may be two, or samples along the arm."""
+        It is given over R2(Z) under `FIELD_ratio`, or in m: one, two, or samples along the arm.
+        """
         length, ratio = getattr(self, field), getattr(self, f"{field}_ratio")
         if ratio is not None:
             return ratio * profile.radius(z), -ratio * profile.slope(z)
@@ -234,12 +233,7 @@ class PolarActuator(Actuator):
 
 
 def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
-    """Everything wrong with a pair (lower, upper), or one such pair for each bundle.
-
-    Args:
-        bounds: Activation bounds.
-        bundles: Number of bundles; None where that is not known.
-    """
+    """Everything wrong with a pair (lower, upper), or one for each bundle, if we know how many."""
     pairs, allowed = as_numbers(bounds), ""
     if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
         allowed = "must be a pair (lower, upper), or one such pair for each bundle"

@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.actuators.sector import RingIntegrals, SectorActuator, cone_integrals
@@ -91,20 +92,18 @@ class FiberArchitecture(SectorActuator):
         if isinstance(angle, AlongArm):
             turned = _rotation_from_base(profile, ratio, angle, np.append(z, start))
             return turned[:-1] - turned[-1]
-        turned = profile.surface_coordinate(z, ratio)
-        if start > 0.0:
-            turned = turned - profile.surface_coordinate(start, ratio)
-        return turned * np.tan(angle)
+        return _along_cone(profile, ratio, start, z) * np.tan(angle)
 
 
 @lru_cache(maxsize=64)
 def _even_angle(fiber: FiberArchitecture, profile: Profile, ratio: float) -> float:
     """α of a revolution on the cone of a ring [rad]; each table of an arm asks for it."""
-    start, end = fiber.span(profile.length)
-    turn = profile.surface_coordinate(end, ratio)
-    if start > 0.0:
-        turn -= profile.surface_coordinate(start, ratio)
-    return math.atan((fiber.revolution or 0.0) / float(turn))
+    along = _along_cone(profile, ratio, *fiber.span(profile.length))
+    return math.atan((fiber.revolution or 0.0) / float(along))
+
+
+def _along_cone(profile: Profile, ratio: float, start: ArrayLike, end: ArrayLike) -> Array:
+    return profile.surface_coordinate(end, ratio) - profile.surface_coordinate(start, ratio)
 
 
 def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Array) -> Array:
@@ -122,8 +121,8 @@ def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Arra
 def _constant_gap(
     profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array
 ) -> Array:
-    along = profile.surface_coordinate(end, ratio) - profile.surface_coordinate(start, ratio)
-    return along * np.tan(angle((start + 1e-13 * profile.length) / profile.length))
+    middle = angle((start + 1e-13 * profile.length) / profile.length)
+    return _along_cone(profile, ratio, start, end) * np.tan(middle)
 
 
 def _smooth_gap(profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array) -> Array:
@@ -165,9 +164,6 @@ class ObliqueMuscle(SectorActuator):
         """I0, I1, I3 with the local taper and the angle of the fibers: theory (3)."""
         return cone_integrals(ring, profile.slope(z), np.full(len(z), self.helical_angle))
 
-    def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
-        return np.zeros(len(z))
-
 
 @dataclass(frozen=True, kw_only=True)
 class RadialMuscle(SectorActuator):
@@ -194,6 +190,3 @@ class RadialMuscle(SectorActuator):
         return RingIntegrals(
             -nu * (1.0 - rho**2) / 2.0 * each, -nu * (1.0 - rho**3) / 3.0 * each, 0.0 * each
         )
-
-    def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
-        return np.zeros(len(z))

@@ -112,7 +112,7 @@ class Tendon(PolarActuator):
 
         All slopes have the shape (station, 1).
         """
-        distance = self.length_and_slope("distance", profile, z[:, None])
+        distance = self.length_along("distance", profile, z[:, None])
         x = z[:, None] / profile.length
         if self.routing is not None:
             turned, rate = self.routing(x), self.routing.derivative(x)
@@ -168,10 +168,10 @@ class LengthTendon(Tendon):
         """Displacement at which it becomes taut while the arm keeps its shape [m]."""
         return self.slack - self.pretension * self.compliance
 
-    def by_tension(self, bounds: Array) -> Tendon:
-        """The same tendon driven by its tension within bounds [N], shape (bundles, 2)."""
+    def by_tension(self) -> Tendon:
+        """The same tendon driven by its tension; its bounds are 0 until the arm sets them."""
         same = {field.name: getattr(self, field.name) for field in fields(Tendon)}
-        return Tendon(**same | {"activation_bounds": bounds.tolist()})
+        return Tendon(**same | {"activation_bounds": (0.0, 0.0)})
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
@@ -233,8 +233,8 @@ class Chamber(PolarActuator):
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = A and M = p × A e3 with the effective area A and the center p: theory (53)."""
-        area = np.pi * self.area_factor * self.length_at("radius", profile, z) ** 2
-        arm = area * self.length_at("distance", profile, z)
+        area = np.pi * self.area_factor * self.length_along("radius", profile, z)[0] ** 2
+        arm = area * self.length_along("distance", profile, z)[0]
         angle = self.start_angles
         along = np.zeros((len(z), self.bundles))
         moment = [arm[:, None] * np.sin(angle), -arm[:, None] * np.cos(angle), along]
@@ -242,8 +242,8 @@ class Chamber(PolarActuator):
 
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
         each, outer = np.ones(self.bundles), profile.radius(z)
-        distance = self.length_at("distance", profile, z)
-        radius = self.length_at("radius", profile, z)
+        distance = self.length_along("distance", profile, z)[0]
+        radius = self.length_along("radius", profile, z)[0]
         share = float(np.max(radius / np.maximum(distance, radius)))
         return Outline(
             center=np.broadcast_to(self.start_angles, (len(z), self.bundles)),

@@ -56,9 +56,9 @@ class SectorActuator(PolarActuator):
     def integrals(self, profile: Profile, ring: Ring, z: Array) -> RingIntegrals:
         """I0, I1, I3 of its ring at stations Z [m], each of shape (station,): theory (3)."""
 
-    @abstractmethod
     def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
         """Θ(Z) [rad]: how far the sectors have turned at stations Z [m] from where they begin."""
+        return np.zeros(len(z))
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = E R2² I0 σ and M = E R2³ (I1 a sin θ, -I1 a cos θ, I3 σ), a = 2 sin(σ/2): theory (4).
@@ -152,12 +152,10 @@ def _nodes(ratio: Array, tangent: Array) -> tuple[Array, Array]:
 
 
 def cone_integrals(ring: Ring, slope: Array, angle: Array) -> RingIntegrals:
-    """I0, I1, I3 of one ring at stations, each pair of slope and angle integrated once.
+    """I0, I1, I3 of one ring, each pair of slope and angle integrated once, shape (station,).
 
-    Args:
-        ring: The ring.
-        slope: tan φ of the arm's surface, shape (station,); that of the ring is in proportion.
-        angle: α at the outer radius of the ring [rad], shape (station,).
+    The slope is tan φ of the arm's surface, with that of the ring in proportion; the angle is α at
+    the outer radius of the ring [rad].
     """
     pairs, station = np.unique(slope + 1j * angle, return_inverse=True)
     of_ring = np.arctan(pairs.real * ring.outer_ratio)

@@ -37,31 +37,38 @@ from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
-PROFILES: Mapping[str, type[Profile]] = MappingProxyType(
-    {"linear": LinearTaper, "piecewise": PiecewiseTaper, "sampled": SampledTaper}
-)
-"""Profiles by the kind that files know them by."""
+Kind = TypeVar("Kind", bound=Part)
+"""Actuators or profiles."""
 
-ACTUATORS: Mapping[str, type[Actuator]] = MappingProxyType(
-    {
+KINDS: Mapping[type, Mapping[str, type]] = {
+    Actuator: {
         "fiber": FiberArchitecture,
         "oblique_muscle": ObliqueMuscle,
         "radial_muscle": RadialMuscle,
         "tendon": Tendon,
         "length_tendon": LengthTendon,
         "chamber": Chamber,
-    }
-)
-"""Actuators by the kind that files know them by."""
+    },
+    Profile: {"linear": LinearTaper, "piecewise": PiecewiseTaper, "sampled": SampledTaper},
+}
+"""Kinds of actuators and of profiles by the words that files have for them."""
 
-Kind = TypeVar("Kind", bound=Part)
-"""Actuators or profiles."""
+TABLES: Mapping[str, type] = {
+    "material": Material,
+    "ring": Ring,
+    "measured": Measured,
+    "section": Section,
+    "loads": Loads,
+    "point_load": PointLoad,
+    "base": Base,
+    "rest": RestShape,
+    "rigid_piece": RigidPiece,
+    "marker": Marker,
+    "drive": Drive,
+}
+"""Other parts that tables describe."""
 
-KINDS: Mapping[type, Mapping[str, type]] = {Actuator: ACTUATORS, Profile: PROFILES}
-"""Kinds by what they are."""
 _GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
-
-_BODY = (Material, Ring, Measured, Section, Loads, PointLoad, Base, RestShape, RigidPiece, Marker)
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
 
@@ -73,8 +80,8 @@ class Block(NamedTuple):
     """One table, a list of tables, text or a number."""
     kind: Any
     """Kind of part that a table describes; None for none."""
-    about: str
-    """Description."""
+    about: str = ""
+    """Description; that of a table alone is its kind's."""
     required: bool = False
 
 
@@ -82,20 +89,16 @@ LAYOUT: Mapping[str, Block] = {
     "version": Block(int, None, "Version of the format", required=True),
     "profile": Block(dict, Profile, "Length and outer radius along the arm", required=True),
     "materials": Block(dict, Material, "Materials by name; others are looked up in the library"),
-    "section": Block(dict, Section, "Inside of the arm"),
+    "section": Block(dict, Section),
     "rings": Block(list, Ring, "Layers that actuators live in", required=True),
     "stations": Block(dict, Stations, "Places along the arm by name, Z [m]"),
-    "actuators": Block(
-        list, Actuator, "In the order of the activations; [] for a passive rod", required=True
-    ),
+    "actuators": Block(list, Actuator, "In the order of activations; [] for none", required=True),
     "rigid_pieces": Block(list, RigidPiece, "Where the arm is not deformed"),
-    "drives": Block(
-        list, Drive, "Inputs that activate bundles, before the bundles that none names"
-    ),
+    "drives": Block(list, Drive, "Inputs that activate bundles; others are inputs themselves"),
     "markers": Block(list, Marker, "Points that go with sections of the arm"),
-    "loads": Block(dict, Loads, "Gravity, payload, forces and moments"),
-    "base": Block(dict, Base, "Where in the world the arm is clamped, and which way it points"),
-    "rest": Block(dict, RestShape, "Curvature and twist of the arm that nothing drives"),
+    "loads": Block(dict, Loads),
+    "base": Block(dict, Base),
+    "rest": Block(dict, RestShape),
     "point": Block(str, None, "Name of the marker that counts as the tip"),
     "display": Block(dict, None, "How the design is shown; it changes nothing about the arm"),
 }
@@ -189,7 +192,7 @@ def known_kinds(of: type[Kind]) -> list[str]:
 @cache
 def _every_key() -> Mapping[str, str]:
     """Field -> key of all parts, but for bounds, whose unit depends on the actuator."""
-    kinds = (*PROFILES.values(), *_BODY, *ACTUATORS.values())
+    kinds = (*KINDS[Profile].values(), *TABLES.values(), *KINDS[Actuator].values())
     keys = {field: key for kind in kinds for field, key in field_keys(kind).items()}
     return MappingProxyType({**keys, "inner_radius": "inner_radius_m", "activation_bounds": ""})
 
@@ -208,13 +211,10 @@ class Place(NamedTuple):
 def in_file_terms(
     error: InvalidDesign, source: str = "", places: Mapping[str, Place] = MappingProxyType({})
 ) -> InvalidDesign:
-    """The same faults under a file's keys and in its units.
+    """The same faults under the keys of a file and in its units.
 
-    Args:
-        error: Faults under the fields of parts.
-        source: Name of the file in the error.
-        places: Places of the parts in the file by their paths in the arm; without them, paths stay
-            but for the field at their end.
+    `places` are those of the parts in the file by their paths in the arm; without them, paths stay
+    but for the field at their end.
     """
     faults = [_in_file_terms(fault, places) for fault in error.faults]
     return InvalidDesign(one_a_path(faults), source)
@@ -231,7 +231,9 @@ def one_a_path(faults: Iterable[Fault]) -> list[Fault]:
 def _in_file_terms(fault: Fault, places: Mapping[str, Place]) -> Fault:
     written = [_written(path, places) for path in fault.path.split(", ")]
     names, values = [name for name, _ in written], [value for _, value in written]
-    allowed, value = in_file_units(fault.allowed), fault.value
+    allowed, value = fault.allowed, fault.value
+    if isinstance(allowed, Range) and allowed.unit == "rad":
+        allowed = allowed.in_degrees()
     if any(one is not MISSING for one in values):
         values = [None if one is MISSING else one for one in values]
         value = values[0] if len(values) == 1 else tuple(values)
@@ -259,13 +261,6 @@ def _written(path: str, places: Mapping[str, Place]) -> tuple[str, Any]:
     key = field if field in place.table else place.keys.get(field, field)
     value = MISSING if rest else place.table.get(key, MISSING)
     return f"{place.path}.{key}{rest}".rstrip("."), value
-
-
-def in_file_units(allowed: Range | str) -> Range | str:
-    """The same range of an angle in degrees; anything else as it is."""
-    if isinstance(allowed, Range) and allowed.unit == "rad":
-        return allowed.in_degrees()
-    return allowed
 
 
 def _shown_degrees(value: object) -> object:

@@ -13,7 +13,6 @@ from os import PathLike
 from typing import Any, TypeVar
 
 from softreach.arm.actuators import Actuator
-from softreach.arm.actuators.actuator import MOST_BUNDLES
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.body import named_actuators
 from softreach.arm.design_file.keys import (
@@ -70,12 +69,7 @@ def document_of(
 
 
 def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
-    """The arm of a TOML text.
-
-    Args:
-        text: The text of a design file.
-        source: Its name in errors.
-        make: Makes the arm of its fields.
+    """The arm that `make` makes of the fields in a TOML text, which errors call `source`.
 
     Raises:
         InvalidDesign: Every fault of the tables, and of the arm that the sound ones make, with
@@ -109,10 +103,6 @@ class _Reader(FaultReader):
     def fields(self) -> dict[str, Any]:
         """Fields of the arm, without what is faulty, nor drives of actuators that may be."""
         self._check_layout()
-        listed = self._document.get("actuators")
-        if isinstance(listed, list) and len(listed) > MOST_BUNDLES:
-            self._refuse("actuators", f"{len(listed):,} tables", f"must be at most {MOST_BUNDLES}")
-            return {}
         fields: dict[str, Any] = {"profile": self._alone("profile", Profile)}
         for name, raw in self._table(self._document, "materials").items():
             path = f"materials.{key_text(name)}"
@@ -122,6 +112,7 @@ class _Reader(FaultReader):
         fields["stations"] = self._made(Stations, Place("stations"), places)
         for name in ("actuators", "rigid_pieces", "drives", "markers"):
             fields[name] = self._several(name, LAYOUT[name].kind)
+        listed = self._document.get("actuators")
         if not isinstance(listed, list) or len(fields["actuators"]) < len(listed):
             del fields["drives"]
         for name in ("loads", "base", "rest"):
@@ -159,9 +150,7 @@ class _Reader(FaultReader):
         if own is None:
             return self._refuse(f"{path}.kind", named, _kinds_text(kind, named))
         # A class outside softreach: fields as they are in Python, in SI units.
-        values = {
-            key: self._plain(value, f"{path}.{key}") for key, value in raw.items() if key != "kind"
-        }
+        values = {key: self._plain(x, f"{path}.{key}") for key, x in raw.items() if key != "kind"}
         try:
             return self._made(own, Place(path), values)
         except TypeError as error:
@@ -230,12 +219,10 @@ class _Reader(FaultReader):
             return self._part(Measured, raw, path)
         if key.of_names and not isinstance(raw, str):
             return self._refuse(path, raw, "must be text")
-        if key.field != "point_loads":
-            return raw
-        if not isinstance(raw, list):
-            return self._refuse(path, raw, "must be a list")
-        each = [self._part(PointLoad, one, f"{path}[{k}]") for k, one in enumerate(raw)]
-        return WRONG if WRONG in each else tuple(each)
+        if key.field == "point_loads" and isinstance(raw, list):
+            each = [self._part(PointLoad, one, f"{path}[{k}]") for k, one in enumerate(raw)]
+            return WRONG if WRONG in each else tuple(each)
+        return self._refuse(path, raw, "must be a list") if key.field == "point_loads" else raw
 
     def _number(self, number: Number, raw: Any, path: str) -> Any:
         if isinstance(raw, str) and number.named:  # which for the part is the name of a station
@@ -244,8 +231,7 @@ class _Reader(FaultReader):
             return self._along(number, raw, path)
         if number.unit != "rad":
             return raw
-        angles = [*map(_in_radians, raw)] if isinstance(raw, list) else _in_radians(raw)
-        return tuple(angles) if isinstance(angles, list) else angles
+        return tuple(map(_in_radians, raw)) if isinstance(raw, list) else _in_radians(raw)
 
     def _along(self, number: Number, raw: dict[str, Any], path: str) -> Any:
         """A function along the arm, in the unit of the key that it belongs to."""
@@ -272,10 +258,9 @@ class _Reader(FaultReader):
         self.places[of] = Place(path, field_keys(Material))
         if isinstance(raw, str) and raw in material_names():
             return named_material(raw)
-        if not isinstance(raw, str):
-            allowed = "must be the name of a material, or a table of its values"
-            return self._refuse(path, raw, allowed)
-        return self._refuse(path, raw, _materials_text(raw, [*self._materials]))
+        if isinstance(raw, str):
+            return self._refuse(path, raw, _materials_text(raw, [*self._materials]))
+        return self._refuse(path, raw, "must be the name of a material, or a table of its values")
 
     def _section(self) -> Any:
         rings = [self._part(Ring, raw, path) for raw, path in self._tables(self._document, "rings")]

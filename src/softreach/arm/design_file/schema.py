@@ -9,23 +9,10 @@ from typing import Any
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
 from softreach.arm.base import POINTS
-from softreach.arm.design_file.keys import (
-    ACTUATORS,
-    KINDS,
-    LAYOUT,
-    PROFILES,
-    Block,
-    Key,
-    in_file_units,
-    keys_of,
-)
-from softreach.arm.drives import Drive
-from softreach.arm.loads import PointLoad
+from softreach.arm.design_file.keys import KINDS, LAYOUT, TABLES, Block, Key, keys_of
 from softreach.arm.material import Material
 from softreach.arm.number import Number
-from softreach.arm.section import Measured, Ring
-from softreach.arm.stations import Marker, RigidPiece
-from softreach.support.errors import Range
+from softreach.arm.profile import Profile
 from softreach.support.units import UNITS
 
 _Schema = dict[str, Any]
@@ -41,38 +28,20 @@ _TEXT: _Schema = {"type": "string"}
 
 def json_schema() -> dict[str, Any]:
     """The JSON schema (draft 7) of design files of version 2."""
+    required = [name for name, block in LAYOUT.items() if block.required]
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "softreach design",
         "description": "An arm: lengths in m, angles in degrees, the unit in every key.",
-        **_object(
-            {name: _block(name, block) for name, block in LAYOUT.items()},
-            [name for name, block in LAYOUT.items() if block.required],
-        ),
-        "$defs": _definitions(),
-    }
-
-
-def _definitions() -> dict[str, _Schema]:
-    definitions = {
-        "material": _table(Material, "Isotropic elastic material", without=("name",)),
-        "inline_material": _table(Material, "Material where it is used"),
-        "ring": _table(Ring, "Layer between two radii"),
-        "measured": _table(Measured, "What was measured, in place of what follows from materials"),
-        "drive": _table(Drive, "Input that activates bundles"),
-        "point_load": _table(PointLoad, "Force and moment on one section"),
-        "rigid_piece": _table(RigidPiece, "Stretch that neither bends nor changes its length"),
-        "marker": _table(Marker, "Point that goes with a section; it changes nothing"),
-        "own_actuator": _own("Actuator", ACTUATORS, "kind"),
-        "own_profile": _own("Profile", PROFILES, "kind", "length"),
-    }
-    definitions |= {
-        name: _table(LAYOUT[name].kind, LAYOUT[name].about)
-        for name in ("section", "loads", "base", "rest")
-    }
-    return definitions | {
-        name: _table(kind, kind.__doc__ or "", kind=name)
-        for name, kind in {**PROFILES, **ACTUATORS}.items()
+        **_object({name: _block(name, block) for name, block in LAYOUT.items()}, required),
+        "$defs": {
+            **{name: _table(kind) for name, kind in TABLES.items()},
+            "material": _table(Material, without=("name",)),
+            "inline_material": _table(Material),
+            **{n: _table(part, kind=n) for kinds in KINDS.values() for n, part in kinds.items()},
+            "own_actuator": _own(Actuator, "kind"),
+            "own_profile": _own(Profile, "kind", "length"),
+        },
     }
 
 
@@ -82,10 +51,7 @@ def _block(name: str, block: Block) -> _Schema:
     others: dict[str, _Schema] = {
         "version": {"const": 2},
         "materials": {"type": "object", "additionalProperties": _of("material")},
-        "stations": {
-            "type": "object",
-            "additionalProperties": {"type": "number", "minimum": 0},
-        },
+        "stations": {"type": "object", "additionalProperties": {"type": "number", "minimum": 0}},
         "point": _TEXT,
         "display": _object({"unit": unit}, []),
     }
@@ -105,11 +71,11 @@ def _of(name: str) -> _Schema:
     return {"$ref": f"#/$defs/{name}"}
 
 
-def _own(part: str, kinds: Mapping[str, type], *required: str) -> _Schema:
+def _own(of: type, *required: str) -> _Schema:
     return {
-        "description": f"{part} of a class of one's own: its fields, in SI units",
+        "description": f"{of.__name__} of a class of one's own: its fields, in SI units",
         "type": "object",
-        "properties": {"kind": {**_TEXT, "not": {"enum": [*kinds]}}},
+        "properties": {"kind": {**_TEXT, "not": {"enum": [*KINDS[of]]}}},
         "required": [*required],
         "additionalProperties": True,
     }
@@ -124,17 +90,14 @@ def _object(properties: Mapping[str, _Schema], required: list[str]) -> _Schema:
     }
 
 
-def _table(
-    part: type, description: str, *, kind: str = "", without: tuple[str, ...] = ()
-) -> _Schema:
+def _table(part: type, *, kind: str = "", without: tuple[str, ...] = ()) -> _Schema:
     keys = {name: key for name, key in keys_of(part).items() if name not in without}
     properties = {"kind": {"const": kind}} if kind else {}
     properties |= {name: _value(part, key) for name, key in keys.items()}
-    required = [name for name, key in keys.items() if key.required]
-    if kind and kind != "linear":  # which is the default
-        required.insert(0, "kind")
-    table = _object(properties, required)
-    return {"description": description.partition("\n")[0], **table}
+    required = ["kind"] if kind and kind != "linear" else []  # which is the default
+    required += [name for name, key in keys.items() if key.required]
+    about = (part.__doc__ or "").partition("\n")[0]
+    return {"description": about, **_object(properties, required)}
 
 
 def _value(part: type, key: Key) -> _Schema:
@@ -165,33 +128,25 @@ def _value(part: type, key: Key) -> _Schema:
 
 
 def _number(number: Number) -> _Schema:
-    allowed = in_file_units(number.allowed)
-    assert isinstance(allowed, Range)
+    allowed = number.allowed.in_degrees() if number.unit == "rad" else number.allowed
     about = {"description": f"{number.symbol}: {number.meaning} [{allowed.unit or '-'}]"}
-    single = {"type": "integer" if allowed.whole else "number", **_limits(allowed)}
-    if number.shape == "triple":
-        return {**about, **_TRIPLE}
-    if number.shape == "stations":
-        return {**about, **_NUMBERS}
-    if number.shape == "series":
-        return {**about, "type": "array", "items": single}
-    if number.along is None:
-        return {**about, **single}
+    single: _Schema = {"type": "integer" if allowed.whole else "number"}
+    if allowed.low > -math.inf:
+        single["exclusiveMinimum" if allowed.open_low else "minimum"] = allowed.low
+    if allowed.high < math.inf:
+        single["exclusiveMaximum" if allowed.open_high else "maximum"] = allowed.high
+    series = {"type": "array", "items": single}
+    shapes = {"triple": _TRIPLE, "stations": _NUMBERS, "series": series}
+    if number.shape in shapes or number.along is None:
+        return about | shapes.get(number.shape, single)
     kinds = ["cubic", "linear", *(() if number.along is Samples else ("constant",))]
     properties = {
         "stations_over_length": _NUMBERS,
-        "values": {"type": "array", "items": single},
+        "values": series,
         "interpolation": {"enum": kinds},
     }
     along = _object(properties, ["stations_over_length", "values"])
     if number.shape == "along":
-        return {**about, **along}
-    pair = [{"type": "array", "items": single, "minItems": 2, "maxItems": 2}] if number.pair else []
-    return {**about, "anyOf": [single, *pair, along]}
-
-
-def _limits(allowed: Range) -> dict[str, float]:
-    low = "exclusiveMinimum" if allowed.open_low else "minimum"
-    high = "exclusiveMaximum" if allowed.open_high else "maximum"
-    ends = ((low, allowed.low), (high, allowed.high))
-    return {word: end for word, end in ends if abs(end) < math.inf}
+        return about | along
+    pair = [{**series, "minItems": 2, "maxItems": 2}] if number.pair else []
+    return about | {"anyOf": [single, *pair, along]}
