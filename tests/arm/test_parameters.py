@@ -24,6 +24,7 @@ from softreach.arm.section import Ring, Section, name_faults
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.cable import Cable
+from tests.calibration.arms import pulled_wire
 from tests.laws import arm_of, arms, in_box
 
 SAMPLED = Samples(stations_over_length=(0.0, 0.3, 1.0), values=(0.0, 0.1, 0.3))
@@ -402,3 +403,15 @@ def test_bounds_of_different_units_are_no_common_parameter(trunk):
     known = parameters(trunk.replace(actuators=(*trunk.actuators, Cable(place=(0.0, 0.01)))))
     assert known["cable 4.lower"].unit == "N"
     assert "lower" not in known
+
+
+def test_a_number_of_each_bundle_is_one_for_all_or_one_for_each():
+    arm = pulled_wire()
+    one = changed(arm, {"s1.slack[1]": 1e-3})
+    assert one.actuators[0].slack == (0.0, 1e-3, 0.0)
+    assert parameters(one)["s1.slack"].values(one) == (0.0, 1e-3, 0.0)
+    assert changed(one, {"s1.slack": 2e-3}).actuators[0].slack == 2e-3
+    assert Manipulator.from_toml(one.to_toml()) == one
+    for wrong in ([1e-3], [1e-3, np.nan, 0.0], [], "x", (1e-3, True, 0.0), [[1e-3] * 3]):
+        with pytest.raises(InvalidDesign, match="slack"):
+            arm.actuators[0].replace(slack=wrong)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.arm.parameters import changed
 from softreach.calibration.calibration import leave_one_run_out
 from softreach.calibration.errors import judged, repeatability
 from softreach.calibration.fit import identifiable
@@ -60,6 +61,19 @@ def test_tendons_driven_by_length_are_found_with_their_slack():
     result = sr.calibrate(pulled_wire(), data, free=free, rivals=False, robust=False)
     assert result.values["s1.slack"] == pytest.approx(0.4e-3, abs=2e-6)
     assert result.values["s1.tendon_stiffness"] == pytest.approx(5e3, rel=1e-2)
+
+
+def test_each_tendon_may_have_its_own_slack():
+    truth, zeros = pulled_wire(), (0.4e-3, 0.0, -0.3e-3)
+    inner, outer = truth.actuators
+    truth = truth.replace(actuators=(inner.replace(slack=zeros, tendon_stiffness=5e3), outer))
+    data = measured(truth, noise=0.0, inputs=0.3 * random_inputs(truth, 60))
+    start = changed(pulled_wire(), {"s1.tendon_stiffness": 5e3})
+    free = ["s1.slack[*]", "pose.z"]
+    result = sr.calibrate(start, data, free=free, rivals=False, robust=False)
+    found = [result.values[f"s1.slack[{k}]"] for k in range(3)]
+    np.testing.assert_allclose(found, zeros, atol=2e-6)
+    assert result.arm.actuators[0].slack == tuple(found)
 
 
 def test_a_prior_and_the_data_share_a_number_by_their_widths():

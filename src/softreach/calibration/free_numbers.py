@@ -209,7 +209,11 @@ def _once(arm: Manipulator, known: Mapping[str, Parameter], names: Sequence[str]
     twins |= {name for name in own if f"{name}_over_length" in own}
     for name, parameter in own.items():
         part = parts(arm).get(parameter.part or ())
-        given = getattr(part, parameter.number.field, 0.0) is not None
+        value = getattr(part, parameter.number.field, 0.0)
+        if parameter.number.each:
+            of_bundles = {other for other in own if other.startswith(f"{name}[")}
+            twins |= {name} if isinstance(value, tuple) else of_bundles
+        given = value is not None
         others = f"{name}_ratio", name.replace("revolution", "helical_angle")
         twins |= {(other if given else name) for other in others if other != name and other in own}
     return [name for name in own or kept if name not in twins]

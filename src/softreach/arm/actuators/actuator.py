@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from softreach.arm.along import AlongArm
-from softreach.arm.number import MOST, Number, as_numbers, number
+from softreach.arm.number import MOST, Number, as_numbers, fields_of, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span
@@ -111,18 +111,31 @@ class Actuator(Span, ABC):
 
     @property
     def numbers(self) -> dict[str, Number]:
-        """With the bounds, `lower` and `upper` of all bundles, `lower[1]` of one of several."""
+        """With those of each bundle, and the bounds: `lower` of all, `lower[1]` of one."""
         allowed = Range(unit="" if self.unit == "1" else self.unit)
         bundles = ["", *(f"[{k}]" for k in range(self.bundles))] if self.bundles > 1 else [""]
         ends = ("lower", "min", "lowest activation"), ("upper", "max", "highest activation")
-        return super().numbers | {
-            f"{end}{k}": Number(symbol=f"{short} {self.symbol}{k}", meaning=about, allowed=allowed)
-            for end, short, about in ends
-            for k in bundles
-        }
+        own = (
+            each.elements(self.of_bundles(each.field)) for each in self._each if self.bundles > 1
+        )
+        of_bundles = {name: number for numbers in own for name, number in numbers.items()}
+        return (
+            super().numbers
+            | of_bundles
+            | {
+                f"{end}{k}": Number(
+                    symbol=f"{short} {self.symbol}{k}", meaning=about, allowed=allowed
+                )
+                for end, short, about in ends
+                for k in bundles
+            }
+        )
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
-        """A bound of all bundles in each."""
+        """A number of all bundles in each."""
+        field, _, k = name.removesuffix("]").partition("[")
+        if field in {each.field for each in self._each}:
+            return self.of_bundles(field) if not k else (self.of_bundles(field)[int(k)],)
         if not (bound := _BOUND.fullmatch(name)):
             return super().values_of(name, profile, section)
         each = self.bounds[:, int(bound[1] == "upper")].tolist()
@@ -147,7 +160,20 @@ class Actuator(Span, ABC):
                     raise InvalidDesign([Fault(name, value, allowed)])
                 bounds[slice(None) if k is None else int(k), int(end == "upper")] = value
             changes["activation_bounds"] = tuple(map(tuple, bounds.tolist()))
+        for field in {each.field for each in self._each} - set(changes):
+            if any(name.startswith(f"{field}[") for name in changes):
+                changes[field] = self.of_bundles(field)
         return super().replace(**changes)
+
+    @property
+    def _each(self) -> list[Number]:
+        """Its numbers that each bundle may have by itself."""
+        return [each for each in fields_of(type(self)).values() if each.each]
+
+    def of_bundles(self, field: str) -> tuple[float, ...]:
+        """Values of a number for each bundle, whether it is one for all or one for each."""
+        values = np.asarray(getattr(self, field), float)
+        return tuple(np.broadcast_to(values, self.bundles).tolist())
 
     @abstractmethod
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
@@ -199,6 +225,11 @@ class Actuator(Span, ABC):
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
         bundles = None if any(fault.path == "bundles" for fault in faults) else self.bundles
+        blamed = {fault.path.partition("[")[0] for fault in faults}
+        for field in {each.field for each in self._each} - blamed if bundles else ():
+            given, allowed = getattr(self, field), f"must be one number, or {bundles}, one a bundle"
+            if isinstance(given, list | tuple) and len(given) != bundles:
+                faults.append(Fault(field, given, allowed))
         return faults + bounds_faults(self.activation_bounds, bundles)
 
 
