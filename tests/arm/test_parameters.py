@@ -415,3 +415,24 @@ def test_a_number_of_each_bundle_is_one_for_all_or_one_for_each():
     for wrong in ([1e-3], [1e-3, np.nan, 0.0], [], "x", (1e-3, True, 0.0), [[1e-3] * 3]):
         with pytest.raises(InvalidDesign, match="slack"):
             arm.actuators[0].replace(slack=wrong)
+
+
+def test_bundles_may_be_counted_clockwise_or_stand_unevenly():
+    """The angle of each is a number of its own, and the shape is that of bundles by themselves."""
+    arm = pulled_wire()
+    inner = arm.actuators[0]
+    clockwise = inner.replace(offset=np.radians([0.0, -120.0, -240.0]).tolist())
+    np.testing.assert_allclose(
+        np.cos(clockwise.start_angles), np.cos(inner.replace(offset=0.0).start_angles)
+    )
+    turned = arm.replace(actuators=(clockwise, arm.actuators[1]))
+    pulled = np.array([[0.002, 0.0, 0.001, 0.0, 0.001, 0.0]])
+    other = changed(arm, {"s1.offset": 0.0})
+    np.testing.assert_allclose(
+        tip_positions(turned, pulled), tip_positions(other, pulled[:, [0, 2, 1, 3, 4, 5]])
+    )
+    assert Manipulator.from_toml(turned.to_toml()) == turned
+    one = changed(arm, {"s1.offset[2]": 0.5})
+    np.testing.assert_array_equal(one.actuators[0].start_angles[:2], inner.start_angles[:2])
+    assert one.actuators[0].start_angles[2] == 0.5
+    assert changed(turned, {"s1.offset": 0.0}).actuators[0] == inner
