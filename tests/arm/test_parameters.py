@@ -26,6 +26,7 @@ from softreach.arm.section import Measured, Ring, Section, name_faults
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.cable import Cable
+from tests.calibration.arms import pulled_wire
 from tests.laws import arm_of, arms, in_box
 
 SAMPLED = Samples(stations_over_length=(0.0, 0.3, 1.0), values=(0.0, 0.1, 0.3))
@@ -411,3 +412,36 @@ def test_bounds_of_different_units_are_no_common_parameter(trunk):
     known = parameters(trunk.replace(actuators=(*trunk.actuators, Cable(place=(0.0, 0.01)))))
     assert known["cable 4.lower"].unit == "N"
     assert "lower" not in known
+
+
+def test_a_number_of_each_bundle_is_one_for_all_or_one_for_each():
+    arm = pulled_wire()
+    one = changed(arm, {"s1.slack[1]": 1e-3})
+    assert one.actuators[0].slack == (0.0, 1e-3, 0.0)
+    assert parameters(one)["s1.slack"].values(one) == (0.0, 1e-3, 0.0)
+    assert changed(one, {"s1.slack": 2e-3}).actuators[0].slack == 2e-3
+    assert Manipulator.from_toml(one.to_toml()) == one
+    for wrong in ([1e-3], [1e-3, np.nan, 0.0], [], "x", (1e-3, True, 0.0), [[1e-3] * 3]):
+        with pytest.raises(InvalidDesign, match="slack"):
+            arm.actuators[0].replace(slack=wrong)
+
+
+def test_bundles_may_be_counted_clockwise_or_stand_unevenly():
+    """The angle of each is a number of its own, and the shape is that of bundles by themselves."""
+    arm = pulled_wire()
+    inner = arm.actuators[0]
+    clockwise = inner.replace(offset=np.radians([0.0, -120.0, -240.0]).tolist())
+    np.testing.assert_allclose(
+        np.cos(clockwise.start_angles), np.cos(inner.replace(offset=0.0).start_angles)
+    )
+    turned = arm.replace(actuators=(clockwise, arm.actuators[1]))
+    pulled = np.array([[0.002, 0.0, 0.001, 0.0, 0.001, 0.0]])
+    other = changed(arm, {"s1.offset": 0.0})
+    np.testing.assert_allclose(
+        tip_positions(turned, pulled), tip_positions(other, pulled[:, [0, 2, 1, 3, 4, 5]])
+    )
+    assert Manipulator.from_toml(turned.to_toml()) == turned
+    one = changed(arm, {"s1.offset[2]": 0.5})
+    np.testing.assert_array_equal(one.actuators[0].start_angles[:2], inner.start_angles[:2])
+    assert one.actuators[0].start_angles[2] == 0.5
+    assert changed(turned, {"s1.offset": 0.0}).actuators[0] == inner

@@ -4,13 +4,22 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.arm.parameters import changed
 from softreach.calibration.calibration import leave_one_run_out
 from softreach.calibration.errors import judged, repeatability
+from softreach.calibration.fit import identifiable
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import marker_names, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.rod.kinematics import marker_positions
-from tests.calibration.arms import MODULUS, hanging_tentacle, measured, pulled_wire, random_inputs
+from tests.calibration.arms import (
+    MODULUS,
+    hanging_tentacle,
+    measured,
+    pulled_wire,
+    random_inputs,
+    table,
+)
 
 
 def test_poses_without_noise_lead_back_to_the_arm():
@@ -30,6 +39,19 @@ def test_poses_without_noise_lead_back_to_the_arm():
     np.testing.assert_allclose(result.arm.base.rotation, truth.base.rotation, atol=1e-3)
 
 
+def test_data_of_a_camera_without_a_scale_lead_back_to_the_arm():
+    truth = hanging_tentacle()
+    data = measured(truth, 12, noise=0.0)
+    data |= {name: 0.37 * x for name, x in data.items() if name.endswith("_mm")}
+    free = ["scale", "pose", "t.distance"]
+    start = truth.replace(actuators=(truth.actuators[0].replace(distance=0.008),))
+    result = sr.calibrate(start, data, free=free, rivals=False, robust=False)
+    assert result.train.rms < 1e-6
+    assert result.values["scale"] == pytest.approx(0.37, rel=1e-4)
+    assert result.values["t.distance"] == pytest.approx(0.009, rel=1e-3)
+    assert result.errors_on(data).rms < 1e-6
+
+
 def test_tendons_driven_by_length_are_found_with_their_slack():
     truth = pulled_wire()
     tendon = truth.actuators[0].replace(slack=0.4e-3, tendon_stiffness=5e3)
@@ -39,6 +61,19 @@ def test_tendons_driven_by_length_are_found_with_their_slack():
     result = sr.calibrate(pulled_wire(), data, free=free, rivals=False, robust=False)
     assert result.values["s1.slack"] == pytest.approx(0.4e-3, abs=2e-6)
     assert result.values["s1.tendon_stiffness"] == pytest.approx(5e3, rel=1e-2)
+
+
+def test_each_tendon_may_have_its_own_slack():
+    truth, zeros = pulled_wire(), (0.4e-3, 0.0, -0.3e-3)
+    inner, outer = truth.actuators
+    truth = truth.replace(actuators=(inner.replace(slack=zeros, tendon_stiffness=5e3), outer))
+    data = measured(truth, noise=0.0, inputs=0.3 * random_inputs(truth, 60))
+    start = changed(pulled_wire(), {"s1.tendon_stiffness": 5e3})
+    free = ["s1.slack[*]", "pose.z"]
+    result = sr.calibrate(start, data, free=free, rivals=False, robust=False)
+    found = [result.values[f"s1.slack[{k}]"] for k in range(3)]
+    np.testing.assert_allclose(found, zeros, atol=2e-6)
+    assert result.arm.actuators[0].slack == tuple(found)
 
 
 def test_a_prior_and_the_data_share_a_number_by_their_widths():
@@ -97,11 +132,51 @@ def test_bands_are_those_of_the_arms_that_are_as_likely():
     arm = hanging_tentacle()
     result = sr.calibrate(arm, measured(arm, 20, noise=1e-3), free=FREE[:2], rivals=False)
     inputs = random_inputs(arm, 3, seed=9)
-    places, sigma = result.predict(inputs)
+    places, sigma = result.predict(inputs, numbers_only=True)
     np.testing.assert_allclose(places, marker_positions(result.arm, inputs, 1e-9), atol=1e-7)
     best, spread = result.band(lambda other: marker_positions(other, inputs), count=200)
     np.testing.assert_allclose(best, places, atol=1e-6)
     np.testing.assert_allclose(spread, sigma, rtol=0.3, atol=1e-6)
+
+
+def test_predictions_hold_measured_places_as_often_as_they_say():
+    """Markers differ in noise, and so do directions."""
+    arm, rng = hanging_tentacle(), np.random.default_rng(5)
+    noise = np.array([[4e-4, 8e-4, 2e-3], [3e-3, 1e-3, 5e-4]])
+    inputs, later = random_inputs(arm, 60), random_inputs(arm, 500, seed=9)
+    places = marker_positions(arm, inputs, 1e-9)
+    places += noise * rng.standard_normal(places.shape)
+    data = table(places, inputs, arm.input_names, ["half", "tool"])
+    for out in (0.0, 0.5):
+        result = sr.calibrate(arm, data, free=FREE, rivals=False, hold_out=out)
+        predicted, sigma = result.predict(later)
+        measured = marker_positions(arm, later, 1e-9)
+        measured += noise * rng.standard_normal(measured.shape)
+        # 95 % of a normal distribution; of 30 poses σ itself is known to 13 %.
+        held = (np.abs(predicted - measured) <= 2 * sigma).mean(axis=0)
+        assert held.min() > 0.88
+        assert held.max() < 0.99
+
+
+def test_whole_runs_are_held_out_where_there_are_eight():
+    arm = hanging_tentacle()
+
+    def fit(runs, **options):
+        data = measured(arm, 32, runs=runs)
+        options = {"free": [MODULUS], "rivals": False, "hold_out": 0.25} | options
+        return sr.calibrate(arm, data, **options)
+
+    many, few, chosen, single = fit(8), fit(4), fit(4, hold_out_runs=True), fit(1)
+    assert many.held_runs
+    assert chosen.held_runs
+    assert not few.held_runs
+    assert many.held.sum() == chosen.held.sum() == few.held.sum() == 8
+    assert "8 of other motions" in str(many)
+    assert "rows of one motion are neighbors" in str(few)
+    for result in (many, chosen, single):
+        assert "rows of one motion" not in str(result)
+    with pytest.raises(sr.NotPossible, match="two runs or more"):
+        fit(1, hold_out_runs=True)
 
 
 def test_a_row_that_names_no_run_leaves_the_others_theirs():
@@ -159,6 +234,16 @@ def test_places_are_those_of_the_markers_or_of_the_tip(arm):
         np.testing.assert_allclose(places[:, 0], sr.tip_positions(arm, inputs, 1e-9), atol=2e-7)
 
 
+def test_only_the_numbers_that_trade_are_refused(rng):
+    free = free_numbers(hanging_tentacle(), [MODULUS, "t.distance", "pose"])
+    slopes = rng.standard_normal((60, len(free))) / free.scale
+    identifiable(free, slopes)
+    slopes[:, 3] = (slopes[:, 2] * free.scale[2] - slopes[:, 4] * free.scale[4]) / free.scale[3]
+    slopes[:, 7] = -2.0 * slopes[:, 6] * free.scale[6] / free.scale[7]
+    with pytest.raises(sr.InvalidInput, match=r"^free = pose.ry, pose.rz: must be numbers that"):
+        identifiable(free, slopes)
+
+
 def by_differences(model, values, way):
     """Derivative of places along a direction of the values, of fourth order."""
     step = 2e-3
@@ -168,6 +253,7 @@ def by_differences(model, values, way):
 
 TENTACLE = [
     "pose",
+    "scale",
     "rings[0].material.young_modulus",
     "rings[0].material.density",
     "rings[0].material.poisson_ratio",
@@ -214,7 +300,7 @@ WIRE = [
 def test_derivatives_are_those_of_differences(arm, free, share, each, rng):
     """By each number, or along two directions in which all of them change."""
     model = model_of(arm, free, share * random_inputs(arm, 2, seed=3))
-    values = model.free.start
+    values = model.free.start * np.where(np.array(model.free.names) == "scale", 1.3, 1.0)
     slopes = model.predict(values, slopes=True).slopes
     count = len(values)
     ways = np.eye(count) if each else rng.choice([-1, 1], (2, count)) / np.sqrt(count)

@@ -224,10 +224,10 @@ class Manipulator(Body):
         if count == 1:
             return self
         extent = original.extent if keep_extent else original.extent / count
-        places = (original.offset + (k - (count - 1) / 2) * extent for k in range(count))
+        places = original.start_angles[0] + (np.arange(count) - (count - 1) / 2) * extent
         parts = (
             original.replace(name=f"{original.name} {k}", offset=place, extent=extent)
-            for k, place in enumerate(places, start=1)
+            for k, place in enumerate(places.tolist(), start=1)
         )
         others = self.actuators[:index], self.actuators[index + 1 :]
         return self.replace(actuators=(*others[0], *parts, *others[1]))

@@ -140,6 +140,8 @@ class Number:
     """The name of a station of the arm may take its place."""
     pair: bool = False
     """Two values, where the part begins and where it ends, may take its place."""
+    each: bool = False
+    """One value for each bundle of an actuator may take its place."""
     instead_of: str = ""
     """Field of the part that says the same in another way: one of the two is given."""
     hint: str = ""
@@ -183,6 +185,8 @@ class Number:
             return self._refused(("", x) for x in value.values)  # pyright: ignore
         if self._is_pair(value):
             return self._refused(("", x) for x in each.tolist())
+        if self._is_of_bundles(value):
+            return self._refused((f"[{k}]", x) for k, x in enumerate(each.tolist()))
         return self._faults_of_one(plain(value))
 
     def _refused(self, elements: Iterable[tuple[str, float]]) -> list[Fault]:
@@ -212,13 +216,15 @@ class Number:
 
     def _element(self, k: int) -> Number:
         called = {"symbol": f"{self.symbol}[{k}]", "meaning": f"{self.meaning}, number {k}"}
-        return dataclasses.replace(self, shape="single", along=None, pair=False, **called)
+        alone: dict[str, Any] = {"along": None, "pair": False, "each": False}
+        return dataclasses.replace(self, shape="single", **alone, **called)
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
         if self.shape == "triple":
             return tuple(x if abs(x) > _NOTHING else 0.0 for x in as_numbers(value).tolist())
-        if self.shape in ("series", "stations", "several") or self._is_pair(value):
+        several = self._is_pair(value) or self._is_of_bundles(value)
+        if several or self.shape in ("series", "stations", "several"):
             return tuple(np.asarray(value, float).tolist())
         is_function = self.along is not None and isinstance(value, self.along)
         if value is None or is_function or self._is_name(value):
@@ -230,6 +236,10 @@ class Number:
 
     def _is_pair(self, value: Any) -> bool:
         return self.pair and as_numbers(value).shape == (2,)
+
+    def _is_of_bundles(self, value: Any) -> bool:
+        each = as_numbers(value)
+        return self.each and each.ndim == 1 and each.size > 0 and each.shape == np.shape(value)
 
 
 def stations(meaning: str) -> Any:

@@ -57,7 +57,8 @@ class LengthLaw:
     @lazy
     def taut_from(self) -> Array:
         """Displacement from which each is taut while the arm keeps its shape [m]."""
-        return np.array([tendon.taut_from for tendon in self._tendons])
+        tendons = (each for each in self.arm.actuators if isinstance(each, LengthTendon))
+        return np.concatenate([np.empty(0), *(tendon.taut_from for tendon in tendons)])
 
     @lazy
     def _tendons(self) -> list[LengthTendon]:

@@ -21,7 +21,7 @@ from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel, marker_stations
 from softreach.calibration.result import Calibration, Rival
-from softreach.calibration.uncertainty import uncertainty
+from softreach.calibration.uncertainty import FEWEST_RUNS, uncertainty
 from softreach.rod.summary import design_warnings
 from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Mask
@@ -41,6 +41,7 @@ def calibrate(
     free: Sequence[str],
     prior: Mapping[str, Any] | None = None,
     hold_out: float = 0.0,
+    hold_out_runs: bool | None = None,
     robust: bool = True,
     noise: float | None = None,
     rivals: bool = True,
@@ -64,6 +65,8 @@ def calibrate(
         prior: What is known of a number beforehand, by its name: its width about the value of the
             design, or (mean, width).
         hold_out: Share of the samples, by chance, that the fit does not see.
+        hold_out_runs: Hold out whole runs, which shows what to expect of other motions, or single
+            samples; by default runs where the data has eight or more.
         robust: Let samples far off count less than their squares.
         noise: Standard deviation of a measured coordinate [m], against which priors are weighed;
             by default that of the residuals.
@@ -87,12 +90,13 @@ def calibrate(
     arm = a_manipulator("arm", arm)
     hold_out = as_number("hold_out", hold_out, Range(0.0, 0.9))
     robust, rivals = as_flag("robust", robust), as_flag("rivals", rivals)
+    by_run = None if hold_out_runs is None else as_flag("hold_out_runs", hold_out_runs)
     noise = None if noise is None else as_number("noise", noise, Range(0.0, 1.0, "m", True))
     table = read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
     rows = np.concatenate([table.inputs, table.places.reshape(len(table), -1)], axis=1)
     if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
         warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
-    held = _held_out(len(table), hold_out, as_integer("seed", seed))
+    held = _held_out(table, hold_out, by_run, as_integer("seed", seed))
     train, progress = table.of(~held), as_progress(progress)
     model = MarkerModel.of(free_numbers(arm, free, prior), train)
     fit_to = partial(fitted, robust=robust, noise=noise, progress=progress)
@@ -114,12 +118,18 @@ def calibrate(
     return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
 
 
-def _held_out(count: int, share: float, seed: int) -> Mask:
-    held, out = np.zeros(count, bool), round(share * count)
+def _held_out(table: Measurements, share: float, by_run: bool | None, seed: int) -> Mask:
+    """Samples that the fit does not see: all of some runs, or some of all samples, by chance."""
+    runs = len(table.run_names)
+    by_run = runs >= FEWEST_RUNS if by_run is None else by_run
+    if share and by_run and runs < 2:
+        raise NotPossible("holding out runs needs two runs or more: name their column by `run`")
+    parts, count, what = (table.runs, runs, "runs") if by_run else (None, len(table), "samples")
+    out = max(round(share * count), 1 if by_run and share else 0)
     if out == count:
-        raise InvalidInput("hold_out", share, f"a share that leaves some of {count} samples")
-    held[np.random.default_rng(seed).permutation(count)[:out]] = True
-    return held
+        raise InvalidInput("hold_out", share, f"a share that leaves some of {count} {what}")
+    chosen = np.random.default_rng(seed).permutation(count)[:out]
+    return np.isin(np.arange(count) if parts is None else parts, chosen)
 
 
 def _rivals(

@@ -20,6 +20,7 @@ _LAW = 0.2
 _SURE = 2.5  # gain in a tenth of the samples, over its standard error, that is not chance
 _WIDTHS = (0.5, 0.25)  # of the bells in laws of the inputs, over their ranges
 _BELLS = 80
+_SHUFFLES = 3  # orders of commands by chance, none of which may explain as much
 _PENALTIES = np.logspace(-7, 1, 9)
 _SLIPS = 0.03  # share of samples far off that may be slips
 
@@ -117,12 +118,17 @@ def judged(
     known = bool(np.isfinite(repeated.rms))
     text += f", repeated inputs differ by {1e3 * repeated.rms:.3g} mm" if known else ""
     law, share = _explained(data, residuals)
+    in_a_row = share is not None
+    share = share or 0.0
     if share > max(_MEMORY, law) and not finding:
         limit = "memory"
         said = f"limited by memory: the commands before explain {100 * share:.0f} % of what is "
         said += "left (friction, creep or slack of the drives), which no law of the inputs does"
     elif known and error <= _NOISE * repeated.rms and law < _LAW and not finding:
         limit, said = "noise", "limited by noise: the error is that of the data itself"
+        if not in_a_row:
+            limit, said = "data", "the error is that of the data itself; too few samples in a row"
+            said += " to look for memory"
     elif len(data) < _FEW:
         limit, said = "data", "too few samples to say what limits the fit"
     elif law < _LAW and not known and not finding:
@@ -158,12 +164,13 @@ def _finding(data: Measurements, far: Mask) -> str:
     return ""
 
 
-def _explained(data: Measurements, residuals: Array) -> tuple[float, float]:
+def _explained(data: Measurements, residuals: Array) -> tuple[float, float | None]:
     """Shares of squared residuals that the inputs explain, and the last command beyond these.
 
     Both are cross-validated. Laws of the inputs are quadratic, and with bells of several widths;
     to each the change from the last command and its sign are added. A gain counts if it is the
-    same all over the samples.
+    same all over the samples, and beyond that of last commands drawn by chance. The second is None
+    where too few samples follow each other in a run.
     """
     order = data.order
     flat = residuals.reshape(len(residuals), -1)[order]
@@ -171,17 +178,19 @@ def _explained(data: Measurements, residuals: Array) -> tuple[float, float]:
     x, runs = data.inputs[order][:, moving], data.runs[order]
     known = np.isfinite(flat).all(axis=1) & np.append(False, runs[1:] == runs[:-1])
     if known.sum() < 10 * (1 + 3 * x.shape[1]):
-        return 0.0, 0.0
+        return 0.0, None
     x = (x - x.mean(axis=0)) / np.ptp(x, axis=0)
-    change = -np.diff(x, axis=0, prepend=x[:1])
-    before = np.concatenate([change, np.tanh(change / 0.1)], axis=1)[known]
-    x, target = x[known], flat[known]
-    plain = with_products(x)
-    some = np.random.default_rng(0).permutation(len(x))[:_BELLS]
+    x, last, target = x[known], np.roll(x, 1, axis=0)[known], flat[known]
+    plain, rng = with_products(x), np.random.default_rng(0)
+    some = rng.permutation(len(x))[:_BELLS]
     square = ((x[:, None] - x[some]) ** 2).mean(axis=2)
     laws = [plain, *(np.concatenate([plain, np.exp(-0.5 * square / w**2)], 1) for w in _WIDTHS)]
-    alone = min((_left(law, target) for law in laws), key=np.sum)
-    wide = min((_left(np.concatenate([law, before], 1), target) for law in laws), key=np.sum)
+
+    def after(last: Array) -> Array:
+        change = last - x
+        before = np.concatenate([change, np.tanh(change / 0.1)], axis=1)
+        return min((_left(np.concatenate([law, before], 1), target) for law in laws), key=np.sum)
+
     total = float(((target - target.mean(axis=0)) ** 2).sum())
 
     def share(less: Array, more: Array) -> float:
@@ -189,7 +198,12 @@ def _explained(data: Measurements, residuals: Array) -> tuple[float, float]:
         sure = gain.mean() > _SURE * gain.std(ddof=1) / np.sqrt(len(gain))
         return min(1.0, float(gain.sum()) / total) if sure and total > 0 else 0.0
 
-    return share(alone, _left(np.zeros((len(x), 1)), target)), share(wide, alone)
+    alone, wide = min((_left(law, target) for law in laws), key=np.sum), after(last)
+    memory = share(wide, alone)
+    if memory > _MEMORY:
+        others = (after(rng.permutation(last)) for _ in range(_SHUFFLES))
+        memory = share(wide, min(alone, *others, key=np.sum))
+    return share(alone, _left(np.zeros((len(x), 1)), target)), memory
 
 
 def with_products(x: Array) -> Array:

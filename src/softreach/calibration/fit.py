@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.calibration.errors import misses
-from softreach.calibration.free_numbers import POSE, FreeNumbers
+from softreach.calibration.free_numbers import POSE, SCALE, FreeNumbers
 from softreach.calibration.model import MarkerModel, Prediction
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
@@ -72,19 +72,22 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
         moved = zip(POSE[:3], start + shift, strict=True)
         return free.started_at({name: place for name, place in moved if name in moving})
     _refuse_exchanged(model, each, places)
-    rotation, shift = _kabsch(predicted, measured)
+    rotation, scale, place = _kabsch(free, predicted - start, measured)
     from scipy.spatial.transform import Rotation
 
-    place, vector = rotation @ start + shift, Rotation.from_matrix(rotation).as_rotvec()
-    return free.started_at(dict(zip(POSE, [*place, *vector], strict=True)))
+    vector = Rotation.from_matrix(rotation).as_rotvec()
+    return free.started_at(dict(zip((*POSE, SCALE), [*place, *vector, scale], strict=True)))
 
 
-def _kabsch(predicted: Array, measured: Array) -> tuple[Array, Array]:
-    """Rotation and shift that carry predicted places to measured ones, least squares."""
+def _kabsch(free: FreeNumbers, predicted: Array, measured: Array) -> tuple[Array, float, Array]:
+    """Rotation, scale and shift that carry predicted places to measured ones, least squares."""
     here, there = predicted.mean(axis=0), measured.mean(axis=0)
     left, _, right = np.linalg.svd((measured - there).T @ (predicted - here))
     rotation = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
-    return rotation, there - rotation @ here
+    turned, scale = (predicted - here) @ rotation.T, 1.0
+    if SCALE in free.names and turned.any():
+        scale = max(float(((measured - there) * turned).sum() / (turned**2).sum()), 1e-3)
+    return rotation, scale, there - scale * rotation @ here
 
 
 def _miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
@@ -95,8 +98,8 @@ def _miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
         return np.inf
     predicted, measured = predicted[known], measured[known]
     if set(POSE) <= set(free.names):
-        rotation, shift = _kabsch(predicted, measured)
-        off = predicted @ rotation.T + shift - measured
+        rotation, scale, shift = _kabsch(free, predicted, measured)
+        off = scale * predicted @ rotation.T + shift - measured
     else:
         off = predicted - measured
         off -= [np.median(off[:, k]) if POSE[k] in free.names else 0.0 for k in range(3)]
@@ -199,14 +202,25 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
         raise InvalidInput("free", f"{len(free)} numbers", allowed)
     if values[-1] > SAME * values[0]:
         return
-    moves = np.abs(axes[-1]) * sizes
-    trading = [free.names[k] for k in np.flatnonzero(moves > 0.05 * moves.max())]
+    null = axes[values <= SAME * values[0]]
+    trading = [free.names[k] for k in _fewest(null * sizes)]
     allowed = (
         "numbers that the data can tell apart: these change together without moving any marker, "
         f"as only their ratio or their sum shows; leave out one, such as {trading[-1]}, or give "
         "it a prior"
     )
     raise InvalidInput("free", ", ".join(trading), allowed)
+
+
+def _fewest(directions: Array) -> list[int]:
+    """The fewest numbers that change in one of all combinations of these directions."""
+    from scipy.linalg import qr, solve
+
+    # Each number of a basis changes in one combination and not in the others.
+    basis = qr(directions, mode="r", pivoting=True)[1][: len(directions)]
+    sparse = np.abs(solve(directions[:, basis], directions))
+    changes = sparse > 0.05 * sparse.max(axis=1, keepdims=True)
+    return np.flatnonzero(changes[changes.sum(axis=1).argmin()]).tolist()
 
 
 def fitted(

@@ -23,6 +23,9 @@ from softreach.support.errors import InvalidDesign, InvalidInput, Range
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
 
+SCALE = "scale"
+"""Lengths of the data over those of the arm, seen from its base: of a camera without a scale."""
+
 _PLACES = ("station", "start", "end")  # Numbers in m that lie on the arm
 _UNFIT = re.compile(r"(.*\.)?(lower|upper)(\[\d+\])?|base\..*|loads\.(follower|tip_moment).*")
 """Numbers that no wildcard frees: bounds, what the pose frees, loads without a derivative."""
@@ -32,8 +35,8 @@ _CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 12))
 
 
-Neighbors = list[tuple[float, Manipulator | Base]]
-"""Arms around one, or their bases alone, with the factors of a derivative by a number."""
+Neighbors = list[tuple[float, Manipulator | Base | float]]
+"""Arms around one, their bases or the scales of the data alone, with the factors of a derivative by a number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,14 +98,18 @@ class FreeNumbers:
 
     @cached_property
     def _parameters(self) -> dict[str, Parameter]:
-        names = [number.name for number in self.numbers if number.name not in POSE]
+        names = [number.name for number in self.numbers if number.name not in (*POSE, SCALE)]
         return find_parameters(self.arm, tuple(path for name in names for path in _tied(name)))
+
+    def scaled(self, values: Array) -> float:
+        """Lengths of the data over those of the arm at these values, 1 unless that is free."""
+        return float(values[self.names.index(SCALE)]) if SCALE in self.names else 1.0
 
     def neighbors(self, values: Array, k: int) -> Neighbors:
         """Arms around these values along one number, with the factors of a derivative by it.
 
         Differences of fourth order, inside the range of the number; of a number of the pose the
-        bases alone.
+        bases alone, of the scale its values.
         """
         number, value, (low, high) = self.numbers[k], float(values[k]), self.bounds
         step, points = _STEP * max(number.scale, abs(value)), _CENTRAL
@@ -114,9 +121,12 @@ class FreeNumbers:
         for offset, factor in points:
             other = values.copy()
             other[k] = value + offset * step
-            pose = dict(zip(self.names, other.tolist(), strict=True))
-            in_pose = number.name in POSE
-            made = _moved(self.arm.base, pose) if in_pose else self.made(other)
+            if number.name == SCALE:
+                made = float(other[k])
+            elif number.name in POSE:
+                made = _moved(self.arm.base, dict(zip(self.names, other.tolist(), strict=True)))
+            else:
+                made = self.made(other)
             result.append((factor / step, made))
         return result
 
@@ -158,6 +168,8 @@ def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
     for name in free:
         if name == "pose" or name.startswith("pose."):
             yield from _of_pose(arm, name)
+        elif name == SCALE:
+            yield FreeNumber(name=SCALE, unit="1", start=1.0, range=Range(1e-3, 1e3), scale=0.02)
         elif "*" in name:
             known = parameters(arm)
             hits = [key for key in known if fnmatchcase(key, name.replace("[", "[[]"))]
@@ -177,7 +189,11 @@ def _once(arm: Manipulator, known: Mapping[str, Parameter], names: Sequence[str]
     twins |= {name for name in own if f"{name}_over_length" in own}
     for name, parameter in own.items():
         part = parts(arm).get(parameter.part or ())
-        given = getattr(part, parameter.number.field, 0.0) is not None
+        value = getattr(part, parameter.number.field, 0.0)
+        if parameter.number.each:
+            of_bundles = {other for other in own if other.startswith(f"{name}[")}
+            twins |= {name} if isinstance(value, tuple) else of_bundles
+        given = value is not None
         others = f"{name}_ratio", name.replace("revolution", "helical_angle")
         twins |= {(other if given else name) for other in others if other != name and other in own}
     return [name for name in own or kept if name not in twins]

@@ -60,6 +60,7 @@ class _Explicit(NamedTuple):
     table: NodeTables
     rotation: Array
     position: Array
+    scale: float | Array  # Of the data
     offsets: Array
     bundles: Array  # Activations of all bundles, displacements among them, (n, bundle)
     taut_from: Array
@@ -100,18 +101,21 @@ class MarkerModel:
         Raises:
             InvalidDesign: No such arm can exist.
         """
-        return self.of_arm(self.free.made(values), values if slopes else None)
+        arm, scale = self.free.made(values), self.free.scaled(values)
+        return self.of_arm(arm, scale, values if slopes else None)
 
-    def of_arm(self, arm: Manipulator, values: Array | None = None) -> Prediction:
-        """Places of the markers of an arm that has these values."""
+    def of_arm(
+        self, arm: Manipulator, scale: float = 1.0, values: Array | None = None
+    ) -> Prediction:
+        """Places of the markers of an arm, in data of a scale; derivatives where it has values."""
         free, (stations, _) = self.free, marker_stations(arm, self.names)
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
-        blocks = parallel.blocks(len(self.inputs), _BLOCK)
-        return joined([self._block(arm, neighbors, grid, self.inputs[rows]) for rows in blocks])
+        blocks = (self.inputs[rows] for rows in parallel.blocks(len(self.inputs), _BLOCK))
+        return joined([self._block(arm, scale, neighbors, grid, inputs) for inputs in blocks])
 
-    def _explicit(self, arm: Manipulator, grid: StepGrid, inputs: Array) -> _Explicit:
+    def _explicit(self, arm: Manipulator, scale: float, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm, self.names)
         body, driving = body_of(arm), Driving(arm)
         law = driving.law
@@ -129,6 +133,7 @@ class MarkerModel:
             table,
             arm.base.rotation,
             np.array(arm.base.position),
+            scale,
             offsets,
             driving.bundles(inputs),
             law.taut_from,
@@ -138,9 +143,14 @@ class MarkerModel:
         )
 
     def _block(
-        self, arm: Manipulator, neighbors: list[Neighbors], grid: StepGrid, inputs: Array
+        self,
+        arm: Manipulator,
+        scale: float,
+        neighbors: list[Neighbors],
+        grid: StepGrid,
+        inputs: Array,
     ) -> Prediction:
-        at = self._explicit(arm, grid, inputs)
+        at = self._explicit(arm, scale, grid, inputs)
         body = body_of(arm)
         bounds = body.bounds * 0.0  # which decide nothing
         bounds[arm.bundles :] = 1.0
@@ -154,7 +164,7 @@ class MarkerModel:
         gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
         state = rod_state(rod, gamma, at.table)
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
-        places = at.position + _beyond(at, state)[1] @ at.rotation.T
+        places = at.position + at.scale * _beyond(at, state)[1] @ at.rotation.T
         places[lost] = np.nan
         slopes = np.full((*places.shape, len(neighbors)), np.nan)
         if neighbors:
@@ -169,13 +179,15 @@ class MarkerModel:
     ) -> _Explicit:
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
-            if isinstance(other, Base):  # gravity alone is another one in its frame
+            if isinstance(other, float):
+                each.append(at._replace(scale=other))
+            elif isinstance(other, Base):  # gravity alone is another one in its frame
                 force, weight = dead_forces(arm, other, at.table.stations, at.table.length)
                 table = at.table._replace(force=force, weight=weight)
                 place = np.array(other.position)
                 each.append(at._replace(table=table, rotation=other.rotation, position=place))
             elif any(getattr(arm, part) != getattr(other, part) for part in _BODY):
-                each.append(self._explicit(other, grid, inputs))
+                each.append(self._explicit(other, at.scale, grid, inputs))
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([other.table for other in each], factors)
@@ -208,9 +220,10 @@ def _slopes(
     slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
     for k, change in enumerate(changes):
         slopes[..., k] += np.einsum("mk,nmka->nma", change.offsets, state.place_directors)
-    slopes = np.einsum("ab,nmbk->nmak", at.rotation, slopes)
+    slopes = at.scale * np.einsum("ab,nmbk->nmak", at.rotation, slopes)
     for k, change in enumerate(changes):
-        slopes[..., k] += change.position + place @ change.rotation.T
+        turned = change.scale * at.rotation + at.scale * change.rotation
+        slopes[..., k] += change.position + place @ turned.T
     return slopes
 
 

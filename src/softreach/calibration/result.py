@@ -27,7 +27,7 @@ from softreach.calibration.free_numbers import POSE, free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.calibration.uncertainty import Uncertainty
-from softreach.support.arguments import as_integer
+from softreach.support.arguments import as_flag, as_integer
 from softreach.support.arrays import Array, Index, Mask, as_rows
 from softreach.support.errors import counted
 from softreach.support.files.text import write_text
@@ -42,6 +42,12 @@ if TYPE_CHECKING:
 
 _OUTLIER = 5.0  # robust widths from which a sample is listed
 _CORRELATED = 0.95
+_ROWS = 5  # samples for each number of a linear law of the inputs
+_MATTERS = 0.1  # motion of a marker by an input over that by the strongest
+_WIDTHS = 3.0  # standard errors by which an input is beyond doubt
+_AGAINST, _HARDLY = -0.2, 0.3  # motion by an input over that of the model
+_FAR_FROM_PRIOR = 2.0  # widths
+_BETTER = 0.9  # error of a rival over that of the arm
 _MOST_ROWS = 10
 _ERRORS = ("rms", "median", "95 % below", "rms / L")
 _PICTURE = (
@@ -105,7 +111,7 @@ class Calibration(Reported):
     @cached_property
     def residuals(self) -> Array:
         """Predicted minus measured places of all samples [m], (n, marker, 3)."""
-        return self._model(self.data).of_arm(self.arm).places - self.data.places
+        return self.residuals_on(self.data)
 
     @property
     def train(self) -> PlacementErrors:
@@ -149,6 +155,17 @@ class Calibration(Reported):
         far = np.isin(self.data.rows, self.outliers)
         return judged(self.data, self.residuals, self.repeatability, self.held, far)
 
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the model or its numbers, in a sentence each, with what to try."""
+        return tuple([*_doubtful_inputs(self), *_doubtful_priors(self), *_better_rivals(self)])
+
+    @property
+    def held_runs(self) -> bool:
+        """True if whole runs were held out."""
+        runs = self.data.runs
+        return bool(self.held.any()) and not set(runs[self.held]) & set(runs[~self.held])
+
     @property
     def outliers(self) -> Index:
         """Rows of the data whose markers are more than five robust widths off."""
@@ -177,23 +194,43 @@ class Calibration(Reported):
     def residuals_on(self, data: Any, **columns: Any) -> Array:
         """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
         table = read_measurements(self.start, data, **columns)
-        return self._model(table).of_arm(self.arm).places - table.places
+        scale = self.fit.free.scaled(self.fit.values)
+        return self._model(table).of_arm(self.arm, scale).places - table.places
 
-    def predict(self, inputs: ArrayLike) -> tuple[Array, Array]:
-        """Places of the markers and the standard deviations that calibration leaves.
+    def predict(self, inputs: ArrayLike, *, numbers_only: bool = False) -> tuple[Array, Array]:
+        """Places of the markers and the standard deviations to expect of measured ones.
+
+        They hold what calibration leaves open of the numbers, and the residuals: those held out if
+        there are some, else those of the fit.
 
         Args:
             inputs: Of the arm, in their units, shape (n, input).
+            numbers_only: Leave the residuals out: how sure the places of the model are, were it
+                right.
 
         Returns:
             Places in the world [m] and their standard deviations [m], (n, marker, 3) each.
+
+        Raises:
+            InvalidInput: No finite inputs of that shape.
         """
         allowed = f"shape (n, {self.arm.inputs})"
         x = as_rows("inputs", inputs, self.arm.inputs, allowed)
         prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
         covariance = self.uncertainty.covariance
         square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
-        return prediction.places, np.sqrt(np.maximum(square, 0.0))
+        square = np.maximum(square, 0.0)
+        if not as_flag("numbers_only", numbers_only):
+            square = square + self.spread**2
+        return prediction.places, np.sqrt(square)
+
+    @cached_property
+    def spread(self) -> Array:
+        """Standard deviations of the residuals by marker and axis of the world [m], (marker, 3)."""
+        left = self.residuals[self._judged]
+        seen = np.isfinite(left).sum()
+        freedom = 1.0 if self.held.any() else seen / max(seen - len(self.names), 1)
+        return np.sqrt(freedom * np.nanmean(left**2, axis=0))
 
     def draws(self, count: int = 32, seed: int = 0) -> list[Manipulator]:
         """Arms as likely as the data leaves them, for bands of any quantity of an arm.
@@ -222,6 +259,10 @@ class Calibration(Reported):
         best = np.asarray(quantity(self.arm), float)
         others = [np.asarray(quantity(arm), float) for arm in self.draws(count, seed)]
         return best, np.sqrt(np.mean([(other - best) ** 2 for other in others], axis=0))
+
+    @property
+    def _held_text(self) -> str:
+        return f"{int(self.held.sum())} {'of other motions' if self.held_runs else 'held out'}"
 
     def _model(self, data: Measurements) -> MarkerModel:
         return MarkerModel.of(self.fit.free, data)
@@ -264,9 +305,9 @@ class Calibration(Reported):
             "date": self.date,
             "data": self.data.source,
             "data_sha256": self.data.digest,
-            "samples": f"{len(self.data)}, of which {int(self.held.sum())} held out",
+            "samples": f"{len(self.data)}, of which {self._held_text}",
             "free": ", ".join(self.names),
-            "error": misses(self.residuals[self._judged]).text(self.arm.length),
+            "error": misses(self.residuals[self._judged]).text(self.start.length),
             "verdict": self.verdict.sentence,
         }
 
@@ -291,7 +332,7 @@ class Calibration(Reported):
         """Law, samples and its errors there: the calibrated arm, the design, rivals."""
         held = int(self.held.sum())
         fitted = f"{len(self.data) - held} fitted"
-        on = f"{held} held out" if held else fitted
+        on = self._held_text if held else fitted
         rows = [("calibrated", fitted, self.train)]
         rows += [("calibrated", on, self.held_out)] if held else []
         rows.append(("design, base fitted", on, self.before))
@@ -356,7 +397,7 @@ class Calibration(Reported):
                     rows=list(_error_rows(self, shown)),
                     note="Distances between measured and predicted places of the markers. Samples "
                     "that are held out were not seen by any fit.",
-                    points=list(_remarks(self, shown)),
+                    points=[*_remarks(self, shown), *self.doubts],
                 ),
                 Section(
                     title="Pictures",
@@ -384,7 +425,7 @@ def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, s
 def _error_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, ...]]:
     for law, samples, errors in result.errors:
         texts = [f"{value / unit.size:.3g}" for value in (errors.rms, errors.median, errors.most)]
-        texts.append(f"{100 * errors.rms / result.arm.length:.2g} %")
+        texts.append(f"{100 * errors.rms / result.start.length:.2g} %")
         yield law, samples, *(texts if errors.number else "----")
 
 
@@ -393,8 +434,67 @@ def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
         each = ((name, errors.rms / unit.size) for name, errors in result.by_marker.items())
         listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)
         yield f"{unit.label('rms')} of each marker: {listed}"
+    if result.held.any() and not result.held_runs and len(result.data.run_names) > 1:
+        yield (
+            "rows of one motion are neighbors: those held out say little about other motions; hold "
+            "out whole runs"
+        )
     for first, second, share in result.correlated[:3]:
         yield f"hardly told apart: {first} and {second} (correlation {share:+.3f})"
     if len(far := result.outliers):
         rows = ", ".join(map(str, far[:_MOST_ROWS])) + ", ..." * (len(far) > _MOST_ROWS)
         yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"
+
+
+def _doubtful_inputs(result: Calibration) -> Iterator[str]:
+    """Inputs that move markers against the model, or hardly, by linear laws of both."""
+    data = result.data
+    moving = np.flatnonzero(np.ptp(data.inputs, axis=0) > 0)
+    known = np.isfinite(result.residuals).all(axis=(1, 2))
+    x = data.inputs[known][:, moving]
+    if len(x) < _ROWS * (1 + len(moving)):
+        return
+    x = np.column_stack([np.ones(len(x)), (x - x.mean(axis=0)) / x.std(axis=0)])
+    inverse = np.linalg.pinv(x.T @ x)
+    left = result.residuals[known].reshape(len(x), -1)
+    measured = data.places[known].reshape(len(x), -1)
+    missed, moves = inverse @ x.T @ left, inverse @ x.T @ (measured + left)
+    noise = ((left - x @ missed) ** 2).reshape(len(x), data.markers, 3).sum(axis=(0, 2)) / len(x)
+    missed, moves = (each[1:].reshape(len(moving), data.markers, 3) for each in (missed, moves))
+    square = (moves**2).sum(axis=2)
+    matters = square > _MATTERS**2 * square.max(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = 1.0 - (missed * moves).sum(axis=2) / square
+        sure = _WIDTHS * np.sqrt(noise * np.diag(inverse)[1:, None] / square)
+    for k, name in enumerate(result.arm.input_names[j] for j in moving):
+        for wrong, words in (
+            (share[k] + sure[k] < _AGAINST, "the wrong way: look at its sign and at the order"),
+            (np.abs(share[k]) + sure[k] < _HARDLY, "hardly: look at its column and its unit"),
+        ):
+            if (hits := np.flatnonzero(wrong & matters[k])).size:
+                seen = ", ".join(data.marker_names[m] for m in hits)
+                times = share[k, hits[0]]
+                yield f"{name} moves {seen} {words} ({times:.2f} times what the model says)"
+
+
+def _doubtful_priors(result: Calibration) -> Iterator[str]:
+    for number, value in zip(result.fit.free.numbers, result.fit.values.tolist(), strict=True):
+        if number.prior is None:
+            continue
+        mean, width = number.prior
+        if (off := abs(value - mean) / width) > _FAR_FROM_PRIOR:
+            yield (
+                f"{number.name} is {off:.1f} widths from its prior, which the data contradicts: "
+                "free what it stands in for, or widen it"
+            )
+
+
+def _better_rivals(result: Calibration) -> Iterator[str]:
+    own = result.held_out
+    better = [r for r in result.rivals if r.held_out.number and r.held_out.rms < _BETTER * own.rms]
+    if better:
+        best = min(better, key=lambda rival: rival.held_out.rms)
+        yield (
+            f"the {best.name} predicts better ({1e3 * best.held_out.rms:.3g} mm, the arm "
+            f"{1e3 * own.rms:.3g}): look at order, sign and unit of the inputs, or free more"
+        )

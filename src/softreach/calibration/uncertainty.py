@@ -11,7 +11,8 @@ from softreach.calibration.fit import SAME, Fit, robust_width
 from softreach.calibration.measurements import Measurements
 from softreach.support.arrays import Array, Mask
 
-_FEWEST_RUNS = 8  # runs from which they are the clusters; with fewer, samples are
+FEWEST_RUNS = 8
+"""Runs from which they, and not samples, are what shares errors and what is held out."""
 _SEEN = 0.1  # least share of a variance that the residuals would show if they were plain noise
 _VAGUE = 30.0
 """Standard deviation, in changes that matter, from which the data does not tell a number."""
@@ -64,7 +65,7 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     seen = (fit.weights > 0) & np.isfinite(slopes).all(axis=(2, 3))
     rows = np.where(seen[..., None, None], weight[..., None] * slopes * scale, 0.0)
     miss = np.where(seen[..., None], weight * fit.residuals, 0.0)
-    by_run = len(data.run_names) >= max(_FEWEST_RUNS, 2 * count)
+    by_run = len(data.run_names) >= max(FEWEST_RUNS, 2 * count)
     keys = data.runs if by_run else np.arange(len(data))
     rows = rows.reshape(len(data), -1, count)[:, :, free]
     miss = miss.reshape(len(data), -1)

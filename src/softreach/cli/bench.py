@@ -32,7 +32,7 @@ Free = Annotated[
     Parameter(
         help="Numbers that may change, comma-separated: names of softreach list parameters DESIGN, "
         "with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for "
-        "the base. May be repeated.",
+        "the base; scale for data of a camera without one. May be repeated.",
     ),
 ]
 
@@ -45,6 +45,7 @@ def calibrate(
     free: Free,
     prior: list[str] | None = None,
     hold_out: Number = 0.0,
+    hold_out_runs: Annotated[bool | None, Parameter(negative="--no-hold-out-runs")] = None,
     noise: str | None = None,
     robust: Annotated[bool, Parameter(negative="--no-robust")] = True,
     rivals: Annotated[bool, Parameter(negative="--no-rivals")] = True,
@@ -73,6 +74,7 @@ def calibrate(
             as in taper=1deg, or NAME=MEAN:WIDTH, as in
             rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
         hold_out: Fraction of samples held out at random.
+        hold_out_runs: Hold out whole runs. By default where the data has eight or more.
         noise: Standard deviation of a measured coordinate, which decides how much priors count:
             0.2mm. Estimated from the residuals if left out.
         robust: Down-weight outliers.
@@ -100,6 +102,7 @@ def calibrate(
             free=free_names(arm, free),
             prior=priors(arm, prior or ()),
             hold_out=hold_out,
+            hold_out_runs=hold_out_runs,
             noise=None if noise is None else _noise(noise),
             robust=robust,
             rivals=rivals,
@@ -140,6 +143,7 @@ def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
             {"law": law, "samples": on, **_errors(errors)} for law, on, errors in result.errors
         ],
         "correlated": result.correlated,
+        "doubts": result.doubts,
         "outlier_rows": result.outliers,
         "repeatability_rms_m": result.repeatability.rms,
         "repeated_samples": result.repeatability.pairs,
@@ -251,13 +255,14 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
         InvalidInput: Text that is anything else, or no such number.
     """
     from softreach.arm.parameters import Written
-    from softreach.calibration.free_numbers import POSE
+    from softreach.calibration.free_numbers import POSE, SCALE
 
     names, result = Written.of(arm), {}
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
     for name, text in pairs_in("prior", texts, allowed).items():
         first = name.split("=")[0].strip()
-        unit = None if first not in POSE else "m" if POSE.index(first) < 3 else "rad"
+        own = (*POSE, SCALE)
+        unit = dict(zip(own, ["m"] * 3 + ["rad"] * 3 + ["1"], strict=True)).get(first)
         if unit is None and first not in names.by_key:
             raise InvalidInput("prior", name, "NAME=WIDTH with the full name of a free number")
         try:

@@ -110,6 +110,7 @@ def _warning(*, with_token: bool) -> str:
 
 
 def begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
+    """What is shown first, and the work that is kept; a state or a cloud is shown as it is."""
     from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 
     if is_stored(source):

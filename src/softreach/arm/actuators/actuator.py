@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from softreach.arm.along import AlongArm
-from softreach.arm.number import MOST, Number, as_numbers, number
+from softreach.arm.number import MOST, Number, as_numbers, fields_of, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span
@@ -108,21 +108,38 @@ class Actuator(Span, ABC):
         bounds = [(low, high) for low, high in pairs]
         bounds = bounds[0] if all(pair == bounds[0] for pair in bounds) else tuple(bounds)
         object.__setattr__(self, "activation_bounds", bounds)
+        for field in self._given_by_bundle:  # one for all, where that says the same
+            values = getattr(self, field)
+            if self._spread(field, values[0]) == values:
+                object.__setattr__(self, field, values[0])
 
     @property
     def numbers(self) -> dict[str, Number]:
-        """With the bounds, `lower` and `upper` of all bundles, `lower[1]` of one of several."""
+        """With those of each bundle, and the bounds: `lower` of all, `lower[1]` of one."""
         allowed = Range(unit="" if self.unit == "1" else self.unit)
         bundles = ["", *(f"[{k}]" for k in range(self.bundles))] if self.bundles > 1 else [""]
         ends = ("lower", "min", "lowest activation"), ("upper", "max", "highest activation")
-        return super().numbers | {
-            f"{end}{k}": Number(symbol=f"{short} {self.symbol}{k}", meaning=about, allowed=allowed)
-            for end, short, about in ends
-            for k in bundles
-        }
+        own = (
+            each.elements(self.of_bundles(each.field)) for each in self._each if self.bundles > 1
+        )
+        of_bundles = {name: number for numbers in own for name, number in numbers.items()}
+        return (
+            super().numbers
+            | of_bundles
+            | {
+                f"{end}{k}": Number(
+                    symbol=f"{short} {self.symbol}{k}", meaning=about, allowed=allowed
+                )
+                for end, short, about in ends
+                for k in bundles
+            }
+        )
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
-        """A bound of all bundles in each."""
+        """A number of all bundles in each."""
+        field, _, k = name.removesuffix("]").partition("[")
+        if field in {each.field for each in self._each} and (k or field in self._given_by_bundle):
+            return (self.of_bundles(field)[int(k)],) if k else self.of_bundles(field)
         if not (bound := _BOUND.fullmatch(name)):
             return super().values_of(name, profile, section)
         each = self.bounds[:, int(bound[1] == "upper")].tolist()
@@ -147,7 +164,31 @@ class Actuator(Span, ABC):
                     raise InvalidDesign([Fault(name, value, allowed)])
                 bounds[slice(None) if k is None else int(k), int(end == "upper")] = value
             changes["activation_bounds"] = tuple(map(tuple, bounds.tolist()))
+        for field in [each.field for each in self._each]:
+            if any(name.startswith(f"{field}[") for name in changes):
+                given = changes.get(field, getattr(self, field))
+                changes[field] = given if isinstance(given, tuple) else self._spread(field, given)
         return super().replace(**changes)
+
+    @property
+    def _each(self) -> list[Number]:
+        """Its numbers that each bundle may have by itself."""
+        return [each for each in fields_of(type(self)).values() if each.each]
+
+    @property
+    def _given_by_bundle(self) -> set[str]:
+        """Fields of these that have a value for each."""
+        fields = {each.field for each in self._each}
+        return {field for field in fields if isinstance(getattr(self, field), list | tuple)}
+
+    def of_bundles(self, field: str) -> tuple[float, ...]:
+        """Values of a number for each bundle, whether it is one for all or one for each."""
+        given = getattr(self, field)
+        return given if isinstance(given, tuple) else self._spread(field, given)
+
+    def _spread(self, field: str, value: float) -> tuple[float, ...]:
+        """Values for each bundle by one for all."""
+        return (value,) * self.bundles
 
     @abstractmethod
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
@@ -199,6 +240,11 @@ class Actuator(Span, ABC):
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
         bundles = None if any(fault.path == "bundles" for fault in faults) else self.bundles
+        blamed = {fault.path.partition("[")[0] for fault in faults}
+        for field in self._given_by_bundle - blamed if bundles else ():
+            given, allowed = getattr(self, field), f"must be one number, or {bundles}, one a bundle"
+            if len(given) != bundles:
+                faults.append(Fault(field, given, allowed))
         return faults + bounds_faults(self.activation_bounds, bundles)
 
 
@@ -206,13 +252,20 @@ class Actuator(Span, ABC):
 class PolarActuator(Actuator):
     """An actuator whose bundles stand evenly around the axis."""
 
-    offset: float = number("θ0", "rad", "polar angle of the first bundle", default=0.0)
-    """θ0, polar angle of the first bundle where it begins [rad]."""
+    offset: float | tuple[float, ...] = number(
+        "θ0", "rad", "polar angle of the first bundle", each=True, default=0.0
+    )
+    """θ0, polar angle of the first bundle where it begins [rad]; the others stand evenly, counted
+    toward larger angles. Or the angle of each bundle, in any order."""
 
     @property
     def start_angles(self) -> Array:
         """θ0 + 2πj/n, polar angle of each bundle where it begins [rad], shape (bundle,)."""
-        return self.offset + 2.0 * np.pi * np.arange(self.bundles) / self.bundles
+        return np.array(self.of_bundles("offset"))
+
+    def _spread(self, field: str, value: float) -> tuple[float, ...]:
+        turn = 2.0 * np.pi * np.arange(self.bundles) / self.bundles
+        return tuple((value + turn * (field == "offset")).tolist())
 
     def length_along(self, field: str, profile: Profile, z: Array) -> tuple[Array, Array]:
         """A length [m] and its slope along Z [-], both of the shape of z.

@@ -149,8 +149,11 @@ class LengthTendon(Tendon):
     activation: ClassVar[str] = "displacement"
     least: ClassVar[float] = -math.inf
 
-    slack: float = number("q0", "m", "pulled in by so much before it is taut", default=0.0)
-    """q0, pulled in by so much before it is taut [m]; negative where it is pretensioned."""
+    slack: float | tuple[float, ...] = number(
+        "q0", "m", "pulled in by so much before it is taut", each=True, default=0.0
+    )
+    """q0, pulled in by so much before it is taut [m]; negative where it is pretensioned. One for
+    all bundles, or one for each."""
     tendon_stiffness: float | None = number(
         "k", "N/m", "stiffness of tendon and drive in series", above=0.0, default=None
     )
@@ -164,9 +167,9 @@ class LengthTendon(Tendon):
         return 0.0 if self.tendon_stiffness is None else 1.0 / self.tendon_stiffness
 
     @property
-    def taut_from(self) -> float:
-        """Displacement at which it becomes taut while the arm keeps its shape [m]."""
-        return self.slack - self.pretension * self.compliance
+    def taut_from(self) -> Array:
+        """Displacement at which each becomes taut while the arm keeps its shape [m], (bundle,)."""
+        return np.array(self.of_bundles("slack")) - self.pretension * self.compliance
 
     def by_tension(self) -> Tendon:
         """The same tendon driven by its tension; its bounds are 0 until the arm sets them."""

@@ -137,6 +137,8 @@ def _number(number: Number) -> _Schema:
         single["exclusiveMaximum" if allowed.open_high else "maximum"] = allowed.high
     series: _Schema = {"type": "array", "items": single}
     shapes = {"triple": _TRIPLE, "stations": _NUMBERS, "series": series}
+    if number.each:
+        return about | {"anyOf": [single, series]}
     if number.shape in shapes or number.along is None:
         return about | shapes.get(number.shape, single)
     kinds = ["cubic", "linear", *(() if number.along is Samples else ("constant",))]

@@ -131,6 +131,8 @@ def _text(key: str, value: Any) -> str:
     number = degrees_text if key.endswith("_deg") else value_text
     if isinstance(value, AlongArm):
         return _along_text(value, number)
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(number, value))}]"
     return value_text(value.name) if isinstance(value, Station) else number(value)
 
 

@@ -18,7 +18,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
 from softreach.support.arrays import Array, Index
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.text import write_text
 
@@ -186,6 +186,11 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
         if not shared[k]:
             yield body
         for place, first, fiber in zip(places, firsts, arm.fibers, strict=False):
+            if place == k and isinstance(fiber.offset, tuple):
+                raise NotPossible(
+                    f"ActiveFilaments.jl spaces bundles evenly: give {fiber.name!r} one offset, or "
+                    "make each of its bundles a fiber"
+                )
             if place == k:
                 angle = fiber.helical_angle_on(arm.profile, arm.section)
                 pairs = (fiber.bounds * body.scale).tolist()
