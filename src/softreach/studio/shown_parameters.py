@@ -353,7 +353,7 @@ def _shown(
 def _unit(parameter: Parameter, lengths: LengthUnit | None) -> tuple[str, float]:
     """Unit of a number, and its size: where none of lengths is given, SI but for angles."""
     units = {"rad": _DEGREES, "1": ("", 1.0)}
-    units |= {"m": tuple(lengths), "Pa": ("kPa", 1e3)} if lengths else {}
+    units |= {"m": (lengths.name, lengths.size), "Pa": ("kPa", 1e3)} if lengths else {}
     return units.get(parameter.unit, (parameter.unit, 1.0))
 
 

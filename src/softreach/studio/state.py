@@ -162,8 +162,7 @@ class Appearance:
         as_one_of("mouse", self.mouse, MOUSE)
         as_one_of("unit", self.unit, ("", *UNITS))
         for each in fields(self):  # in a state that came from elsewhere too
-            if each.type in ("bool", "str"):
-                kind = {"bool": bool, "str": str}[each.type]
+            if (kind := {"bool": bool, "str": str}.get(str(each.type))) is not None:
                 name = f"appearance.{each.name}"
                 as_instance(name, getattr(self, each.name), kind, f"a {each.type}")
 

@@ -64,11 +64,11 @@ class Latest:
     ) -> None:
         """Start with nothing to do; `failed` gets exceptions, `idle` follows the last work."""
         self._failed, self._idle = failed, idle
-        self._waiting: Callable[[StaleCheck], None] | None = None
+        self._waiting: Callable[[StaleCheck], object] | None = None
         self._closed = self._canceled = self.busy = False
         self._changed = threading.Condition()
 
-    def submit(self, work: Callable[[StaleCheck], None]) -> None:
+    def submit(self, work: Callable[[StaleCheck], object]) -> None:
         """Do this next, instead of whatever was to be next."""
         with self._changed:
             if self._closed:
@@ -107,7 +107,7 @@ class Latest:
         if not self._closed:
             self._idle()
 
-    def _next(self) -> Callable[[StaleCheck], None] | None:
+    def _next(self) -> Callable[[StaleCheck], object] | None:
         with self._changed:
             work, self._waiting, self._canceled = self._waiting, None, False
             if work is None:

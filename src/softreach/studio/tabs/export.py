@@ -143,8 +143,8 @@ def _write_page(session: Session, path: Path) -> None:
     reach, state, (cloud, color) = _reach(session), session.state, _shown(session)
     is_surface = reach.has_surface and state.appearance.surface and not state.appearance.cloud
     shown = [reach.exact if is_surface else cloud, _shape(state)]
-    look = {"color": color, "unit": state.design.length_unit.name}
-    page = plot.plot_3d(shown, **look, caption=". ".join(_caption(state, reach)))
+    unit, caption = state.design.length_unit.name, ". ".join(_caption(state, reach))
+    page = plot.plot_3d(shown, color=color, unit=unit, caption=caption)
     path.write_text(page.html, encoding="utf-8")
 
 
