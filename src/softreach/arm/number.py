@@ -175,7 +175,7 @@ class Number:
         each = as_numbers(value)
         if self.shape == "triple" and not (each.shape == (3,) and np.isfinite(each).all()):
             return [Fault(self.field, value, "must be three finite numbers")]
-        if self.shape == "several" and not (each.ndim == 1 and each.shape == np.shape(value)):
+        if self.shape == "several" and not _is_sequence(value):
             return [Fault(self.field, value, "must be a sequence of numbers")]
         if self.shape in ("series", "several", "triple"):
             judged = self.shape == "several"  # of a series the others are judged with its stations
@@ -238,8 +238,7 @@ class Number:
         return self.pair and as_numbers(value).shape == (2,)
 
     def _is_of_bundles(self, value: Any) -> bool:
-        each = as_numbers(value)
-        return self.each and each.ndim == 1 and each.size > 0 and each.shape == np.shape(value)
+        return self.each and _is_sequence(value) and len(value) > 0
 
 
 def stations(meaning: str) -> Any:
@@ -334,6 +333,12 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
         allowed = f"must be {count} finite numbers, one for each {where}"
         return [Fault(field, values[field], allowed)]
     return []
+
+
+def _is_sequence(value: Any) -> bool:
+    """True for numbers in a row."""
+    each = as_numbers(value)
+    return each.ndim == 1 and each.shape == np.shape(value)
 
 
 def is_path_name(text: str) -> bool:

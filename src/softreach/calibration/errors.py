@@ -201,7 +201,7 @@ def _explained(data: Measurements, residuals: Array) -> tuple[float, float | Non
     alone, wide = min((_left(law, target) for law in laws), key=np.sum), after(last)
     memory = share(wide, alone)
     if memory > _MEMORY:
-        others = (after(rng.permutation(last)) for _ in range(_SHUFFLES))
+        others = (after(last[rng.permutation(len(last))]) for _ in range(_SHUFFLES))
         memory = share(wide, min(alone, *others, key=np.sum))
     return share(alone, _left(np.zeros((len(x), 1)), target)), memory
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, SCALE, FreeNumbers
 from softreach.calibration.model import MarkerModel, Prediction
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from softreach.support.progress import Progress
 
@@ -217,8 +217,8 @@ def _fewest(directions: Array) -> list[int]:
     from scipy.linalg import qr, solve
 
     # Each number of a basis changes in one combination and not in the others.
-    basis = qr(directions, mode="r", pivoting=True)[1][: len(directions)]
-    sparse = np.abs(solve(directions[:, basis], directions))
+    _, order = cast(tuple[Array, Index], qr(directions, mode="r", pivoting=True))
+    sparse = np.abs(solve(directions[:, order[: len(directions)]], directions))
     changes = sparse > 0.05 * sparse.max(axis=1, keepdims=True)
     return np.flatnonzero(changes[changes.sum(axis=1).argmin()]).tolist()
 

@@ -36,7 +36,7 @@ _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 1
 
 
 Neighbors = list[tuple[float, Manipulator | Base | float]]
-"""Arms around one, their bases or the scales of the data alone, with the factors of a derivative by a number."""
+"""Arms around one, their bases or scales of data alone, with the factors of a derivative."""
 
 
 @dataclass(frozen=True, kw_only=True)

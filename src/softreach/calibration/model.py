@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,7 @@ class _Explicit(NamedTuple):
     table: NodeTables
     rotation: Array
     position: Array
-    scale: float | Array  # Of the data
+    scale: float  # Of the data
     offsets: Array
     bundles: Array  # Activations of all bundles, displacements among them, (n, bundle)
     taut_from: Array
@@ -179,7 +179,7 @@ class MarkerModel:
     ) -> _Explicit:
         factors, each = [factor for factor, _ in neighbors], list[_Explicit]()
         for _, other in neighbors:
-            if isinstance(other, float):
+            if isinstance(other, float | int):
                 each.append(at._replace(scale=other))
             elif isinstance(other, Base):  # gravity alone is another one in its frame
                 force, weight = dead_forces(arm, other, at.table.stations, at.table.length)
@@ -191,7 +191,7 @@ class MarkerModel:
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([other.table for other in each], factors)
-        others = (
+        others: Iterable[Any] = (
             np.tensordot(factors, np.stack(columns), axes=1)
             for columns in zip(*(other[1:] for other in each), strict=True)
         )

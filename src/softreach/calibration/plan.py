@@ -205,7 +205,7 @@ def _candidates(dim: int, count: int, seed: int) -> Array:
     if dim <= _CORNERS:
         return np.concatenate([inside, [*np.ndindex(*[2] * dim)]])
     draw = np.random.default_rng(seed).integers(0, 2, (1 << _CORNERS, dim))
-    return np.concatenate([inside, np.unique(draw, axis=0)])
+    return np.concatenate([inside, np.unique(draw, axis=0).astype(float)])
 
 
 def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:

@@ -73,8 +73,8 @@ Start with
     console=cast(Any, HelpConsole()),
     default_parameter=Parameter(negative=(), show_default=_shown_default),
 )
-for _rank, (_title, _words) in enumerate(_GROUPS):
-    _group = Group(_title, sort_key=_rank - 9)
+_groups = [Group(_title, sort_key=_rank - 9) for _rank, (_title, _) in enumerate(_GROUPS)]
+for _group, (_, _words) in zip(_groups, _GROUPS, strict=True):
     for _place, _word in enumerate(_words.split()):
         _module, _name = _word.split(":")
         _where = f"softreach.cli.{_module}:{_FUNCTIONS.get(_name, _name.replace('-', '_'))}"
@@ -82,7 +82,7 @@ for _rank, (_title, _words) in enumerate(_GROUPS):
 app.meta.suppress_keyboard_interrupt = False
 app.register_install_completion_command(add_to_startup=False)
 for _flag in ("--help", "--version", "--install-completion"):
-    app[_flag].group = _group  # the last
+    app[_flag].group = _groups[-1]
 
 
 def _always(*names: str, help: str) -> Parameter:

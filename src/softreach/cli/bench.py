@@ -261,8 +261,8 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
     for name, text in pairs_in("prior", texts, allowed).items():
         first = name.split("=")[0].strip()
-        own = (*POSE, SCALE)
-        unit = dict(zip(own, ["m"] * 3 + ["rad"] * 3 + ["1"], strict=True)).get(first)
+        of_pose = zip((*POSE, SCALE), ["m"] * 3 + ["rad"] * 3 + ["1"], strict=True)
+        unit = next((unit for name, unit in of_pose if name == first), None)
         if unit is None and first not in names.by_key:
             raise InvalidInput("prior", name, "NAME=WIDTH with the full name of a free number")
         try:

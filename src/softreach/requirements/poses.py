@@ -293,7 +293,7 @@ def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
     if not known.any():
         return _without_equilibrium(rules, places)
     neighbors = range(1, 1 + min(_NEIGHBORS, int(known.sum())))
-    near = KDTree(tips[known]).query(places, neighbors)[1]
+    near = KDTree(tips[known]).query(places, neighbors)[1]  # pyright: ignore[reportArgumentType]
     owner, enough = np.repeat(np.arange(len(places)), len(neighbors)), TOL * rod.length
     ends = nearest_tips(rod, gamma[known][near.ravel()], places[owner], enough)
     least = np.full(len(places), np.inf)

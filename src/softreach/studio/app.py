@@ -16,7 +16,7 @@ from softreach.studio.scene.camera import UPRIGHT, VIEWS
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.tabs import JOBS, furnish
-from softreach.studio.work import CompilationWatch, Latest
+from softreach.studio.work import CompilationWatch, Latest, StaleCheck
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -98,7 +98,12 @@ class Studio:
 
     def _compiling(self) -> None:
         """Notify every tab, on another thread: this one holds the compiler's lock."""
-        self._notice.submit(lambda _: [session.show() for session in [*self.sessions.values()]])
+
+        def show(_: StaleCheck) -> None:
+            for session in [*self.sessions.values()]:
+                session.show()
+
+        self._notice.submit(show)
 
     def _connected(self, client: ClientHandle) -> None:
         watch = self._compilation

@@ -285,7 +285,8 @@ class StudioState:
         if version != VERSION:
             raise InvalidInput("state file", f"version {version}", allowed)
         try:
-            return cls(**{k: v if v is None else _READ[k](v) for k, v in values.items()})
+            read: dict[str, Any] = {k: v if v is None else _READ[k](v) for k, v in values.items()}
+            return cls(**read)
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if type(error).__module__.startswith("softreach"):
                 raise

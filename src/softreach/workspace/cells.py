@@ -392,4 +392,4 @@ def _smallest_cell(tip_map: TipMap, sides: Array, memory: float) -> float:
     for side in sides:
         count *= np.poly1d([side, 8.0])  # over 1 / edge
     roots = (count - min((memory - fixed) / each, _MOST_CELLS)).roots
-    return float(1.0 / roots[np.isreal(roots)].real.max())
+    return float(1.0 / np.real(roots[np.isreal(roots)]).max())

@@ -173,8 +173,9 @@ class LengthTendon(Tendon):
 
     def by_tension(self) -> Tendon:
         """The same tendon driven by its tension; its bounds are 0 until the arm sets them."""
-        same = {field.name: getattr(self, field.name) for field in fields(Tendon)}
-        return Tendon(**same | {"activation_bounds": (0.0, 0.0)})
+        same: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(Tendon)}
+        same["activation_bounds"] = (0.0, 0.0)
+        return Tendon(**same)
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()

@@ -261,7 +261,7 @@ def neighbors(
     moved = place[axis, np.arange(len(nodes))] + way
     place[axis, np.arange(len(nodes))] = moved
     inside = (moved >= 0) & (moved < np.array(sizes)[axis])
-    return np.ravel_multi_index(tuple(place), sizes, mode="clip").astype(np.int64), inside
+    return np.asarray(np.ravel_multi_index(tuple(place), sizes, mode="clip"), np.int64), inside
 
 
 def edges_along(sizes: tuple[int, ...], axis: int) -> tuple[Index, Index]:

@@ -54,7 +54,7 @@ class Equilibria(NamedTuple):
 
     def of(self, rows: slice | Mask | Index) -> Equilibria:
         """Some of them; a slice shares memory."""
-        return Equilibria(*(values[rows] for values in self))
+        return self._make(values[rows] for values in self)
 
     def put(self, rows: slice | Index, others: Equilibria) -> None:
         """Replace some of them."""

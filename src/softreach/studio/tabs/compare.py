@@ -117,7 +117,8 @@ def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
         rows.append(Row(title, before, after, (first, second)))
     shares = [_finite(100 * reach.unreachability) if reach else None for reach in reaches]
     if shares != [None, None]:
-        rows.append(Row("UNR [%]", *(share and round(share, 2) for share in shares)))
+        before, after = (share and round(share, 2) for share in shares)
+        rows.append(Row("UNR [%]", before, after))
     return rows
 
 
@@ -129,7 +130,7 @@ def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) ->
         both = [_finite(each[name].shown) if name in each else None for each in (before, after)]
         known = [value for value in both if value is not None]
         if len(known) == 1 or (known and not math.isclose(*known, rel_tol=_EQUAL)):
-            rows[name] = Row((after.get(name) or before[name]).label, *both)
+            rows[name] = Row((after.get(name) or before[name]).label, both[0], both[1])
     return rows
 
 
