@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,11 +191,11 @@ class MarkerModel:
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([other.table for other in each], factors)
-        others: Iterable[Any] = (
+        others = (
             np.tensordot(factors, np.stack(columns), axes=1)
             for columns in zip(*(other[1:] for other in each), strict=True)
         )
-        return _Explicit(table, *others)
+        return _Explicit._make([table, *others])
 
 
 def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:
