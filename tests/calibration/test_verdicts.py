@@ -118,7 +118,7 @@ DOUBTS = {
     "moves half, tool the wrong way": {"felt": lambda x: np.column_stack([3 - x[:, 0], x[:, 1:]])},
     "moves half, tool hardly": {"felt": lambda x: x * [0.0, 1.0, 1.0]},
     "widths from its prior": {"prior": {MODULUS: (3e5, 3e3)}, "noise": 1e-2},
-    "the quadratic ridge predicts better": {
+    "quadratic ridge predicts better": {
         "felt": lambda x: x[:, [0]] + 0.1 * x,
         "rivals": True,
         "hold_out": 0.3,

@@ -495,6 +495,6 @@ def _better_rivals(result: Calibration) -> Iterator[str]:
     if better:
         best = min(better, key=lambda rival: rival.held_out.rms)
         yield (
-            f"the {best.name} predicts better ({1e3 * best.held_out.rms:.3g} mm, the arm "
+            f"{best.name} predicts better ({1e3 * best.held_out.rms:.3g} mm, the arm "
             f"{1e3 * own.rms:.3g}): look at order, sign and unit of the inputs, or free more"
         )
