@@ -13,7 +13,7 @@ import dataclasses
 import inspect
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sized
 from dataclasses import MISSING, dataclass
 from functools import cache
 from types import MappingProxyType
@@ -338,7 +338,7 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
 def _is_sequence(value: Any) -> bool:
     """True for numbers in a row."""
     each = as_numbers(value)
-    return each.ndim == 1 and each.shape == np.shape(value)
+    return each.ndim == 1 and isinstance(value, Sized) and each.size == len(value)
 
 
 def is_path_name(text: str) -> bool:

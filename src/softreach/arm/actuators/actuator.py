@@ -179,7 +179,7 @@ class Actuator(Span, ABC):
     def _given_by_bundle(self) -> set[str]:
         """Fields of these that have a value for each."""
         fields = {each.field for each in self._each}
-        return {field for field in fields if isinstance(getattr(self, field), list | tuple)}
+        return {field for field in fields if as_numbers(getattr(self, field)).ndim == 1}
 
     def of_bundles(self, field: str) -> tuple[float, ...]:
         """Values of a number for each bundle, whether it is one for all or one for each."""
