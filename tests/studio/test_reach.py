@@ -18,7 +18,8 @@ from softreach.picture.axes_box import axes_box, seen_from
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import TipStatus, has_tip
-from softreach.studio.captions import left_out_text, legend_text, size_text
+from softreach.studio.captions import legend_text, picture_text, size_text
+from softreach.studio.found import Found
 from softreach.studio.reach import (
     Quality,
     Reach,
@@ -423,12 +424,15 @@ def test_unstable_samples_are_those_of_the_cloud_that_are_shown(torn):
         ({"cloud": True, "half": False}, ""),
     ],
 )
-def test_a_caption_says_what_a_picture_leaves_out(both, look, text):
+def test_a_caption_says_what_is_gray_in_a_picture_and_what_it_leaves_out(both, look, text):
     coarse, fine = both
-    assert left_out_text(fine, Appearance(**look)) == text
+    out = f"Not in the picture: {text}." if text else ""
+    assert picture_text(Found(), fine, Appearance(**look)) == out
+    beside = picture_text(Found(free=coarse, reference=coarse), fine, Appearance(**look))
+    assert beside == f"Gray: the reach without loads and of the kept design. {out}".strip()
     many = replace(coarse, cloud=fine.cloud.isel(sample=np.arange(5000) % fine.samples))
-    some = left_out_text(many, Appearance(level=12, cloud=True, half=False))
-    assert some == "all but 4,096 of the samples"
+    some = picture_text(Found(), many, Appearance(level=12, cloud=True, half=False))
+    assert some == "Not in the picture: all but 4,096 of the samples."
 
 
 @pytest.mark.filterwarnings("ignore:the load number is above")

@@ -110,19 +110,23 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 
 
-def left_out_text(reach: Reach, look: Appearance) -> str:
-    """What a picture of the scene leaves out, in words; "" for nothing."""
+def picture_text(found: Found, reach: Reach, look: Appearance) -> str:
+    """What is gray in a picture of the scene with a reach, and what it leaves out, in words."""
     arm, cut, shown = reach.arm, look.slice, len(shown_samples(reach, look.level))
     dots, unit = shows_cloud(reach, look), arm.length_unit
     off = [unit.rounded(arm.length * value) for value in (cut.thickness, cut.center)]
-    left_out = {
+    beside = {"without loads": found.free, "of the kept design": found.reference}
+    gray = " and ".join(whose for whose, known in beside.items() if known is not None)
+    parts = {
         "the arm": not look.arm,
         "the reach": not (dots or look.surface),
         "the half of the points in front of the arm": dots and look.half,
         f"what lies off a slab of {off[0]} at {cut.axis} = {off[1]}": cut.axis != "none",
         f"all but {shown:,} of the samples": dots and shown < reach.samples,
     }
-    return ", ".join(text for text, is_out in left_out.items() if is_out)
+    left_out = ", ".join(text for text, is_out in parts.items() if is_out)
+    told = {"Gray: the reach": gray, "Not in the picture:": left_out}
+    return " ".join(f"{head} {text}." for head, text in told.items() if text)
 
 
 def loaded_share(found: Found, design: Manipulator) -> str:

@@ -15,7 +15,7 @@ from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
 from softreach.plot.coloring import draw_figure_key
 from softreach.rod.kinematics import configuration
-from softreach.studio.captions import left_out_text, legend_text, reach_text
+from softreach.studio.captions import legend_text, picture_text, reach_text
 from softreach.studio.fields import GRAY, Fields, file_text
 from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
@@ -177,9 +177,7 @@ def _write_picture(session: Session, path: Path) -> None:
     scene = session.camera.picture()
     height, width = (size / FINER for size in scene.shape[:2])
     room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
-    texts = _caption(state, reach)
-    if left_out := left_out_text(reach, state.appearance):
-        texts.append(f"Not in the picture: {left_out}.")
+    texts = *_caption(state, reach), picture_text(session.found, reach, state.appearance)
     lines = [line for text in texts for line in textwrap.wrap(text, room)]
     above, below = _KEY if key is not None else 0, 2 * _EDGE + _LINE * len(lines)
     total, (paper, ink) = above + height + below, _PAPER_AND_INK[state.appearance.dark]
@@ -204,9 +202,9 @@ def _caption(state: StudioState, reach: Reach) -> list[str]:
     )
     values = ", ".join(f"{c.label} {c.shown:g}" for c in slider_parameters(state.design))
     pulls = ", ".join(f"{value:.3g}" for value in state.activation)
-    design = f"{values}; L = {state.design.length:g} m. Activation ({pulls})."
-    setting = f"{words[0].upper()}{words[1:]}." if (words := setting_text(state)) else ""
-    return [text for text in (numbers, marks, design, setting) if text]
+    parts = values, f"L = {state.design.length:g} m", setting_text(state)
+    design = f"{'; '.join(filter(None, parts))}. Activation ({pulls})."
+    return [*filter(None, (numbers, marks, design))]
 
 
 _WRITERS: Mapping[str, tuple[Mapping[str, object], Write]] = {
