@@ -13,7 +13,6 @@ from softreach.rod import as_tip_map
 
 @pytest.fixture
 def inverse_tab(tab):
-    tab.page.set_viewport_size({"width": 1366, "height": 768})  # else notices cover the tip
     tab.open("Move")
     return tab
 

@@ -76,7 +76,6 @@ def test_an_arm_is_designed_loaded_seen_to_shrink_and_exported(tab, tmp_path):
 
 def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(tab, tmp_path):
     page, mouse = tab.page, tab.page.mouse
-    page.set_viewport_size({"width": 1366, "height": 768})  # else notices cover the tip
     tab.open("Move")
     start, end = (-0.7, -0.4, -0.9), (-0.6, -0.55, -0.8)
     pulled(tab, start)

@@ -18,7 +18,9 @@ from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
 
 
-def test_nothing_leaves_the_machine_and_no_panel_of_viser_is_seen(tab, studio):
+def test_nothing_leaves_the_machine_and_nothing_of_viser_is_seen(tab, studio):
+    warning = tab.page.get_by_text("Software WebGL rendering")
+    assert (warning.count(), warning.locator("visible=true").count()) == (1, 0)
     assert not tab.page.evaluate("flashed")
     assert tab.requests
     assert all(url.startswith((studio.url, f"blob:{studio.url}", "data:")) for url in tab.requests)
@@ -131,6 +133,27 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path)
         reach = tab.reach_of(design)
         tab.page.get_by_text(size_text(reach.size, design)).wait_for()
         tab.close()
+
+
+@pytest.mark.large
+def test_a_banner_says_that_the_server_is_gone_until_it_answers_again(browser, studio):
+    with Studio(studio.start) as running:
+        tab = Tab(browser, running)
+    banner = tab.page.get_by_text("The server of this page is gone")
+    banner.wait_for()
+    with Studio(studio.start, port=running.server.get_port()):
+        banner.wait_for(state="detached")
+        tab.page.get_by_text("taper φ [deg]").wait_for()
+    tab.context.close()
+
+
+@pytest.mark.large
+def test_a_browser_without_webgl_says_why_there_is_no_scene(browser, studio):
+    page = browser.new_page()
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null;")
+    page.goto(studio.url)
+    page.get_by_text("switch WebGL on").wait_for()
+    page.close()
 
 
 @pytest.mark.large

@@ -75,6 +75,22 @@ new MutationObserver(() => {
   waiting = true;
 }).observe(document.documentElement, {childList: true, subtree: true});
 
+// viser's own notices are hidden; what a person has to know of the page itself stands above the scene.
+const banner = text => Object.assign(document.createElement("div"), {
+  className: "sr-banner", role: "alert", textContent: text,
+});
+const gone = banner("The server of this page is gone. The page goes on once it answers again.");
+const blind = banner("This browser draws no scene: switch WebGL on in its settings, and reload.");
+window.Worker = class extends Worker {  // one of viser's holds the socket
+  constructor(...given) {
+    super(...given);
+    this.addEventListener("message", ({data}) => {
+      if (data?.type === "closed") document.body.append(gone);
+      if (data?.type === "connected") gone.remove();
+    });
+  }
+};
+
 // Smooth edges cost a third of the pictures a second where no graphics card draws them: there edges are
 // plain, and the arm follows a dragged tip.
 const context = HTMLCanvasElement.prototype.getContext;
@@ -89,7 +105,9 @@ const isSoftware = () => {
 let plain;
 HTMLCanvasElement.prototype.getContext = function (kind, options) {
   if (kind === "webgl2" && options?.antialias) options = {...options, antialias: !(plain ??= isSoftware())};
-  return context.call(this, kind, options);
+  const drawn = context.call(this, kind, options);
+  if (kind === "webgl2" && !drawn) document.body.append(blind);
+  return drawn;
 };
 
 // While a node is dragged, viser tells where the mouse is after 50 ms and the picture that follows: 7 to
