@@ -68,6 +68,12 @@ def test_what_is_no_arm_is_refused(arm):
         as_tip_map(arm)
 
 
+def test_a_dataset_that_is_no_arm_is_named_and_not_printed(trunk):
+    shape = sr.configuration(trunk, np.zeros(trunk.inputs))
+    with pytest.raises(InvalidInput, match=r"^arm = <xarray\.Dataset> Size: \d+kB: must be a"):
+        as_tip_map(shape)
+
+
 def test_an_arm_beyond_the_theory_is_refused_every_time(trunk):
     for _ in range(2):
         with pytest.raises(InvalidDesign, match="must keep ζ > 0"):

@@ -41,7 +41,8 @@ def did_you_mean(name: str, known: Iterable[str], cutoff: float = 0.7) -> str:
 
 def in_short(value: object) -> str:
     """A value in one line of moderate length."""
-    text = " ".join(str(value).splitlines())  # an array may take several
+    lines = str(value).splitlines()  # an array takes several, a dataset many
+    text = lines[0] if lines and lines[0].startswith("<") else " ".join(lines)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
