@@ -104,7 +104,7 @@ def _write(
 
 
 def _too_few(path: Path) -> NotPossible:
-    return NotPossible(f"{path} cannot be written for a design with so few free bundles")
+    return NotPossible(f"{path} cannot be written: slices need three free bundles, surfaces two")
 
 
 def payload(
@@ -120,8 +120,8 @@ def payload(
 ) -> None:
     """Compute how much of its reach a payload costs an arm.
 
-    The volumes under several payloads, which take the place of the design's own,
-    and the largest payload that keeps a share of the volume.
+    Prints the volume under each of several payloads, which replace the design's
+    own, and the largest payload that keeps a share of the volume.
 
     Example: softreach payload lce_arm --gravity up --share 0.8
 
