@@ -182,7 +182,7 @@ def test_a_wildcard_takes_one_name_of_each_number():
 
 
 def test_one_sample_says_nothing_of_how_sure_a_number_is(good):
-    with pytest.warns(SoftreachWarning, match="does not tell rings"):
+    with pytest.warns(SoftreachWarning, match="does not determine rings"):
         result = sr.calibrate(ARM, good[:1], free=[MODULUS], rivals=False)
     assert result.sigma[MODULUS] == np.inf
     assert "which the data does not determine" in str(result)
