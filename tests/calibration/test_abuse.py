@@ -120,10 +120,7 @@ OPTIONS = {
     "all held out": (dict(hold_out=1.0), "hold_out = 1"),
     "prior of no number": (dict(prior={"taper": 1.0}), "must be a free number: "),
     "twice": (dict(free=[MODULUS, "rings*modulus"]), "given once"),
-    "does nothing": (
-        dict(free=[MODULUS, "rings[0].material.density"]),
-        "leave out those that move",
-    ),
+    "does nothing": (dict(free=[MODULUS, "rings[0].material.density"]), "leave out those"),
     "two units": (dict(free=["t.distance = t.offset"]), "of the same unit"),
 }
 
