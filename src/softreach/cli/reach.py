@@ -165,13 +165,13 @@ def gradient(
 ) -> None:
     """Differentiate the reachable volume by design parameters.
 
-    Also its convex hull and its unreachability; everything in SI units.
+    Also prints those of the convex hull and the unreachability, all in SI units.
 
     Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
 
     Args:
         parameters: Parameters, as softreach list parameters DESIGN names them, or without units.
-        accuracy: Relative error allowed in what is rasterized.
+        accuracy: Relative error allowed in volumes found on a raster.
     """
     from softreach.arm.parameters import parameters_by_every_name, written_name
 
