@@ -38,8 +38,9 @@ def check(
 
     Judges places to reach, regions to stay in or to avoid, payloads, limits and
     measures. For each one missed, prints how far, which bounds hold the arm back,
-    and what would help. A margin that is smaller than its own error is undecided. The exit code
-    is 0 if all is met, 1 if something is missed, and 3 if something is undecided.
+    and what would help. A margin that is smaller than its own error is undecided.
+    The exit code is 0 if all is met, 1 if something is missed, and 3 if something
+    is undecided.
 
     Example: softreach check arm.toml needs.toml --out check.png
 
