@@ -16,7 +16,7 @@ from tests.abuse.refusals import refusal_of
 TRUNK = "minimal_trunk"
 VARY = "atlas build a.zarr --vary taper_deg=0,1"
 POSITION = "three comma-separated numbers x,y,z in m"
-SHAPE = "must be such that the arm has a shape, as from -1.6"
+SHAPE = "must be such that the arm has a shape, such as from -1.6"
 STORED = "has no effect on a stored cloud: give the design instead"
 NOT_WRITTEN = "error: --overwrite has no effect without --out"
 

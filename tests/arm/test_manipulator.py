@@ -199,9 +199,9 @@ def test_what_is_added_can_be_removed(silicone):
 def test_the_last_actuator_and_the_last_ring_stay(trunk):
     for name in ("left", "right"):
         trunk = edits.without_actuator(trunk, name)
-    with pytest.raises(InvalidInput, match="more than one to remove"):
+    with pytest.raises(InvalidInput, match="the last one cannot be removed"):
         edits.without_actuator(trunk, "longitudinal")
-    with pytest.raises(InvalidInput, match="more than one to remove"):
+    with pytest.raises(InvalidInput, match="the last one cannot be removed"):
         edits.without_ring(trunk, 0)
 
 

@@ -171,7 +171,7 @@ def test_whole_runs_are_held_out_where_there_are_eight():
     assert chosen.held_runs
     assert not few.held_runs
     assert many.held.sum() == chosen.held.sum() == few.held.sum() == 8
-    assert "8 of other motions" in str(many)
+    assert "8 in held-out runs" in str(many)
     assert "rows of one motion are neighbors" in str(few)
     for result in (many, chosen, single):
         assert "rows of one motion" not in str(result)

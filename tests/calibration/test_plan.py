@@ -69,7 +69,7 @@ def test_a_plan_is_a_dataset_of_its_poses_and_of_the_errors_to_expect():
         (dict(n=10**6), "n = 1000000"),
         (dict(markers=["disk"]), "of half, tool, each once"),
         (dict(markers=[]), "markers = none"),
-        (dict(free=["rings[0].material.density"]), "leave out what does nothing"),
+        (dict(free=["rings[0].material.density"]), "leave out those that move none"),
         (dict(candidates=1), "candidates = 1"),
     ],
 )

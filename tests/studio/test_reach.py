@@ -419,7 +419,7 @@ def test_unstable_samples_are_those_of_the_cloud_that_are_shown(torn):
     [
         ({}, ""),
         ({"arm": False, "surface": False}, "the arm, the reach"),
-        ({"slice": Slice(axis="x", center=0.1)}, "what lies off a slab of 0.05 m at x = 0.1 m"),
+        ({"slice": Slice(axis="x", center=0.1)}, "all outside a slab of 0.05 m at x = 0.1 m"),
         ({"cloud": True}, "the half of the points in front of the arm"),
         ({"cloud": True, "half": False}, ""),
     ],

@@ -68,7 +68,7 @@ def without_actuator(arm: Manipulator, name: str) -> Manipulator:
     """
     others = tuple(actuator for actuator in arm.actuators if actuator.name != name)
     if not others:
-        raise InvalidInput("actuators", name, "more than one to remove one of them")
+        raise InvalidInput("actuators", name, "one of several: the last one cannot be removed")
     return arm.replace(actuators=others)
 
 
@@ -107,12 +107,12 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
     """
     rings, label = arm.section.rings, ring_label(arm, index)
     if len(rings) == 1:
-        raise InvalidInput("rings", label, "more than one to remove one of them")
+        raise InvalidInput("rings", label, "one of several: the last one cannot be removed")
     sectors = [part for part in arm.actuators if isinstance(part, SectorActuator)]
     inside = [part.name for part in sectors if arm.section.ring_index(part.ring) == index]
     if inside:
         hint = f"move or remove {', '.join(inside)} first"
-        raise InvalidInput("rings", label, "without actuators to be removed", hint)
+        raise InvalidInput("rings", label, "a ring without actuators", hint)
     moved: dict[int | str, int] = {k: k - 1 for k in range(index + 1, len(rings))}
     return _with_rings(arm, rings[:index] + rings[index + 1 :], moved)
 

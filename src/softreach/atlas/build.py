@@ -136,7 +136,7 @@ def build_atlas(
         range(first, space.size, count),
     )
     content = contents(atlas, tips_of=numbers)
-    content.warn_of_damage("; what is damaged is computed again")
+    content.warn_of_damage("; damaged designs are computed again")
     ended = np.isin(content.status, (DONE, GAP, UNSTABLE))
     _run(atlas, [k for k in numbers if not ended[k]], executor, progress)
     built = open_atlas(store)

@@ -113,7 +113,7 @@ def _run_in_pool(
                 on_outcome(outcome)
     except BrokenExecutor as error:
         raise NotPossible(
-            "a worker died and broke its executor; what is done is safe, and the same call with "
+            "a worker died and broke its executor; finished designs are safe: the same call with "
             "a new executor continues"
         ) from error
     finally:

@@ -48,7 +48,7 @@ def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
     for metric in chain.from_iterable(map(_metrics_of, metrics)):
         same = chosen.setdefault(metric.name, metric) == metric
         if not same or _KNOWN.get(metric.name, metric) != metric:
-            raise InvalidInput("name of a metric", metric.name, "of one metric only")
+            raise InvalidInput("name of a metric", metric.name, "the name of one metric only")
     order = list(_KNOWN)
     own = sorted(name for name in chosen if name not in _KNOWN)
     return tuple(chosen[name] for name in [*order, *own] if name in chosen)

@@ -397,7 +397,7 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
 
     store = AtlasStore.open(location, "r")
     content, space = contents(store, metrics=metrics), store.command.space
-    then = "left out; the command that built the atlas computes again what is damaged"
+    then = "left out; run the command that built the atlas to compute them again"
     content.warn_of_damage(f" ({then})")
     with storage_errors(f"{store.location} cannot be read"):
         raw = xr.open_zarr(store.opened.place, drop_variables=_READ_HERE, **READING)

@@ -86,13 +86,13 @@ class AtlasStore:
             if opened is None:
                 _write_root(location, command, durable)
                 opened = opened_store(location, "atlas", "r+", durable=durable)
-        allowed = "a new folder, or an atlas; it holds something else"
+        allowed = "a new folder, or an atlas; this one holds other files"
         opened, stored = _with_command(opened, location, allowed)
         if (begun := stored.softreach_version) != (now := command.softreach_version):
             command = command.continuing(stored)
-            warn(f"{location} was begun by softreach {begun}, and goes on with {now}")
+            warn(f"{location} was begun by softreach {begun}; softreach {now} goes on with it")
         if differences := command.differences(stored):
-            hint = f"it differs in {'; '.join(differences)}"
+            hint = f"this one differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
         store = cls(location, command, opened)  # this command has all functions
         with writing(location), opened.noting():  # what is damaged counts as missing

@@ -95,7 +95,7 @@ def calibrate(
     table = read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
     rows = np.concatenate([table.inputs, table.places.reshape(len(table), -1)], axis=1)
     if copies := len(rows) - len(np.unique(rows, axis=0, equal_nan=True)):
-        warn(f"{copies} samples are copies of others to the last digit: errors come out too small")
+        warn(f"{copies} samples repeat others exactly: remove them, or errors come out too small")
     held = _held_out(table, hold_out, by_run, as_integer("seed", seed))
     train, progress = table.of(~held), as_progress(progress)
     model = MarkerModel.of(free_numbers(arm, free, prior), train)
@@ -127,7 +127,7 @@ def _held_out(table: Measurements, share: float, by_run: bool | None, seed: int)
     parts, count, what = (table.runs, runs, "runs") if by_run else (None, len(table), "samples")
     out = max(round(share * count), 1 if by_run and share else 0)
     if out == count:
-        raise InvalidInput("hold_out", share, f"a share that leaves some of {count} {what}")
+        raise InvalidInput("hold_out", share, f"small enough to leave some of {count} {what}")
     chosen = np.random.default_rng(seed).permutation(count)[:out]
     return np.isin(np.arange(count) if parts is None else parts, chosen)
 
@@ -186,12 +186,12 @@ def _warn_of_numbers(result: Calibration) -> None:
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:
             warn(
-                f"{name} became {ratio:.3g} times what the design says: hold it, give it a prior, "
-                "and look whether the inputs are in their order"
+                f"{name} became {ratio:.3g} times what the design says: check the order of "
+                "the inputs, then hold this number or give it a prior"
             )
     if len(vague := names[~(result.uncertainty.told | fit.at_bound)]):
         warn(
-            f"the data does not tell {', '.join(vague)}: its standard deviation is infinite; hold "
+            f"the data does not determine {', '.join(vague)}: standard deviation infinite; hold "
             "it, give it a prior, or measure more"
         )
     before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}

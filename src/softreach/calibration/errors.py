@@ -122,27 +122,27 @@ def judged(
     share = share or 0.0
     if share > max(_MEMORY, law) and not finding:
         limit = "memory"
-        said = f"limited by memory: the commands before explain {100 * share:.0f} % of what is "
-        said += "left (friction, creep or slack of the drives), which no law of the inputs does"
+        said = f"limited by memory: earlier commands explain {100 * share:.0f} % of the residuals, "
+        said += "as friction, creep or slack of the drives would; no law of the inputs does"
     elif known and error <= _NOISE * repeated.rms and law < _LAW and not finding:
-        limit, said = "noise", "limited by noise: the error is that of the data itself"
+        limit, said = "noise", "limited by noise: repeated poses differ as much as the error"
         if not in_a_row:
-            limit, said = "data", "the error is that of the data itself; too few samples in a row"
-            said += " to look for memory"
+            limit, said = "data", "repeated poses differ as much as the error; too few samples"
+            said += " in a row to look for memory"
     elif len(data) < _FEW:
         limit, said = "data", "too few samples to say what limits the fit"
     elif law < _LAW and not known and not finding:
-        said = "limited by missing physics, or by noise: no inputs are repeated, so nothing tells"
+        said = "limited by missing physics or by noise: no inputs are repeated to tell which"
         limit = "data"
     else:
-        limit, said = "physics", "the error is beyond what the data repeats"
+        limit, said = "physics", "repeated poses differ by less than the error"
         if law >= _LAW:
-            said = f"a law of the inputs explains {100 * law:.0f} % of what is left, such as "
+            said = f"a law of the inputs explains {100 * law:.0f} % of the residuals, such as "
             said += "another geometry or inputs that saturate"
-            beyond = f", and the commands before {100 * share:.0f} % beyond"
+            beyond = f", and earlier commands another {100 * share:.0f} %"
             said += beyond if share > _MEMORY else ""
         elif not known:
-            said = "samples far off are no slips"
+            said = "samples far off are no errors of measurement"
         said = f"limited by missing physics: {said}"
     return Verdict(limit, f"{said} ({text}){finding and '; '}{finding}")
 

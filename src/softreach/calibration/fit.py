@@ -166,7 +166,7 @@ def _ordered(places: Array, order: NDArray[np.intp]) -> Array:
 
 def _said(orders: list[_Order]) -> str:
     alike = [order.text for order in orders if order.miss <= _ALIKE * orders[0].miss]
-    return f"{' or '.join(alike[:4])} seem to be exchanged, or counted the other way round"
+    return f"{' or '.join(alike[:4])} seem to be exchanged or reversed"
 
 
 def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> None:
@@ -177,7 +177,7 @@ def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> No
         if orders[0].miss < _FAR_BETTER * own:
             raise NotPossible(
                 f"the columns of the data fit no arm with right-handed axes: {_said(orders)}; "
-                f"the middle then misses by {1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
+                f"put right, they miss by {1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
             )
 
 
@@ -194,7 +194,7 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
     still = _IDLE * max(sizes.max(), free.arm.length * np.sqrt(len(slopes)))
     idle = [name for name, size in zip(free.names, sizes, strict=True) if size <= still]
     if idle:
-        allowed = "numbers that move some marker of some sample: leave out what does nothing here"
+        allowed = "numbers that move a marker in some sample: leave out those that move none"
         raise InvalidInput("free", ", ".join(idle), allowed)
     _, values, axes = np.linalg.svd(scaled, full_matrices=False)
     if len(scaled) < len(free):
@@ -205,8 +205,8 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
     null = axes[values <= SAME * values[0]]
     trading = [free.names[k] for k in _fewest(null * sizes)]
     allowed = (
-        "numbers that the data can tell apart: these change together without moving any marker, "
-        f"as only their ratio or their sum shows; leave out one, such as {trading[-1]}, or give "
+        "numbers that the data can tell apart: markers show only the ratio or the sum "
+        f"of these; leave out one, such as {trading[-1]}, or give "
         "it a prior"
     )
     raise InvalidInput("free", ", ".join(trading), allowed)

@@ -156,7 +156,7 @@ def free_numbers(
     )
     names = [number.name for number in numbers]
     if priors:
-        raise InvalidInput("prior", next(iter(priors)), f"of a free number: {', '.join(names)}")
+        raise InvalidInput("prior", next(iter(priors)), f"a free number: {', '.join(names)}")
     if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("free", twice[0], "given once")
     if not numbers:
@@ -221,7 +221,7 @@ def _of_parameters(arm: Manipulator, name: str) -> FreeNumber:
     known = find_parameters(arm, paths)
     first = known[paths[0]]
     if first.whole:
-        raise InvalidInput("free", name, "a number that can change a little: this one counts")
+        raise InvalidInput("free", name, "a number that can change a little, not a count")
     if len({parameter.unit for parameter in known.values()}) > 1:
         raise InvalidInput("free", name, "tied to numbers of the same unit")
     values = [value for p in known.values() for value in p.values(arm) if math.isfinite(value)]

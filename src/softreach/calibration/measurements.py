@@ -314,8 +314,8 @@ def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]
     if far := int((away > reach).sum()):
         row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
         given = f"{1e3 * places[row, marker, axis]:.4g} mm"
-        given += f", as {far - 1} others" if far > 1 else ""
-        allowed = f"within {1e3 * reach:.4g} mm of the middle, for an arm of "
+        given += f", and {far - 1} more cells" if far > 1 else ""
+        allowed = f"within {1e3 * reach:.4g} mm of the median, for an arm of "
         allowed += f"{1e3 * arm.length:.4g} mm: look at the unit of the column, and leave a cell "
         allowed += "empty where the marker was not seen"
         raise InvalidInput(f"{columns[marker][axis]} in row {row}", given, allowed)
@@ -372,7 +372,7 @@ def _triples(columns: list[str]) -> dict[str, list[str]]:
             raise NotPossible(f"a place needs x, y and z: {lacking[0]} is missing beside {given}")
     if not places:
         usual = "x_mm, y_mm, z_mm or marker1_x_mm"
-        raise NotPossible(f"the data has no places: no columns such as {usual}")
+        raise NotPossible(f"the data has no columns of places, such as {usual}")
     return {start: [axes[axis] for axis in "xyz"] for start, axes in places.items()}
 
 
@@ -386,7 +386,7 @@ def _chosen_markers(
         listed = ", ".join(start or "x, y, z" for start in triples)
         own = f"{counted(len(names), 'marker')} ({', '.join(names)})"
         raise NotPossible(
-            f"the arm has {own}, and the data others ({listed}): name their columns by `markers`"
+            f"the arm has {own}, the data has {len(triples)} ({listed}): name them by `markers`"
         )
     return dict(zip(names, triples, strict=True))
 

@@ -262,7 +262,7 @@ class Calibration(Reported):
 
     @property
     def _held_text(self) -> str:
-        return f"{int(self.held.sum())} {'of other motions' if self.held_runs else 'held out'}"
+        return f"{int(self.held.sum())} {'in held-out runs' if self.held_runs else 'held out'}"
 
     def _model(self, data: Measurements) -> MarkerModel:
         return MarkerModel.of(self.fit.free, data)
@@ -418,7 +418,7 @@ def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, s
         name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma / size, digits=2)
         text += ", at its bound" if at_bound else ", with its prior" if number.prior else ""
-        text += ", which the data does not tell" if sigma == math.inf else ""
+        text += ", which the data does not determine" if sigma == math.inf else ""
         yield number.name, text, f"{pose.get(number.name, number.start) / size:.4g}"
 
 
@@ -436,14 +436,14 @@ def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
         yield f"{unit.label('rms')} of each marker: {listed}"
     if result.held.any() and not result.held_runs and len(result.data.run_names) > 1:
         yield (
-            "rows of one motion are neighbors: those held out say little about other motions; hold "
-            "out whole runs"
+            "rows of one motion are neighbors: errors at held-out rows say little about other "
+            "motions; hold out whole runs"
         )
     for first, second, share in result.correlated[:3]:
         yield f"hardly told apart: {first} and {second} (correlation {share:+.3f})"
     if len(far := result.outliers):
         rows = ", ".join(map(str, far[:_MOST_ROWS])) + ", ..." * (len(far) > _MOST_ROWS)
-        yield f"{counted(len(far), 'sample')} far off, rows below the header from 0: {rows}"
+        yield f"{counted(len(far), 'sample')} far off, in rows (counted from 0): {rows}"
 
 
 def _doubtful_inputs(result: Calibration) -> Iterator[str]:
@@ -468,13 +468,13 @@ def _doubtful_inputs(result: Calibration) -> Iterator[str]:
         sure = _WIDTHS * np.sqrt(noise * np.diag(inverse)[1:, None] / square)
     for k, name in enumerate(result.arm.input_names[j] for j in moving):
         for wrong, words in (
-            (share[k] + sure[k] < _AGAINST, "the wrong way: look at its sign and at the order"),
-            (np.abs(share[k]) + sure[k] < _HARDLY, "hardly: look at its column and its unit"),
+            (share[k] + sure[k] < _AGAINST, "the wrong way: check its sign and the input order"),
+            (np.abs(share[k]) + sure[k] < _HARDLY, "hardly: check its column and its unit"),
         ):
             if (hits := np.flatnonzero(wrong & matters[k])).size:
                 seen = ", ".join(data.marker_names[m] for m in hits)
                 times = share[k, hits[0]]
-                yield f"{name} moves {seen} {words} ({times:.2f} times what the model says)"
+                yield f"{name} moves {seen} {words} ({times:.2f} times as far as the model)"
 
 
 def _doubtful_priors(result: Calibration) -> Iterator[str]:
@@ -484,8 +484,8 @@ def _doubtful_priors(result: Calibration) -> Iterator[str]:
         mean, width = number.prior
         if (off := abs(value - mean) / width) > _FAR_FROM_PRIOR:
             yield (
-                f"{number.name} is {off:.1f} widths from its prior, which the data contradicts: "
-                "free what it stands in for, or widen it"
+                f"{number.name} is {off:.1f} widths from its prior: free another number that may "
+                "explain the data, or widen the prior"
             )
 
 
@@ -495,6 +495,6 @@ def _better_rivals(result: Calibration) -> Iterator[str]:
     if better:
         best = min(better, key=lambda rival: rival.held_out.rms)
         yield (
-            f"{best.name} predicts better ({1e3 * best.held_out.rms:.3g} mm, the arm "
-            f"{1e3 * own.rms:.3g}): look at order, sign and unit of the inputs, or free more"
+            f"{best.name} predicts better than the arm ({1e3 * best.held_out.rms:.3g} mm, not "
+            f"{1e3 * own.rms:.3g}): check order, sign and unit of inputs, or free more numbers"
         )

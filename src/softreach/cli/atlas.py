@@ -53,8 +53,8 @@ def build(
 ) -> None:
     """Compute the clouds and the metrics of all designs.
 
-    The same command continues after an interruption, and computes again what is
-    damaged.
+    The same command continues after an interruption, and computes damaged
+    designs again.
 
     Example: softreach atlas build a.zarr --vary taper_deg=0:3:9 --vary length_m=1,2
 
@@ -107,15 +107,15 @@ def _print(store: str, state: sr.atlas.AtlasStatus, json: bool) -> None:
 def verify(store: Store, /, *, json: options.AsJson = False) -> None:
     """Read all of an atlas and check it.
 
-    The command that built it computes again what is damaged.
+    The command that built it computes damaged designs again.
 
     Example: softreach atlas verify atlas.zarr
     """
     _print(store, state := sr.atlas.verify_atlas(store), json)
     if state.damaged:
         raise NotPossible(
-            f"{counted(state.damaged, 'design')} of {store} damaged; the command that built the "
-            "atlas computes them again"
+            f"{counted(state.damaged, 'design')} of {store} damaged: run the command that built "
+            "the atlas again"
         )
 
 

@@ -74,7 +74,7 @@ def calibrate(
             as in taper=1deg, or NAME=MEAN:WIDTH, as in
             rings[0].material.young_modulus=300kPa:50kPa. May be repeated.
         hold_out: Fraction of samples held out at random.
-        hold_out_runs: Hold out whole runs. By default where the data has eight or more.
+        hold_out_runs: Hold out whole runs; the default for data with eight or more.
         noise: Standard deviation of a measured coordinate, which decides how much priors count:
             0.2mm. Estimated from the residuals if left out.
         robust: Down-weight outliers.
@@ -82,11 +82,11 @@ def calibrate(
         seed: Seed of the held-out samples.
         inputs: Column of an input: "tendon 1=tension1_N". May be repeated.
         markers: Start of the columns of a marker: tip=disk3. May be repeated.
-        run: Column that groups samples into runs, if not run.
-        order: Column to sort by, if not time_s.
+        run: Column that names the run of each sample: run if left out.
+        order: Column to sort by: time_s if left out.
         out: Write the calibrated design to this TOML file.
         report: Write a report with pictures to this .html file.
-        table: Write what was predicted and missed to this .csv file.
+        table: Write predicted places and their errors to this .csv file.
     """
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.support.report import REPORT

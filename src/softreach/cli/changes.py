@@ -156,8 +156,8 @@ def _unchanged(text: str) -> sr.Manipulator:
     suffix = path.suffix.lower()
     if suffix in _POINTS:
         raise NotPossible(
-            f"{text} is no design; in Python, softreach.concave_hull(points, alpha=0.05) computes "
-            "the volume of points of your own, in m and of shape (n, 3)"
+            f"{text} is no design: give a .toml file; in Python, softreach.concave_hull(points, "
+            "alpha=0.05) computes the volume of points [m] of shape (n, 3)"
         )
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):

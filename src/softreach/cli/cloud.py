@@ -78,7 +78,7 @@ def volume(
 ) -> None:
     """Estimate volumes and unreachability from a cloud.
 
-    The volume is that of an α-shape of the samples, which limit its accuracy.
+    The volume is that of an α-shape; the number of samples limits its accuracy.
     softreach reach computes the exact volume, without samples and with its error.
 
     Example: softreach volume trunk.zarr --alpha 0.03L --out hull.ply

@@ -148,7 +148,7 @@ def shape_of(text: str | None, arm: sr.Manipulator) -> xr.Dataset:
     shape = sr.configuration(arm, activation_of(text, arm))
     if not np.isfinite(shape.position.values).all():
         lower, upper = (",".join(f"{bound:g}" for bound in ends) for ends in arm.input_bounds.T)
-        allowed = f"such that the arm has a shape, as from {lower} to {upper}"
+        allowed = f"such that the arm has a shape, such as from {lower} to {upper}"
         raise InvalidInput("activation", text, allowed)
     return shape
 

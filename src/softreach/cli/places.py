@@ -29,8 +29,8 @@ def solve(
 ) -> None:
     """Find every activation that puts the tip at a target.
 
-    Where none does, the nearest point that can be reached and a bound on its
-    distance. Places are in the world: --base hanging turns the arm in it.
+    If there is none, prints the nearest point that the tip reaches and a bound on
+    its distance. Places are in the world, in which --base hanging turns the arm.
 
     Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
 
@@ -38,7 +38,7 @@ def solve(
         target: Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.
         targets: CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.
         within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
-        family: Number of solutions for each target of more than three free bundles (1).
+        family: Number of solutions for each target, with more than three free bundles (1).
     """
     from softreach.inverse.request import length_in, position_in
 

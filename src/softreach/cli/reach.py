@@ -104,7 +104,7 @@ def _write(
 
 
 def _too_few(path: Path) -> NotPossible:
-    return NotPossible(f"{path} cannot be written for a design with so few free bundles")
+    return NotPossible(f"{path} cannot be written: slices need three free bundles, surfaces two")
 
 
 def payload(
@@ -120,8 +120,8 @@ def payload(
 ) -> None:
     """Compute how much of its reach a payload costs an arm.
 
-    The volumes under several payloads, which take the place of the design's own,
-    and the largest payload that keeps a share of the volume.
+    Prints the volume under each of several payloads, which replace the design's
+    own, and the largest payload that keeps a share of the volume.
 
     Example: softreach payload lce_arm --gravity up --share 0.8
 
@@ -165,13 +165,13 @@ def gradient(
 ) -> None:
     """Differentiate the reachable volume by design parameters.
 
-    Also its convex hull and its unreachability; everything in SI units.
+    Also prints those of the convex hull and the unreachability, all in SI units.
 
     Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
 
     Args:
         parameters: Parameters, as softreach list parameters DESIGN names them, or without units.
-        accuracy: Relative error allowed in what is rasterized.
+        accuracy: Relative error allowed in volumes found on a raster.
     """
     from softreach.arm.parameters import parameters_by_every_name, written_name
 

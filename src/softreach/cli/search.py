@@ -36,10 +36,10 @@ def check(
 ) -> int:
     """Check a design against requirements: met or missed, and by how much.
 
-    Places to reach, regions to stay in or to avoid, payloads, limits, measures;
-    for what is missed, how far, which bounds hold the arm back, and what it would
-    take. A margin that is smaller than its own error is undecided. The exit code
-    is 0 if all is met, 1 if something is missed, and 3 if something is undecided.
+    Judges places to reach, regions to stay in or to avoid, payloads, limits and
+    measures; prints how far each is missed, which bounds hold the arm back and
+    what would help. A margin below its own error is undecided. The exit code is 0
+    if all is met, 1 if something is missed, and 3 if something is undecided.
 
     Example: softreach check arm.toml needs.toml --out check.png
 

@@ -42,8 +42,8 @@ def studio(
 ) -> None:
     """Open the design desk in the browser.
 
-    Move sliders, and see at once what the design can reach. The work on a design
-    is kept in a folder of your own, and found again.
+    Move sliders, and see at once what the design can reach. Your work is saved,
+    and restored at the next start.
 
     Example: softreach studio redundant_trunk --no-open
 

@@ -23,8 +23,8 @@ from softreach.support.progress import bar
 def warmup(*, only: str | None = None) -> int:
     """Compile all kernels now, so that no later command has to.
 
-    They are kept in a cache on disk; if it has them already, this takes seconds.
-    Exits with 1 if they cannot be kept.
+    A cache on disk keeps them; if it has them already, this takes seconds.
+    Exits with 1 if the cache cannot be written.
 
     Example: softreach warmup --only free
 

@@ -120,7 +120,7 @@ def end_text(track: xr.Dataset, unit: LengthUnit) -> str:
     count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
     end, way = track.attrs["end"], unit.rounded(float(track.end_length))
     if end == "no_start":
-        return "The first point is not reached: out of reach, or not from this activation."
+        return "The first point cannot be reached, or not from the starting activation."
     if end == "end":
         return f"All {points} points are followed: {way} of path."
     error = unit.rounded(float(track.end_length_error), digits=".1g")

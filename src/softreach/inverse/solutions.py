@@ -123,7 +123,7 @@ class Solution:
             if gamma.size:
                 quality += f", condition {self.conditions[k]:.3g}, margin {self.margins[k]:.3g}"
             if self.sheets[k]:
-                quality += ", in a posture that it does not take straight from rest"
+                quality += ", in a posture that the arm does not take straight from rest"
             lines.append(f"{activation_text(arm, gamma, names)}  ({quality})")
         if not len(self):
             least = shown.rounded(self.gap_bound)

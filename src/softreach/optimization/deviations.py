@@ -75,7 +75,7 @@ def deviations_of(arm: Manipulator, sigmas: Mapping[str, Any]) -> Deviations:
     known = find_parameters(arm, given)
     for name, parameter in known.items():
         if parameter.whole or not np.isfinite(parameter.values(arm)).all():
-            raise InvalidInput("sigmas", name, "a number that can change a little")
+            raise InvalidInput("sigmas", name, "a number that can change a little, not a count")
     return Deviations(arm, tuple(known.values()), np.array([given[name] for name in known]))
 
 

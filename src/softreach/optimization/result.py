@@ -362,7 +362,7 @@ def _best(search: Search, unit: LengthUnit) -> Section:
     rows = [(_goal_text(goal), _value_text(goal, value, unit), "") for goal, value in pairs]
     rows += _parameter_rows(search, unit)
     ends = ", ".join(f"{name} at its {end} end" for name, end in search.at_ends.items())
-    note = f"At an end of their range: {ends}. A wider one may be better." if ends else ""
+    note = f"At an end of their range: {ends}. A wider range may be better." if ends else ""
     return Section(title="Best design", head=("number", "best", "range"), rows=rows, note=note)
 
 
@@ -375,7 +375,7 @@ def _front(search: Search, unit: LengthUnit) -> Iterator[Section]:
         rows.append((str(number), *(_value_text(*pair, unit) for pair in pairs), *numbers))
     if len(rows) > 1:
         head = ("front", *map(_goal_text, goals), *(p.name for p in free))
-        note = "Designs that no other one beats in every objective, each judged to full accuracy."
+        note = "No design beats one of these in every objective; each is judged to full accuracy."
         yield Section(title="Front", head=head, rows=rows, note=note)
 
 

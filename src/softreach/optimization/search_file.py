@@ -190,7 +190,7 @@ class _Reader(FaultReader):
             return names.by_key[key].name
         hint = did_you_mean(key, names.by_key, 0.5)
         allowed = unknown_parameter(key, names.written).allowed
-        text = f"is no parameter; {hint}" if hint else f"is no parameter, which are {allowed}"
+        text = f"is no parameter; {hint}" if hint else f"is no parameter: must be {allowed}"
         self._refuse(path, None, text)
         return ""
 

@@ -270,7 +270,7 @@ def plot_opposite_sides(
     around = None if box_over_length is None else as_box("box_over_length", box_over_length)
     bundles = {bundle_names(cloud) for cloud in clouds.values()}
     if len(bundles) != 1:
-        raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
+        raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "some of equal bundles")
     azimuth, elevation = view_angles(view)
     sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
     if around is None:

@@ -403,7 +403,7 @@ def _kept(
     keep: Keep, value: float, error: float, excess: float, where: str, unit: LengthUnit
 ) -> Finding:
     of = "the tip" if keep.of == "tip" else "the arm"
-    close = f" (to {unit.rounded(error, digits='.2g')})" if keep.of == "arm" else ""
+    close = f" ± {unit.rounded(error, digits='.2g')}" if keep.of == "arm" else ""
     verdict = "missed" if excess > 0.0 else verdict_of(max(-value, 0.0), error)
     if excess > 0.0:
         beyond = "outside" if keep.inside else "inside or too near"

@@ -56,7 +56,7 @@ class Target:
 
     def __post_init__(self) -> None:
         if (self.places is None) == (self.region is None):
-            raise InvalidInput("places", as_given(self.places), "given, or a region, and not both")
+            raise InvalidInput("places", as_given(self.places), "given, or else a region")
         if self.places is not None:
             places = as_points("places", self.places)
             if not 0 < len(places) <= MOST_PLACES:

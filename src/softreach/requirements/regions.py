@@ -302,7 +302,7 @@ class Mesh(Region):
         name = as_path("path", path)
         stated = _unit_of(name)
         if unit is None and stated is None:
-            allowed = "m, cm or mm: the file of the mesh does not say in which it counts"
+            allowed = "m, cm or mm: the file of the mesh does not name its unit"
             raise InvalidInput("unit", None, allowed)
         size = as_unit(stated if unit is None else unit)
         if stated not in (None, size.name):
@@ -454,4 +454,4 @@ def _check_closed(faces: Any, name: str) -> None:
         many = f"{counted(number, 'edge')} of more than two triangles"
         raise NotPossible(f"the surface of {name} branches: it has {many}")
     if len(np.unique(ways, axis=0)) < len(ways):
-        raise NotPossible(f"some triangles of {name} face out and others in: turn them one way")
+        raise NotPossible(f"some triangles of {name} face out and others in: make all face out")

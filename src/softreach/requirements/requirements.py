@@ -235,7 +235,7 @@ def _named(parts: Sequence[Any]) -> Iterator[Any]:
     """The parts, those without a name called "target 1" or "avoid 2" by their places."""
     names = [part.name for part in parts if part.name]
     if twice := [name for name in names if names.count(name) > 1]:
-        raise InvalidInput("name", repr(twice[0]), "of one target, or of one region, only")
+        raise InvalidInput("name", repr(twice[0]), "the name of only one target or region")
     for number, part in enumerate(parts, 1):
         kind = "target" if isinstance(part, Target) else part.kind.replace("_", " ")
         yield part if part.name else dataclasses.replace(part, name=f"{kind} {number}")
@@ -321,7 +321,7 @@ class _Reader(FaultReader):
     def _beside(self, name: str, instead: str) -> Path:
         """Path of a file that lies beside the text, if that has a place."""
         if self.folder is None:
-            allowed = f"part of the text, as other files are not sent along: write {instead}"
+            allowed = f"part of the text: other files are not sent along; write {instead}"
             raise InvalidInput("file", repr(name), allowed)
         return self.folder / name
 

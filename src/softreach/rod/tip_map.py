@@ -209,7 +209,7 @@ class TipMap(ABC):
             why = f"here the arm turns by {turn:.3g} rad in a step, too far to be followed"
         lower, upper = map(_listed, (self.box.low, self.box.high))
         count = f"; so are {len(wrong):,} rows in all" if len(wrong) > 1 else ""
-        allowed = f"such that the arm has a shape, as from {lower} to {upper}"
+        allowed = f"such that the arm has a shape, such as from {lower} to {upper}"
         name = name if len(gamma) == 1 else f"{name}[{wrong[0]}]"
         raise InvalidInput(name, _listed(first[0]), allowed, why + count)
 
@@ -470,4 +470,4 @@ def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> 
 def no_equilibrium(tried: int, sought: str = "a stable equilibrium") -> InvalidLoads:
     """Error of loads under which none of so many activations has what is sought."""
     missing = no_equilibrium_message(tried, sought)
-    return InvalidLoads("loads", missing, "such that some have one", "lighten the load")
+    return InvalidLoads("loads", missing, f"light enough for {sought}", "lighten the load")

@@ -121,7 +121,7 @@ def picture_text(found: Found, reach: Reach, look: Appearance) -> str:
         "the arm": not look.arm,
         "the reach": not (dots or look.surface),
         "the half of the points in front of the arm": dots and look.half,
-        f"what lies off a slab of {off[0]} at {cut.axis} = {off[1]}": cut.axis != "none",
+        f"all outside a slab of {off[0]} at {cut.axis} = {off[1]}": cut.axis != "none",
         f"all but {shown:,} of the samples": dots and shown < reach.samples,
     }
     left_out = ", ".join(text for text, is_out in parts.items() if is_out)

@@ -69,12 +69,12 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     columns = _table(activations, len(filament.columns[0]), f"the sectors of {sectors}")
     if len(tip) != len(columns):
         rows = counted(len(columns), "row")
-        raise InvalidInput(activations, rows, f"{len(tip)}, as {path} has")
+        raise InvalidInput(activations, rows, f"{len(tip)} rows, as in {path}")
     activation = filament.from_columns(columns)
     difference = float(np.linalg.norm(tip - tip_positions(arm, activation, tol), axis=1).max())
     low, high = arm.bounds.T
     if (activation < low).any() or (activation > high).any():
-        warn("activations leave the bounds of the design: widen them before asking for its set")
+        warn("activations leave the bounds of the design: widen these to cover its reachable set")
     if difference > _SAME * arm.length:
         warn(
             f"tips differ by up to {difference / arm.length:.2g} L from those of this design: "

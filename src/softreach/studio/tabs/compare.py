@@ -33,7 +33,7 @@ def compare(panel: Fields) -> None:
     panel.change("Keep this design", keep, "Draws its boundary in gray from now on")
     with panel.folder("kept design", "reference"):
         swap = lambda s: s.replace(design=s.reference or s.design, reference=s.design)
-        panel.change("Swap", swap, "Makes the kept design the design, and back")
+        panel.change("Swap", swap, "Exchanges the design and the kept design")
         forget = "Compares no more, and takes the gray boundary away"
         panel.change("Forget", lambda state: state.replace(reference=None), forget, **GRAY)
 

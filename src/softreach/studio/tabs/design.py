@@ -123,7 +123,7 @@ def _designs() -> dict[str, Manipulator]:
 _AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
 _NEW_RING = "ring"
 _ABOUT_MADE_OF = (
-    "Material that all rings get: an actuator that pulls with a force needs Young's modulus E, "
+    "Material of all rings: tendons and chambers need its Young's modulus E, "
     "which some arms leave open"
 )
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
@@ -277,7 +277,7 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
         gravity_name,
         lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
     )
-    falls = "Which way things fall in the world; the base says how the arm stands in it"
+    falls = "Direction of gravity in the world; the base says which way the arm points"
     panel.dropdown("gravity", names, fall, falls)
     for name, (label, symbol, _, hint) in _LOADS.items():
         kind = number_kind if name == "payload" else vector_kind
@@ -289,7 +289,7 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
     panel.text(*follows, content=rests)
     more = lambda s, _: ", ".join(other_loads(s.design))
-    act = lambda *known: [f"From the design file act too: {more(*known)}."] * bool(more(*known))
+    act = lambda *known: [f"The design file also has: {more(*known)}."] * bool(more(*known))
     panel.text("design", content=act)
 
 

@@ -36,9 +36,9 @@ Write = Callable[[Session, Path], object]
 
 _ABOUT = {
     "data": "The design alone, which the command line reads too; all samples of the cloud; the "
-    "exact boundary of the reachable set; or the arm as it is. Lengths are in the unit of the page",
+    "exact boundary of the reachable set; or the arm as bent. Lengths are in the unit of the page",
     "picture": "The scene as it is seen, with legend and design; three views and an oblique one of "
-    "the points that are shown; or the scene in one file, to be turned without a studio",
+    "the points that are shown; or one web page with the scene, which turns without the studio",
 }
 
 

@@ -112,9 +112,9 @@ def _work(session: Session) -> str:
 
 _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
-    "surface": ("exact surface", "Boundary of all that the tip reaches, from the map itself"),
+    "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
     "cloud": ("cloud", "Tips of sampled activations"),
-    "half": ("half of the cloud", "Cuts away the half in front of the arm, so that it is seen"),
+    "half": ("half of the cloud", "Cuts away the half in front of the arm"),
     "dark": ("dark page", "Light on dark"),
 }
 
@@ -131,7 +131,7 @@ def view(panel: Fields) -> None:
     lengths = Attribute(
         lambda state: state.design.length_unit.name, lambda state, name: state.showing(unit=name)
     )
-    about = "Unit of lengths, and those of areas and volumes beside it: here and in saved files"
+    about = "Unit of lengths, areas and volumes, here and in saved files"
     panel.dropdown("unit", {name: name for name in UNITS}, lengths, about)
     with panel.folder("show"):
         for name, (label, hint) in _TOGGLES.items():

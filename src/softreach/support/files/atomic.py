@@ -60,7 +60,7 @@ def check_place(
     place = Path(os.path.realpath(shown))
     with _one_line(path):
         if foreign is not None and (whole := _rename_what_is_whole(place)):
-            warn(f"{path}: its replacement was killed; {whole.name} was renamed to it")
+            warn(f"{path}: a killed command left {whole.name}, which was renamed to it")
         try:
             mode = place.stat().st_mode
         except FileNotFoundError:
@@ -150,7 +150,7 @@ def place_to_read(path: StrPath) -> str:
         SoftreachWarning: It is read from there.
     """
     if whole := _whole(Path(os.path.realpath(path))):
-        warn(f"{path}: its replacement was killed; {whole.name} is read")
+        warn(f"{path}: a killed command left {whole.name}, which is read")
         return os.fspath(whole)
     return os.fspath(path)
 

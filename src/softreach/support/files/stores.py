@@ -49,7 +49,7 @@ READING: Mapping[str, Any] = {
 
 _REMEDY = {
     "cloud": "compute the cloud again, or bring back a copy",
-    "atlas": "the command that built the atlas computes again what is damaged",
+    "atlas": "run the command that built the atlas again, which repairs it",
 }
 _ALLOWED = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
 _KEY = re.compile(r"([^/]+)/c((?:/\d+)*)", re.ASCII)
