@@ -36,7 +36,9 @@ def test_an_arm_is_designed_loaded_seen_to_shrink_and_exported(tab, tmp_path):
     page = tab.page
     tab.open("Design")
     tab.choose("start from", "lce_arm")
-    arm = designs.lce_arm().replace(display_unit="in")
+    arm = designs.lce_arm()
+    page.get_by_text(size_text(tab.reach_of(arm).size, arm)).wait_for()
+    arm = arm.replace(display_unit="in")
     tab.open("View")
     tab.choose("unit", "in")
     free = size_text(tab.reach_of(arm).size, arm)
