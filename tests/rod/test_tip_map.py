@@ -68,6 +68,13 @@ def test_what_is_no_arm_is_refused(arm):
         as_tip_map(arm)
 
 
+def test_of_a_path_the_refusal_says_how_to_open_it(tmp_path):
+    for path in ("arm.toml", tmp_path / "arm.toml"):
+        for ask in (as_tip_map, sr.reachable_set, sr.describe):
+            with pytest.raises(InvalidInput, match=r"; softreach\.Manipulator\.load opens"):
+                ask(path)
+
+
 def test_a_dataset_that_is_no_arm_is_named_and_not_printed(trunk):
     shape = sr.configuration(trunk, np.zeros(trunk.inputs))
     with pytest.raises(InvalidInput, match=r"^arm = <xarray\.Dataset> Size: \d+kB: must be a"):

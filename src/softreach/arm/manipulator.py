@@ -24,7 +24,6 @@ from softreach.arm.stations import Marker
 from softreach.support.arguments import (
     as_flag,
     as_given,
-    as_instance,
     as_integer,
     as_path,
     as_text,
@@ -364,7 +363,16 @@ class Manipulator(Body):
 
 def a_manipulator(name: str, value: object) -> Manipulator:
     """An argument that is a design."""
-    return as_instance(name, value, Manipulator, "a Manipulator")
+    if isinstance(value, Manipulator):
+        return value
+    raise no_arm(name, value, "a Manipulator")
+
+
+def no_arm(name: str, value: object, allowed: str) -> InvalidInput:
+    """The refusal of an argument that is no arm; of a path it says how to open a file."""
+    is_path = isinstance(value, str | PathLike)
+    hint = "softreach.Manipulator.load opens a design file" if is_path else ""
+    return InvalidInput(name, as_given(value), allowed, hint)
 
 
 def scale_warnings(arm: Manipulator) -> tuple[str, ...]:

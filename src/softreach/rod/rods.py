@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.body import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.driving import inner_arm
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator, no_arm
 from softreach.arm.stations import Marker
 from softreach.kernels.rod.frames import move, turn
 from softreach.rod.free import ArmRod, FreeRod
@@ -30,7 +30,7 @@ from softreach.rod.tip_map import (
     check_tol,
     drop,
 )
-from softreach.support.arguments import as_flag, as_given, as_instance, as_one_of
+from softreach.support.arguments import as_flag, as_instance, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
@@ -236,7 +236,7 @@ def as_tip_map(
     """
     as_one_of("frame", frame, ("world", "base"))
     if not isinstance(arm, Manipulator | TipMap):
-        raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
+        raise no_arm("arm", arm, "a Manipulator or a TipMap")
     if isinstance(arm, TipMap):
         known = arm if isinstance(arm, ArmMap) else ArmMap.of(arm)
         return replace(known, pose=UPRIGHT) if frame == "base" != known.frame else known
