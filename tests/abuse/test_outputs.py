@@ -253,11 +253,11 @@ def test_a_folder_whose_replacement_was_killed_is_found_and_comes_back(tmp_path)
     for path in (new, old):
         path.mkdir()
         (path / "whole").write_text(path.name)
-    with pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new is read"):
+    with pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new, which is read"):
         assert place_to_read(place) == str(new)
     assert not place.exists()
     with (
-        pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new was renamed to it"),
+        pytest.warns(SoftreachWarning, match=r"a.zarr.softreach-new, which was renamed to it"),
         replacing_folder(place, lambda _: "", overwrite=True),
     ):
         assert (place / "whole").read_text() == new.name

@@ -221,7 +221,7 @@ def test_nan_is_an_answer_where_the_metric_says_when(tmp_path):
         (("extend",), "metrics = 'extend': must be some of extent, convex"),
         ((), "metrics = none: must be some of extent"),
         ((MEAN_HEIGHT, replace(MEAN_HEIGHT, unit="1")), "name of a metric = mean_height"),
-        ((replace(MEAN_HEIGHT, name="volume"),), "name of a metric = volume: must be of one"),
+        ((replace(MEAN_HEIGHT, name="volume"),), "name of a metric = volume: must be the name of"),
         (
             (replace(MEAN_HEIGHT, name="status"),),
             "= status: must be a name that the atlas does not",

@@ -188,7 +188,7 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path):
         build_atlas(small_space(), tmp_path, **SMALL)
     cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=100)
     sr.save_cloud(cloud, tmp_path / "cloud.zarr")
-    with pytest.raises(InvalidInput, match="holds something else"):
+    with pytest.raises(InvalidInput, match="holds other files"):
         build_atlas(small_space(), tmp_path / "cloud.zarr", **SMALL)
 
 

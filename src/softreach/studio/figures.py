@@ -288,7 +288,7 @@ def slope_bars(
         per = f"{unit.symbol(3)} per {label}" if label else unit.symbol(3)
         value, error = (number / unit.scale(3) for number in slope)
         meaning = (
-            f"{before}change of volume V by one hundredth of this slider, "
+            f"{before}change of V by one hundredth of this slider, "
             f"{f'{part[name]:.3g} {label}'.rstrip()}; ∂V/∂({name}) = {quantity(value, per, error)}"
         )
         bars[name] = markup.bar(change / most, text, meaning, faded=old)
