@@ -1,5 +1,7 @@
 """Fits find the arm that was measured, and say rightly how sure they are."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,8 @@ def test_data_of_a_camera_without_a_scale_lead_back_to_the_arm():
     assert result.values["scale"] == pytest.approx(0.37, rel=1e-4)
     assert result.values["t.distance"] == pytest.approx(0.009, rel=1e-3)
     assert result.errors_on(data).rms < 1e-6
+    assert result.before.rms < 1e-2  # of the design, at the scale of the data
+    assert re.search(r"scale +0\.37\d* ± .* 1$", str(result), re.MULTILINE)
 
 
 def test_tendons_driven_by_length_are_found_with_their_slack():

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import from_written, written_name
+from softreach.arm.written import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import MESSAGE, OF, PER_DESIGN, STATUS

@@ -11,7 +11,8 @@ import numpy as np
 
 from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Written, from_written, unknown_parameter
+from softreach.arm.parameters import unknown_parameter
+from softreach.arm.written import Written, from_written
 from softreach.atlas.space import DesignSpace, column
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.quantity import read_number, read_whole_number

@@ -124,12 +124,13 @@ def _held_out(table: Measurements, share: float, by_run: bool | None, seed: int)
     by_run = runs >= FEWEST_RUNS if by_run is None else by_run
     if share and by_run and runs < 2:
         raise NotPossible("holding out runs needs two runs or more: name their column by `run`")
-    parts, count, what = (table.runs, runs, "runs") if by_run else (None, len(table), "samples")
+    every = np.arange(len(table))
+    parts, count, what = (table.runs, runs, "runs") if by_run else (every, len(every), "samples")
     out = max(round(share * count), 1 if by_run and share else 0)
     if out == count:
         raise InvalidInput("hold_out", share, f"small enough to leave some of {count} {what}")
     chosen = np.random.default_rng(seed).permutation(count)[:out]
-    return np.isin(np.arange(count) if parts is None else parts, chosen)
+    return np.isin(parts, chosen)
 
 
 def _rivals(

@@ -117,16 +117,15 @@ def judged(
         residuals = np.where(far[:, None, None], np.nan, residuals)
     known = bool(np.isfinite(repeated.rms))
     text += f", repeated inputs differ by {1e3 * repeated.rms:.3g} mm" if known else ""
-    law, share = _explained(data, residuals)
-    in_a_row = share is not None
-    share = share or 0.0
+    law, memory = _explained(data, residuals)
+    share = memory or 0.0
     if share > max(_MEMORY, law) and not finding:
         limit = "memory"
         said = f"limited by memory: earlier commands explain {100 * share:.0f} % of the residuals, "
         said += "as friction, creep or slack of the drives would; no law of the inputs does"
     elif known and error <= _NOISE * repeated.rms and law < _LAW and not finding:
         limit, said = "noise", "limited by noise: repeated poses differ as much as the error"
-        if not in_a_row:
+        if memory is None:
             limit, said = "data", "repeated poses differ as much as the error; too few samples"
             said += " in a row to look for memory"
     elif len(data) < _FEW:

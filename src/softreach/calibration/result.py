@@ -23,7 +23,7 @@ from softreach.calibration.errors import (
     repeatability,
 )
 from softreach.calibration.fit import Fit, robust_width, started
-from softreach.calibration.free_numbers import POSE, free_numbers
+from softreach.calibration.free_numbers import POSE, SCALE, free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.calibration.uncertainty import Uncertainty
@@ -136,9 +136,10 @@ class Calibration(Reported):
         Of samples held out, or of all if none is.
         """
         train = self.data.of(~self.held)
-        free = started(MarkerModel.of(free_numbers(self.start, ["pose"]), train), train.places)
+        moved = free_numbers(self.start, ["pose", *({SCALE} & set(self.names))])
+        free = started(MarkerModel.of(moved, train), train.places)
         data = self.data.of(self._judged)
-        return misses(MarkerModel.of(free, data).of_arm(free.made(free.start)).places - data.places)
+        return misses(MarkerModel.of(free, data).predict(free.start).places - data.places)
 
     @cached_property
     def repeatability(self) -> Repeatability:
@@ -412,8 +413,9 @@ class Calibration(Reported):
 def _number_rows(result: Calibration, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     fit, widths = result.fit, result.uncertainty.sigma.tolist()
     pairs = zip(fit.free.numbers, fit.values.tolist(), widths, fit.at_bound, strict=True)
-    # The pose starts from the data and not from the design.
-    pose = dict[str, float](zip(POSE, (*result.start.base.position, 0.0, 0.0, 0.0), strict=True))
+    # Pose and scale start from the data and not from the design.
+    designed = zip((*POSE, SCALE), (*result.start.base.position, 0.0, 0.0, 0.0, 1.0), strict=True)
+    pose = dict[str, float](designed)
     for number, value, sigma, at_bound in pairs:
         name, size = readable_unit(number.unit, value, unit)
         text = quantity(value / size, name, sigma / size, digits=2)

@@ -107,7 +107,8 @@ def _objectives() -> Table:
 
 
 def _parameters(arm: sr.Manipulator) -> Table:
-    from softreach.arm.parameters import parameters, written_name
+    from softreach.arm.parameters import parameters
+    from softreach.arm.written import written_name
 
     yield "parameter", "value", "unit", "symbol", "meaning"
     for name, one in parameters(arm).items():

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -66,6 +68,12 @@ class Outline:
         return 0.5 * (self.inner_ratio + self.outer_ratio)
 
 
+@cache
+def _each_bundle(kind: type) -> Mapping[str, Number]:
+    """Numbers of a kind of actuator that each bundle may have by itself."""
+    return {field: number for field, number in fields_of(kind).items() if number.each}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Actuator(Span, ABC):
     """Something that loads the sections of an arm in proportion to its activations.
@@ -108,9 +116,9 @@ class Actuator(Span, ABC):
         bounds = [(low, high) for low, high in pairs]
         bounds = bounds[0] if all(pair == bounds[0] for pair in bounds) else tuple(bounds)
         object.__setattr__(self, "activation_bounds", bounds)
-        for field in self._given_by_bundle:  # one for all, where that says the same
+        for field in _each_bundle(type(self)):  # one for all, where that says the same
             values = getattr(self, field)
-            if self._spread(field, values[0]) == values:
+            if isinstance(values, tuple) and self._spread(field, values[0]) == values:
                 object.__setattr__(self, field, values[0])
 
     @property
@@ -119,26 +127,19 @@ class Actuator(Span, ABC):
         allowed = Range(unit="" if self.unit == "1" else self.unit)
         bundles = ["", *(f"[{k}]" for k in range(self.bundles))] if self.bundles > 1 else [""]
         ends = ("lower", "min", "lowest activation"), ("upper", "max", "highest activation")
-        own = (
-            each.elements(self.of_bundles(each.field)) for each in self._each if self.bundles > 1
-        )
-        of_bundles = {name: number for numbers in own for name, number in numbers.items()}
-        return (
-            super().numbers
-            | of_bundles
-            | {
-                f"{end}{k}": Number(
-                    symbol=f"{short} {self.symbol}{k}", meaning=about, allowed=allowed
-                )
-                for end, short, about in ends
-                for k in bundles
-            }
-        )
+        numbers = super().numbers
+        for field, own in _each_bundle(type(self)).items() if self.bundles > 1 else ():
+            numbers |= own.elements(self.of_bundles(field))
+        return numbers | {
+            f"{end}{k}": Number(symbol=f"{short} {self.symbol}{k}", meaning=about, allowed=allowed)
+            for end, short, about in ends
+            for k in bundles
+        }
 
     def values_of(self, name: str, profile: Profile, section: Section) -> tuple[float, ...]:
         """A number of all bundles in each."""
         field, _, k = name.removesuffix("]").partition("[")
-        if field in {each.field for each in self._each} and (k or field in self._given_by_bundle):
+        if field in _each_bundle(type(self)) and (k or isinstance(getattr(self, field), tuple)):
             return (self.of_bundles(field)[int(k)],) if k else self.of_bundles(field)
         if not (bound := _BOUND.fullmatch(name)):
             return super().values_of(name, profile, section)
@@ -164,22 +165,11 @@ class Actuator(Span, ABC):
                     raise InvalidDesign([Fault(name, value, allowed)])
                 bounds[slice(None) if k is None else int(k), int(end == "upper")] = value
             changes["activation_bounds"] = tuple(map(tuple, bounds.tolist()))
-        for field in [each.field for each in self._each]:
+        for field in _each_bundle(type(self)):
             if any(name.startswith(f"{field}[") for name in changes):
                 given = changes.get(field, getattr(self, field))
                 changes[field] = given if isinstance(given, tuple) else self._spread(field, given)
         return super().replace(**changes)
-
-    @property
-    def _each(self) -> list[Number]:
-        """Its numbers that each bundle may have by itself."""
-        return [each for each in fields_of(type(self)).values() if each.each]
-
-    @property
-    def _given_by_bundle(self) -> set[str]:
-        """Fields of these that have a value for each."""
-        fields = {each.field for each in self._each}
-        return {field for field in fields if as_numbers(getattr(self, field)).ndim == 1}
 
     def of_bundles(self, field: str) -> tuple[float, ...]:
         """Values of a number for each bundle, whether it is one for all or one for each."""
@@ -241,9 +231,9 @@ class Actuator(Span, ABC):
         faults = super()._faults()
         bundles = None if any(fault.path == "bundles" for fault in faults) else self.bundles
         blamed = {fault.path.partition("[")[0] for fault in faults}
-        for field in self._given_by_bundle - blamed if bundles else ():
+        for field in _each_bundle(type(self)).keys() - blamed if bundles else ():
             given, allowed = getattr(self, field), f"must be one number, or {bundles}, one a bundle"
-            if len(given) != bundles:
+            if as_numbers(given).shape not in ((), (bundles,)):
                 faults.append(Fault(field, given, allowed))
         return faults + bounds_faults(self.activation_bounds, bundles)
 
