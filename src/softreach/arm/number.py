@@ -24,6 +24,7 @@ import numpy as np
 from softreach.support.arguments import plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import Fault, InvalidInput, Range
+from softreach.support.lazy import lazy
 
 Shape = Literal["single", "along", "triple", "series", "stations", "several"]
 """One number, a function along the arm alone, a vector, several along the arm, their places, or
@@ -162,16 +163,22 @@ class Number:
 
         Every number of a design passes here, from files, Python and the command line alike.
         """
+        limits = (self.allowed, self._sense)
+        return next((each for each in limits if not each.admits(value)), None)
+
+    @lazy
+    def _sense(self) -> Range:
         declared = self.allowed
         least, most = _SENSE.get(self.symbol) or _SENSE.get(self.unit, (1.0 / MOST, MOST))
         low = least if declared.low == 0.0 and declared.open_low else max(declared.low, -most)
-        sense = declared._replace(low=low, high=min(declared.high, most), open_low=False)
-        return next((limits for limits in (declared, sense) if not limits.admits(value)), None)
+        return declared._replace(low=low, high=min(declared.high, most), open_low=False)
 
     def faults(self, value: Any) -> list[Fault]:
         """Everything wrong with a value by itself, but for what `series_faults` judges."""
         if self.shape == "stations" or (value is None and self.optional) or self._is_name(value):
             return []
+        if self.shape == "single" and isinstance(value, float):  # as nearly all are
+            return self._faults_of_one(value)
         each = as_numbers(value)
         if self.shape == "triple" and not (each.shape == (3,) and np.isfinite(each).all()):
             return [Fault(self.field, value, "must be three finite numbers")]
@@ -221,6 +228,8 @@ class Number:
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
+        if type(value) is float and self.shape == "single" and not self.allowed.whole:
+            return value
         if self.shape == "triple":
             return tuple(x if abs(x) > _NOTHING else 0.0 for x in as_numbers(value).tolist())
         several = self._is_pair(value) or self._is_of_bundles(value)

@@ -101,9 +101,13 @@ class ArmRod(TipMap):
         least, most = np.empty((2, len(gamma)))
         with np.errstate(all="ignore"):  # what overflows is no arm
             for block in parallel.blocks(len(gamma), 1024):
-                bend, extension, eta = linear_strains(table, gamma[block])
+                # By BLAS, whose rounding does not matter to bounds of sense.
+                extension = eta = 1.0 + gamma[block] @ table.extension.T
+                if table.has_forces:
+                    eta = 1.0 + gamma[block] @ table.rest_length_factor.T
+                bend = np.tensordot(table.curvature, gamma[block], ([2], [1])).transpose(1, 0, 2)
                 least[block] = np.minimum(extension, eta).min(axis=1)
-                most[block] = (eta * np.linalg.norm(bend, axis=-1) * step).max(axis=1)
+                most[block] = (eta * step * np.linalg.norm(bend, axis=0).T).max(axis=1)
         return least, most
 
     def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
