@@ -223,7 +223,7 @@ def nudged(name: str, value: float) -> float:
     """Another value near one that an arm has, at which it can still exist."""
     if math.isnan(value):
         return 0.1 if "angle" in name or "distance" in name else 1000.0
-    if name.endswith("bundles"):
+    if name.endswith(("bundles", "guides")):
         return value + 1
     below = name.endswith(("end_over_length", ".end", "inner_ratio", "bore_ratio", "poisson_ratio"))
     step = 0.01 * abs(value) or 0.005

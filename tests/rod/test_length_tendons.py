@@ -106,7 +106,7 @@ def test_tensions_of_redundant_tendons_are_some_that_shorten_them_as_wanted():
     law = LengthLaw(arm_of(tendons(4)))
     pulled = random_activations(law.arm, 200)
     tension, taut = law.tensions(pulled)
-    left = law.shortening(tension) - pulled
+    left = law.works.of(tension) - law.at_rest - pulled
     assert (tension >= 0).all()
     assert (left > -1e-15).all()
     assert (np.abs(left[taut]) < 1e-15).all()
@@ -117,8 +117,8 @@ def test_slopes_are_those_of_differences_where_the_taut_stay_taut(arm):
     law, step = LengthLaw(arm), 1e-7
     pulled = random_activations(arm, 8)
     tension, taut = law.tensions(pulled)
-    inner = law.inner(pulled, tension)
-    slopes = law.slopes(inner, taut, law.shortening_slopes(inner))[:, law.columns]
+    inner = law.with_tensions(pulled, tension)
+    slopes = law.slopes(inner, taut)[:, law.columns]
     for k in range(arm.bundles):
         moved = pulled + step * np.array([[[-1.0]], [[1.0]]]) * np.eye(arm.bundles)[k]
         ends = [law.tensions(each) for each in moved]

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon, Tendon
 from softreach.arm.body import STRAIGHT, RestStrains
+from softreach.arm.guides import arc_loads, has_guides
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import ends_over, range_of_extension, strain_stations, tables
-from softreach.arm.tensions import LengthLaw, Tensions
+from softreach.arm.tensions import LengthLaw, PulledTendons
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
@@ -27,21 +28,21 @@ _SAFETY = 1.25  # of the largest tensions that samples reach
 _LEAST_EXTENSION = 0.05  # that a box of tensions has
 
 
-class Lengths(Protocol):
-    """Tensions that displacements of tendons lead to under loads."""
+class Pulled(Protocol):
+    """How an arm takes what is pulled in, and guides."""
 
     law: LengthLaw
 
-    def tensions(self, activations: Array) -> Tensions:
-        """Tensions at activations with displacements, shape (n, bundles)."""
+    def inner(self, bundles: Array) -> tuple[Array, Mask]:
+        """Activations of the inner arm, and which tendons are taut, at those with displacements."""
         ...
 
-    def shortening_slopes(self, inner: Array) -> Array:
-        """∂s/∂γ at activations with tensions [m per unit], shape (n or 1, tendon, bundle)."""
+    def slopes(self, inner: Array, is_taut: Mask) -> Array:
+        """∂(activations of the inner arm)/∂(those with displacements), (n, bundle, bundle)."""
         ...
 
     def continued_from(self, inner: Array, frames: Array | None = None) -> Self:
-        """Those of the arm in its posture at activations with tensions, shape (k, bundles)."""
+        """Those of the arm in its posture at activations of the inner arm, shape (k, bundles)."""
         ...
 
 
@@ -50,8 +51,8 @@ class Driving:
     """The map from the inputs x of an arm to the activations of its inner arm, γ(x)."""
 
     arm: Manipulator
-    lengths: Lengths | None = None
-    """Tensions of tendons driven by length under loads; by default those without loads."""
+    pulled: Pulled | None = None
+    """Tendons driven by length or held by guides under loads; by default those without loads."""
     is_effective: bool = False
     """True if x are inputs beyond the dead zones of the drives."""
 
@@ -67,17 +68,21 @@ class Driving:
     @lazy
     def law(self) -> LengthLaw:
         """Law of the tendons that are driven by length, without loads."""
-        return LengthLaw(body_of(self.arm)) if self.lengths is None else self.lengths.law
+        return LengthLaw(body_of(self.arm)) if self.pulled is None else self.pulled.law
+
+    @property
+    def is_bundles(self) -> bool:
+        """True if the activations of the bundles are those of the inner arm."""
+        return not (self._has_lengths or has_guides(self.arm))
 
     @lazy
-    def has_length_tendons(self) -> bool:
-        """True if tensions follow from displacements."""
+    def _has_lengths(self) -> bool:
         return any(isinstance(each, LengthTendon) for each in self.arm.actuators)
 
     @lazy
     def is_affine(self) -> bool:
-        """True if γ(x) has no kinks."""
-        return not (self.has_length_tendons or self._has_kinked_drives)
+        """True if γ(x) is affine, so that it has no kinks."""
+        return self.is_bundles and not self._has_kinked_drives
 
     @lazy
     def _has_kinked_drives(self) -> bool:
@@ -89,11 +94,13 @@ class Driving:
         """True if γ(x) has no kinks within the bounds: is affine, or all lengths stay taut."""
         if self.is_affine:
             return True
-        if self._has_kinked_drives or self.arm.loads is not None or self.law.changes_rest_length:
+        if self._has_kinked_drives or not self._has_lengths:
+            return not self._has_kinked_drives
+        if self.arm.loads is not None or self.law.works.has_growth:
             return False
         low, high = self.driven.input_bounds.T
-        tensions = self.law.tensions(self.bundles(low + pilot(self.arm.inputs) * (high - low)))
-        return bool(tensions.is_taut.all())
+        bundles = self.bundles(low + pilot(self.arm.inputs) * (high - low))
+        return bool(self.tendons.inner(bundles)[1].all())
 
     @lazy
     def kinks(self) -> list[Array]:
@@ -134,7 +141,7 @@ class Driving:
     def offsets(self) -> Array:
         """Activation of each bundle of the inner arm at inputs of 0; 1 of the rest shape."""
         offsets = np.zeros(self.law.arm.bundles)
-        offsets[self.arm.bundles :] = 1.0
+        offsets += self.law.rest[0]
         for drive in self.arm.drives:
             for name, offset in drive.offsets.items():
                 offsets[self.arm.bundle_names.index(name)] += offset
@@ -167,23 +174,22 @@ class Driving:
     def activations(self, x: Array) -> Array:
         """γ at checked x (n, inputs); NaN where no tensions are found."""
         bundles = self.bundles(x)
-        if not self.has_length_tendons:
-            return bundles
-        return self.law.inner(bundles, self._lengths.tensions(bundles).tension)
+        return bundles if self.is_bundles else self.tendons.inner(bundles)[0]
 
     def with_slopes(self, x: Array) -> tuple[Array, Array]:
         """γ (n, inner bundle) with ∂γ/∂x (n, inner bundle, input), of taut tendons."""
         bundles, of_drives = self._of_drives(x)
-        if not self.has_length_tendons:
+        if self.is_bundles:
             return bundles, of_drives
-        tensions = self._lengths.tensions(bundles)
-        inner = self.law.inner(bundles, tensions.tension)
-        of_strains = self._lengths.shortening_slopes(inner)
-        return inner, self.law.slopes(inner, tensions.is_taut, of_strains) @ of_drives
+        inner, is_taut = self.tendons.inner(bundles)
+        return inner, self.tendons.slopes(inner, is_taut) @ of_drives
 
-    @property
-    def _lengths(self) -> LengthLaw | Lengths:
-        return self.law if self.lengths is None else self.lengths
+    @lazy
+    def tendons(self) -> Pulled | LengthLaw | PulledTendons:
+        """How the arm takes what is pulled in, and guides."""
+        if self.pulled is not None:
+            return self.pulled
+        return PulledTendons(self.law) if has_guides(self.arm) else self.law
 
     def with_dead_zones(self, x: Array) -> Array:
         """Inputs of the arm at x (n, inputs), with the dead zones that effective ones leave."""
@@ -210,10 +216,13 @@ def inner_arm(arm: Manipulator) -> Manipulator:
 def _inner_arm(arm: Manipulator) -> Manipulator:
     driving, body = Driving(arm), body_of(arm)
     bounds = driving.ranges.copy()
-    if not driving.has_length_tendons:
+    if driving.is_bundles:
         return body.with_bounds(bounds)
     low, high = arm.input_bounds.T
     gamma = driving.activations(low + pilot(arm.inputs) * (high - low))
+    if not len(gamma := gamma[np.isfinite(gamma).all(axis=1)]):
+        allowed = "bend the arm so far that it buckles between guides: narrow them, or add guides"
+        raise InvalidDesign([Fault("activation_bounds", arm.input_bounds.tolist(), allowed)])
     rates = tables(body, strain_stations(body)).extension
     least = float(1.0 + (gamma @ rates.T).min())
     if not least > 0.0:
@@ -223,6 +232,10 @@ def _inner_arm(arm: Manipulator) -> Manipulator:
     most = _SAFETY * gamma.max(axis=0) + _against_loads(arm)
     columns = driving.law.columns
     bounds[columns] = np.stack([np.zeros(len(columns)), most[columns]], axis=1)
+    if has_guides(arm):
+        loads = slice(bounds.shape[0] - body.actuators[-1].bundles, None)
+        size = _SAFETY * np.abs(gamma[:, loads]).max(axis=0)
+        bounds[loads] = np.stack([-size, size], axis=1)
     pulled = (x.by_tension() if isinstance(x, LengthTendon) else x for x in body.actuators)
     return body.replace(actuators=tuple(pulled)).with_bounds(_fitting(bounds, columns, rates))
 
@@ -239,16 +252,20 @@ def _against_loads(arm: Manipulator) -> float:
 
 
 def body_of(arm: Manipulator) -> Manipulator:
-    """The arm without drives, its rest shape as a bundle held at 1 behind the others."""
-    if not arm.drives and arm.rest.is_straight:
+    """The arm without drives, its rest shape as a bundle held at 1, loads of arcs as others."""
+    if not arm.drives and arm.rest.is_straight and not has_guides(arm):
         return arm
     if (known := vars(arm).get("_body")) is None:
-        name = "rest shape"
+        name, actuators = "rest shape", list(arm.actuators)
         while name in arm.bundle_names:
             name += "'"
-        held = RestStrains(name=name, shape=arm.rest, activation_bounds=(1.0, 1.0))
-        actuators = arm.actuators if arm.rest.is_straight else (*arm.actuators, held)
-        known = vars(arm)["_body"] = arm.replace(drives=(), actuators=actuators, rest=STRAIGHT)
+        if not arm.rest.is_straight:
+            held = RestStrains(name=name, shape=arm.rest, activation_bounds=(1.0, 1.0))
+            actuators.append(held)
+        if (loads := arc_loads(arm)) is not None:
+            actuators.append(loads)
+        known = arm.replace(drives=(), actuators=tuple(actuators), rest=STRAIGHT)
+        vars(arm)["_body"] = known
     return known
 
 

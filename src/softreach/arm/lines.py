@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.actuators import Tendon
 from softreach.arm.driving import Driving, body_of
+from softreach.arm.guides import Guides, has_guides
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import quadrature, tables
 from softreach.support.arguments import as_number
@@ -69,7 +70,13 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
     step = _STEP * half
     slopes = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
     speed = np.linalg.norm(_tangents(_places(arm, z), slopes, turn, zeta), axis=0)
-    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
+    lengths = np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
+    if has_guides(arm):
+        guides = Guides(body_of(arm))
+        force, moment = guides.works.loads_at(z, weights)
+        works = (zeta - 1.0) @ force + np.einsum("nsc,scw->nw", turn, moment)
+        lengths[:, guides.columns] = guides.lengths(works)
+    return lengths
 
 
 def _tangents(places: Array, slopes: Array, turn: Array, zeta: Array) -> Array:
@@ -143,7 +150,8 @@ def pull_error(arm: Manipulator) -> float:
     repetition from the linear law (52), for inputs at the ends and the middle of their bounds.
     """
     body = body_of(arm)
-    pulls = np.array([isinstance(each, Tendon) for each in body.bundle_actuators], bool)
+    tendons = [each if isinstance(each, Tendon) else None for each in body.bundle_actuators]
+    pulls = np.array([each is not None and not each.has_guides for each in tendons], bool)
     if not pulls.any():
         return 0.0
     step = arm.length / _SECTIONS

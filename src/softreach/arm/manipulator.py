@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm import design_file
-from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator
+from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator, Tendon
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.body import Body, actuator_faults, behind, mass
@@ -332,8 +332,9 @@ class Manipulator(Body):
     @property
     def is_direct(self) -> bool:
         """True if its inputs load its sections as they are: see `arm.driving`."""
-        by_length = any(isinstance(actuator, LengthTendon) for actuator in self.actuators)
-        return self.rest.is_straight and not self.drives and not by_length
+        tendons = [part for part in self.actuators if isinstance(part, Tendon)]
+        by_tension = not any(isinstance(t, LengthTendon) or t.has_guides for t in tendons)
+        return self.rest.is_straight and not self.drives and by_tension
 
     def __repr__(self) -> str:
         base, tip = self.profile.radius([0.0, self.length])

@@ -228,7 +228,8 @@ class Number:
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
-        if type(value) is float and self.shape == "single" and not self.allowed.whole:
+        is_plain = type(value) is float and self.shape == "single" and not self.allowed.whole
+        if value is None or is_plain:
             return value
         if self.shape == "triple":
             return tuple(x if abs(x) > _NOTHING else 0.0 for x in as_numbers(value).tolist())
@@ -236,7 +237,7 @@ class Number:
         if several or self.shape in ("series", "stations", "several"):
             return tuple(np.asarray(value, float).tolist())
         is_function = self.along is not None and isinstance(value, self.along)
-        if value is None or is_function or self._is_name(value):
+        if is_function or self._is_name(value):
             return value
         return int(plain(value)) if self.allowed.whole else float(plain(value))
 

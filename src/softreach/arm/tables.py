@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
@@ -22,6 +22,7 @@ from softreach.arm.body import Body, RestStrains
 from softreach.arm.number import fields_of
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
+from softreach.support.lazy import lazy
 
 _STATIONS = 101
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -202,3 +203,70 @@ def quadrature(arm: Body, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
     half = np.diff(knots)[:, None] / 2.0
     z = knots[:-1, None] + half * (1.0 + _NODES)
     return z.ravel(), (half * _WEIGHTS).ravel(), np.repeat(half.ravel(), len(_NODES))
+
+
+@dataclass(frozen=True, eq=False)
+class Works:
+    """∫ N (ζ - 1) + M·ω dZ: what unit loads of some bundles do work on, without other loads.
+
+    It is linear in the activations but where bundles change the length of matter.
+    """
+
+    arm: Body
+    columns: NDArray[np.intp]
+    """Bundles whose unit loads do the work."""
+
+    @property
+    def has_growth(self) -> bool:
+        """True if bundles change the length of matter."""
+        return len(self._growing) > 0
+
+    @lazy
+    def _growing(self) -> NDArray[np.intp]:
+        return np.flatnonzero([not each.is_force for each in self.arm.bundle_actuators])
+
+    def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:
+        """N and M of the unit loads at nodes, times weights, (node, work) and (node, 3, work)."""
+        table = tables(self.arm, z)
+        stiffness = self.arm.section.stiffness_at(self.arm.profile, z)
+        resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
+        force = table.extension[:, self.columns] * (weights * stiffness.axial)[:, None]
+        moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]
+        return force, moment
+
+    @lazy
+    def _rates(self) -> tuple[Array, Array]:
+        """∫ N z + M·U dZ, (work, bundle), and ∫ M·U dη/dγ dZ of each bundle that grows."""
+        z, weights, _ = quadrature(self.arm)
+        force, moment = self.loads_at(z, weights)
+        table = tables(self.arm, z)
+        bent = np.einsum("sct,scb->stb", moment, table.curvature)
+        axial = np.einsum("st,sb->tb", force, table.extension)
+        eta = table.rest_length_factor[:, self._growing]
+        return axial + bent.sum(axis=0), np.einsum("stb,sg->tbg", bent, eta)
+
+    def of(self, inner: Array) -> Array:
+        """Work of each unit load at activations of the inner arm, shape (n, work)."""
+        return self._sum(self.by_bundle(inner), inner)
+
+    def slopes(self, inner: Array) -> Array:
+        """Its derivatives by the activations, shape (n or 1, work, bundle)."""
+        slopes = self.by_bundle(inner)
+        for k, column in enumerate(self._growing):
+            slopes[..., column] += self._sum(self._rates[1][None, ..., k], inner)
+        return slopes
+
+    def by_bundle(self, inner: Array) -> Array:
+        """∫ N z + η M·U dZ, shape (n or 1, work, bundle)."""
+        linear, growing = self._rates
+        work = linear[None].copy()
+        for k, column in enumerate(self._growing):
+            work = work + inner[:, column, None, None] * growing[..., k]
+        return work
+
+    def _sum(self, rates: Array, inner: Array) -> Array:
+        """Σ rates γ over the bundles in their order, whatever BLAS and its threads would do."""
+        total = np.zeros((len(inner), len(self.columns)))
+        for j in range(inner.shape[1]):
+            total += rates[..., j] * inner[:, j, None]
+        return total

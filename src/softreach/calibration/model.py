@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.driving import Driving, body_of
+from softreach.arm.guides import has_guides
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw
 from softreach.calibration.free_numbers import FreeNumbers, Neighbors
 from softreach.calibration.measurements import Measurements
 from softreach.kernels.rod.linear_response import WEIGHTS
-from softreach.rod.free import FreeRod
-from softreach.rod.loaded.pulled import LoadedLengths
+from softreach.rod.free import ArmRod, FreeRod
+from softreach.rod.loaded.pulled import LoadedTendons
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.response import (
     NodeTables,
@@ -112,8 +113,26 @@ class MarkerModel:
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
+        if neighbors and has_guides(arm):  # whose arcs change with the numbers
+            return self._by_differences(arm, scale, neighbors)
         blocks = (self.inputs[rows] for rows in parallel.blocks(len(self.inputs), _BLOCK))
         return joined([self._block(arm, scale, neighbors, grid, inputs) for inputs in blocks])
+
+    def _by_differences(
+        self, arm: Manipulator, scale: float, neighbors: list[Neighbors]
+    ) -> Prediction:
+        """Places and their derivatives by those of the neighbors."""
+        slopes = list[Array]()
+        for each in neighbors:
+            slope = np.zeros((len(self.inputs), len(self.names), 3))
+            for factor, other in each:
+                if isinstance(other, float | int):
+                    near = arm, float(other)
+                else:
+                    near = arm.replace(base=other) if isinstance(other, Base) else other, scale
+                slope += factor * self.of_arm(*near).places
+            slopes.append(slope)
+        return self.of_arm(arm, scale)._replace(slopes=np.stack(slopes, axis=-1))
 
     def _explicit(self, arm: Manipulator, scale: float, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm, self.names)
@@ -128,7 +147,7 @@ class MarkerModel:
         measures = np.concatenate(
             [table.curvature[..., columns], table.extension[:, :, None, columns]], axis=2
         )
-        rest = table.curvature[..., arm.bundles :].sum(axis=-1)
+        rest = table.curvature @ law.rest[0]
         return _Explicit(
             table,
             arm.base.rotation,
@@ -151,17 +170,9 @@ class MarkerModel:
         inputs: Array,
     ) -> Prediction:
         at = self._explicit(arm, scale, grid, inputs)
-        body = body_of(arm)
-        bounds = body.bounds * 0.0  # which decide nothing
-        bounds[arm.bundles :] = 1.0
-        kind, steps = FreeRod if arm.loads is None else LoadedRod, int(grid.counts.sum())
-        rod = kind(body.with_bounds(bounds), _TOL, steps)
-        law, gamma = LengthLaw(body), at.bundles
-        if len(law.columns):  # tensions in place of displacements
-            lengths = law if arm.loads is None else LoadedLengths(law, rod)
-            gamma = law.inner(gamma, lengths.tensions(gamma).tension)
+        rod, gamma = self._driven(arm, grid, at.bundles)
         lost = np.asarray(~np.isfinite(gamma).all(axis=1))
-        gamma = np.where(lost[:, None], np.where(at.bundles == 1.0, 1.0, 0.0), gamma)
+        gamma = np.where(lost[:, None], Driving(arm).law.rest, gamma)
         state = rod_state(rod, gamma, at.table)
         state.status[lost] = TipStatus.NO_EQUILIBRIUM
         places = at.position + at.scale * _beyond(at, state)[1] @ at.rotation.T
@@ -173,6 +184,17 @@ class MarkerModel:
             changes = [self._change(arm, at, each, grid, inputs) for each in neighbors]
             slopes[known] = _slopes(rod.arm, at, some, changes, known)
         return Prediction(places, slopes, state.status)
+
+    def _driven(self, arm: Manipulator, grid: StepGrid, bundles: Array) -> tuple[ArmRod, Array]:
+        """The rod of the inner arm, and its activations at those of the bundles."""
+        driving = Driving(arm)
+        rest = driving.law.rest.T
+        body = body_of(arm).with_bounds(rest + np.zeros(2))  # which decide nothing else
+        kind, steps = FreeRod if arm.loads is None else LoadedRod, int(grid.counts.sum())
+        rod, tendons = kind(body, _TOL, steps), driving.tendons
+        if arm.loads is not None:
+            tendons = LoadedTendons(driving.law, rod)
+        return rod, bundles if driving.is_bundles else tendons.inner(bundles)[0]
 
     def _change(
         self, arm: Manipulator, at: _Explicit, neighbors: Neighbors, grid: StepGrid, inputs: Array
@@ -253,7 +275,7 @@ def _with_tensions(
     # The other changes act as if so much less were pulled in.
     pulled = driven.copy()
     pulled[:, columns] -= np.stack(own, axis=-1) + works[..., bundles:]
-    return law.slopes(state.gamma, tension > 0, works[..., :bundles]) @ pulled
+    return law.slopes_of_taut(state.gamma, tension > 0, works[..., :bundles]) @ pulled
 
 
 def _strains(at: _Explicit, state: RodState) -> tuple[Array, Array]:

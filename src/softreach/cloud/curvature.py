@@ -163,7 +163,7 @@ def strain_ranges(tip_map: ArmMap, z: Array) -> tuple[Array, Array, Array]:
         InvalidInput: Under loads no sample has an equilibrium.
     """
     driving, inner = tip_map.inputs.driving, tip_map.rod
-    if driving is not None and driving.has_length_tendons:
+    if driving is not None and not driving.is_bundles:
         whole = all_inputs(tip_map)
         return _sampled(whole.strains(whole.box.from_cube(pilot(whole.box.bundles)), z))
     if not tip_map.supports_unstable:

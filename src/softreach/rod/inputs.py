@@ -210,10 +210,10 @@ class Inputs:
 
     def continued_from(self, activation: Array, frames: Array | None = None) -> Inputs:
         """Those of an arm in its posture at activations of the rod, see `TipMap.continued_from`."""
-        if self.driving is None or self.driving.lengths is None:
+        if self.driving is None or self.driving.pulled is None:
             return self
-        lengths = self.driving.lengths.continued_from(activation, frames)
-        return replace(self, driving=replace(self.driving, lengths=lengths))
+        pulled = self.driving.pulled.continued_from(activation, frames)
+        return replace(self, driving=replace(self.driving, pulled=pulled))
 
     @lazy
     def box(self) -> ActivationBox:

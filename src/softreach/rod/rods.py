@@ -356,13 +356,13 @@ def _made(arm: Manipulator, tol: float, frame: Frame, rod: ArmRod) -> ArmMap:
 def _with_tensions(inputs: Inputs, tol: float) -> Inputs:
     """The same with tensions under loads for a tolerance of tips [L]."""
     driving = inputs.driving
-    if driving is None or driving.arm.loads is None or not driving.has_length_tendons:
+    if driving is None or driving.arm.loads is None or driving.is_bundles:
         return inputs
-    from softreach.rod.loaded.pulled import LoadedLengths
+    from softreach.rod.loaded.pulled import LoadedTendons
 
     # A tip moves by far more than the length by which a tendon near the axis is off.
     rod = _rod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, SMALLEST_TOL))
-    return replace(inputs, driving=replace(driving, lengths=LoadedLengths(driving.law, rod)))
+    return replace(inputs, driving=replace(driving, pulled=LoadedTendons(driving.law, rod)))
 
 
 @lru_cache(maxsize=64)

@@ -75,19 +75,66 @@ class Tendon(PolarActuator):
         default=None,
     )
     """θ(Z) - θ0 along the arm [rad], in place of an even rotation."""
+    guides: int = number(
+        "ng", "", "guides that hold it, evenly spaced", low=0, high=100, integer=True, default=0
+    )
+    """Guides that hold it, evenly spaced, the last at its anchor [-]: between them, and between
+    where it begins and the first, it is straight. 0 for so many that it follows the arm."""
+    guide_stations: tuple[float, ...] | None = number(
+        "Zg", "m", "guides", above=0.0, shape="several", instead_of="guides", default=None
+    )
+    """Z of the guides [m], ascending, in place of their number; its anchor holds it too."""
+
+    @property
+    def has_guides(self) -> bool:
+        """True if it is straight between guides."""
+        return self.guides > 0 or self.guide_stations is not None
+
+    def held_at(self, length: float) -> Array:
+        """Z of where it begins, its guides and its anchor [m], on an arm of a length [m]."""
+        start, end = self.span(length)
+        if self.guide_stations is None:
+            return np.linspace(start, end, self.guides + 1)
+        inside = [z for z in self.guide_stations if z < end]
+        return np.array([start, *inside, end])
+
+    def points_at(self, profile: Profile, z: Array) -> Array:
+        """Where it goes through the sections at stations Z [m], were it guided there.
+
+        Returns:
+            In the directors [m], shape (station, 3, bundle).
+        """
+        (distance, _), (angle, _) = self._route(profile, z)
+        x, y = distance * np.cos(angle), distance * np.sin(angle)
+        return np.stack([x, y, np.zeros_like(x)], axis=1)
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = -t3 and M = -p × t along t = (p' + e3)/|p' + e3| of the straight arm: (52)."""
-        (distance, inclination), (angle, turning) = self._route(profile, z)
-        cos, sin, around = np.cos(angle), np.sin(angle), distance * turning
-        x, y = distance * cos, distance * sin
-        t1, t2 = inclination * cos - around * sin, inclination * sin + around * cos
+        (x, y), (t1, t2) = self._path(profile, z)
         t3 = 1.0 / np.hypot(1.0, np.hypot(t1, t2))
         moment = np.stack([-y * t3, x * t3, (y * t1 - x * t2) * t3], axis=1)
         return Resultants(-t3, moment)
 
+    def _path(self, profile: Profile, z: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """p of the straight arm [m] and p' [-] at stations Z [m], shape (station, bundle) each."""
+        if self.has_guides:
+            held = self.held_at(profile.length)
+            points = self.points_at(profile, held)[:, :2]
+            first = np.clip(np.searchsorted(held, z, side="right") - 1, 0, len(held) - 2)
+            slopes = np.diff(points, axis=0) / np.diff(held)[:, None, None]
+            points = points[first] + slopes[first] * (z - held[first])[:, None, None]
+            return (points[:, 0], points[:, 1]), (slopes[first, 0], slopes[first, 1])
+        (distance, inclination), (angle, turning) = self._route(profile, z)
+        cos, sin, around = np.cos(angle), np.sin(angle), distance * turning
+        slopes = inclination * cos - around * sin, inclination * sin + around * cos
+        return (distance * cos, distance * sin), slopes
+
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
         (distance, _), (angle, _) = self._route(profile, z)
+        if self.has_guides:
+            (x, y), _ = self._path(profile, z)
+            distance, straight = np.hypot(x, y), np.arctan2(y, x)
+            angle = angle + np.remainder(straight - angle + np.pi, 2.0 * np.pi) - np.pi
         ratio = distance / profile.radius(z)[:, None] * np.ones(self.bundles)
         return Outline(
             center=angle,
@@ -98,8 +145,17 @@ class Tendon(PolarActuator):
             acts=self.acts(profile, z),
         )
 
+    def breakpoints(self, profile: Profile) -> tuple[float, ...]:
+        held = self.held_at(profile.length)[1:-1].tolist() if self.has_guides else []
+        return (*super().breakpoints(profile), *held)
+
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
+        faults = section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
+        given, (start, end) = self.guide_stations or (), self.span(profile.length)
+        if (np.diff([start, *given]) <= 0.0).any() or max(given, default=end) > end:
+            between = f"{start:g} m, where the tendon begins, and its anchor at {end:g} m"
+            faults.append(Fault("guide_stations", given, f"must rise between {between}"))
+        return faults
 
     def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
         """The revolution of a routing: from where the tendon begins to its anchor."""
