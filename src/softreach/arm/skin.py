@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.actuators import Tendon
 from softreach.arm.base import Base
 from softreach.arm.body import Body
 from softreach.arm.stations import Marker
@@ -112,6 +113,9 @@ class _Span(NamedTuple):
     """Stretch of an arm on which one bundle acts without a gap: stations along the first axis."""
 
     extent: float
+    z: Array
+    held: Array
+    """Z of guides between which a line is straight; none if it follows the arm."""
     position: Array
     directors: Array
     center: Array
@@ -128,7 +132,11 @@ class _Span(NamedTuple):
     def curve(self) -> Array:
         """The middle of a line or a lumen, shape (station, 3)."""
         radius = 0.5 * (self.inner_ratio + self.outer_ratio) * self.arm_radius
-        return self.points(self.center[:, None], radius)[:, 0]
+        curve = self.points(self.center[:, None], radius)[:, 0]
+        if not len(self.held):
+            return curve
+        at = np.abs(self.z - self.held[:, None]).argmin(axis=1)
+        return np.column_stack([np.interp(self.z, self.z[at], x[at]) for x in curve.T])
 
     def band(self, lift: float, step: float) -> Array:
         """Points over the outer radius, `lift` R2 above it, shape (station, across, 3)."""
@@ -255,7 +263,11 @@ def _skins(arm: Body, shape: Shape, sector: Callable[[_Span], Surface]) -> list[
         along = (outline.center, outline.inner_ratio, outline.outer_ratio)
         center, inner, outer = (values[part, k] for values in along)
         section = line.position[part], line.directors[part]
-        return _Span(float(outline.extent[k]), *section, center, inner, outer, radius[part])
+        tendon, held = arm.bundle_actuators[k], np.empty(0)
+        if isinstance(tendon, Tendon) and tendon.has_guides:
+            held = tendon.held_at(arm.length)
+        extent, z = float(outline.extent[k]), line.z[part]
+        return _Span(extent, z, held, *section, center, inner, outer, radius[part])
 
     return [
         joined([make[kind](span(k, part)) for part in _runs(acts[:, k])])

@@ -274,23 +274,41 @@ class PulledTendons:
 
     def slopes(self, inner: Array, is_taut: Mask) -> Array:
         """∂(activations of the inner arm)/∂(those with displacements), (n, bundle, bundle)."""
+        bundles = inner.shape[1]
+        return self.response(inner, is_taut, np.eye(bundles), np.zeros((bundles, bundles)))
+
+    def response(self, inner: Array, is_taut: Mask, pulled: Array, on_arcs: Array) -> Array:
+        """Changes of the activations of the inner arm with what drives it, (n, bundle, change).
+
+        Args:
+            inner: Activations of the inner arm, shape (n, bundle).
+            is_taut: Shape (n, tendon).
+            pulled: Changes of activations with displacements, shape (n or none, bundle, change).
+            on_arcs: Changes of the loads of arcs at the same strains and tensions, likewise, in the
+                rows of these loads.
+        """
         law, guides = self.law, self.guides
         if guides is None:
-            return law.slopes_of_taut(inner, is_taut, self.work_slopes(inner, [law.works])[0])
+            (of_paths,) = self.work_slopes(inner, [law.works])
+            return law.slopes_of_taut(inner, is_taut, of_paths) @ pulled
         of_paths, of_arcs = self.work_slopes(inner, [law.works, guides.works])
         arcs, tension = self.works(inner, guides.works), inner[:, guides.columns]
         by_arcs, by_tension = guides.on_arcs_slopes(arcs, tension)
         # w = w(arcs(γ, w), τ)
         given = np.array(by_arcs @ of_arcs)
         given[..., guides.columns] += by_tension
-        own = np.eye(len(guides.loads)) - given[..., guides.loads]
+        own = np.linalg.inv(np.eye(len(guides.loads)) - given[..., guides.loads])
         given[..., guides.loads] = 0.0
         loads = np.tile(np.eye(inner.shape[1]), (len(inner), 1, 1))
-        loads[:, guides.loads] = np.linalg.solve(own, given)
+        loads[:, guides.loads] = own @ given
         places, column = self._guided
         of_paths = np.tile(of_paths, (len(inner) // len(of_paths), 1, 1))
         of_paths[:, places] = -(guides.slopes(arcs) @ of_arcs)[:, column]
-        return loads @ law.slopes_of_taut(inner, is_taut, of_paths @ loads)
+        changed = np.zeros((len(inner), *pulled.shape[-2:]))
+        changed[:, guides.loads] = own @ on_arcs[..., guides.loads, :]
+        left = pulled + np.zeros_like(changed)
+        left[:, law.columns] -= of_paths @ changed
+        return changed + loads @ law.slopes_of_taut(inner, is_taut, of_paths @ loads) @ left
 
 
 def _has_nan(values: Array) -> Mask:

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.base import Base
-from softreach.arm.driving import Driving, body_of
+from softreach.arm.driving import Driving, Pulled, body_of
 from softreach.arm.guides import has_guides
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tensions import LengthLaw
+from softreach.arm.tensions import LengthLaw, PulledTendons
 from softreach.calibration.free_numbers import FreeNumbers, Neighbors
 from softreach.calibration.measurements import Measurements
 from softreach.kernels.rod.linear_response import WEIGHTS
@@ -44,6 +44,7 @@ _TOL = 1e-6
 _STEPS = 24
 _BODY = ("profile", "section", "actuators", "loads", "rest", "stations", "rigid_pieces", "markers")
 """Parts of an arm that are more than its drives and the pose of its base."""
+Tendons: TypeAlias = "Pulled | LengthLaw | PulledTendons"
 _ENDS = ("start", "end", "stations.")  # In names of numbers that move ends of actuators
 
 
@@ -83,6 +84,13 @@ def marker_stations(arm: Manipulator, names: Iterable[str]) -> tuple[Array, Arra
     return np.array(places), np.array([known[name].offset for name in names])
 
 
+def _moves_guides(arm: Manipulator, neighbors: list[Neighbors]) -> bool:
+    """True if arcs between guides come or go with a number."""
+    near = (other for each in neighbors for _, other in each if isinstance(other, Manipulator))
+    bundles = body_of(arm).bundles
+    return has_guides(arm) and any(body_of(other).bundles != bundles for other in near)
+
+
 @dataclass(frozen=True, eq=False)
 class MarkerModel:
     """Markers of an arm as functions of its free numbers, at given inputs."""
@@ -113,7 +121,7 @@ class MarkerModel:
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
-        if neighbors and has_guides(arm):  # whose arcs change with the numbers
+        if _moves_guides(arm, neighbors):
             return self._by_differences(arm, scale, neighbors)
         blocks = (self.inputs[rows] for rows in parallel.blocks(len(self.inputs), _BLOCK))
         return joined([self._block(arm, scale, neighbors, grid, inputs) for inputs in blocks])
@@ -170,7 +178,10 @@ class MarkerModel:
         inputs: Array,
     ) -> Prediction:
         at = self._explicit(arm, scale, grid, inputs)
-        rod, gamma = self._driven(arm, grid, at.bundles)
+        rod, tendons = self._rod(arm, grid)
+        gamma, is_taut = at.bundles, np.empty((len(inputs), 0), bool)
+        if not Driving(arm).is_bundles:
+            gamma, is_taut = tendons.inner(gamma)
         lost = np.asarray(~np.isfinite(gamma).all(axis=1))
         gamma = np.where(lost[:, None], Driving(arm).law.rest, gamma)
         state = rod_state(rod, gamma, at.table)
@@ -182,19 +193,52 @@ class MarkerModel:
             known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
             some = table_rows(state, known)
             changes = [self._change(arm, at, each, grid, inputs) for each in neighbors]
-            slopes[known] = _slopes(rod.arm, at, some, changes, known)
+            driven = np.stack([change.bundles[known] for change in changes], axis=-1)
+            if isinstance(tendons, PulledTendons) and tendons.guides is not None:
+                near = (changes, neighbors)
+                driven = self._guided(arm, grid, tendons, some.gamma, is_taut[known], driven, near)
+                slopes[known] = _slopes(rod.arm, at, some, changes, driven)
+            else:
+                slopes[known] = _slopes(rod.arm, at, some, changes, driven, by_length=True)
         return Prediction(places, slopes, state.status)
 
-    def _driven(self, arm: Manipulator, grid: StepGrid, bundles: Array) -> tuple[ArmRod, Array]:
-        """The rod of the inner arm, and its activations at those of the bundles."""
+    def _rod(self, arm: Manipulator, grid: StepGrid) -> tuple[ArmRod, Tendons]:
+        """The rod of the inner arm, and how that takes what is pulled in."""
         driving = Driving(arm)
-        rest = driving.law.rest.T
-        body = body_of(arm).with_bounds(rest + np.zeros(2))  # which decide nothing else
+        body = body_of(arm).with_bounds(driving.law.rest.T + np.zeros(2))  # which decide nothing
         kind, steps = FreeRod if arm.loads is None else LoadedRod, int(grid.counts.sum())
-        rod, tendons = kind(body, _TOL, steps), driving.tendons
-        if arm.loads is not None:
-            tendons = LoadedTendons(driving.law, rod)
-        return rod, bundles if driving.is_bundles else tendons.inner(bundles)[0]
+        rod = kind(body, _TOL, steps)
+        return rod, driving.tendons if arm.loads is None else LoadedTendons(driving.law, rod)
+
+    def _guided(
+        self,
+        arm: Manipulator,
+        grid: StepGrid,
+        tendons: PulledTendons,
+        gamma: Array,
+        is_taut: Mask,
+        pulled: Array,
+        near: tuple[list[_Explicit], list[Neighbors]],
+    ) -> Array:
+        """Derivatives of the rod's activations where guides hold tendons, (n, bundle, number).
+
+        `pulled` are those of activations with displacements.
+        """
+        columns, on_arcs = tendons.law.columns, np.zeros_like(pulled)
+        for k, (change, neighbors) in enumerate(zip(*near, strict=True)):
+            own = gamma[:, columns] * change.compliance + change.taut_from
+            for factor, other in neighbors:
+                if isinstance(other, float | int):
+                    continue
+                made = arm.replace(base=other) if isinstance(other, Base) else other
+                _, there = self._rod(made, grid)
+                assert isinstance(there, PulledTendons) and there.guides is not None
+                arcs, pulls = there.works(gamma, there.guides.works), there.guides.columns
+                loads = there.guides.on_arcs(arcs, gamma[:, pulls])
+                on_arcs[:, there.guides.loads, k] += factor * loads
+                own += factor * there.shortening(gamma)
+            pulled[:, columns, k] -= own
+        return tendons.response(gamma, is_taut, pulled, on_arcs)
 
     def _change(
         self, arm: Manipulator, at: _Explicit, neighbors: Neighbors, grid: StepGrid, inputs: Array
@@ -227,14 +271,22 @@ def _beyond(at: _Explicit, state: RodState) -> tuple[Array, Array]:
 
 
 def _slopes(
-    arm: Manipulator, at: _Explicit, state: RodState, changes: list[_Explicit], rows: Mask
+    arm: Manipulator,
+    at: _Explicit,
+    state: RodState,
+    changes: list[_Explicit],
+    driven: Array,
+    *,
+    by_length: bool = False,
 ) -> Array:
-    """Derivatives of the places by all numbers, (n, marker, 3, number)."""
+    """Derivatives of the places by all numbers, (n, marker, 3, number).
+
+    `driven` are those of activations: with displacements where these are still to become tensions.
+    """
     bundles = state.gamma.shape[1]
     tables = [change.table for change in changes]
     response = linear_response(at.table, state, tables, at.measures)
-    driven = np.stack([change.bundles[rows] for change in changes], axis=-1)
-    if at.measures.shape[-1]:
+    if by_length and at.measures.shape[-1]:
         driven = _with_tensions(arm, at, state, changes, driven, response.works)
     moves = response.moves[..., bundles:] + _products(response.moves[..., :bundles], driven)
     turns = response.turns[..., bundles:] + _products(response.turns[..., :bundles], driven)

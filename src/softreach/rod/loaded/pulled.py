@@ -52,7 +52,7 @@ class LoadedTendons(PulledTendons):
         ]
         z, weights, _ = quadrature(arm, _PIECES + int(max(turns, default=0.0)))
         force, moment = which.loads_at(z, weights)
-        return z, force, moment.reshape(-1, len(which.columns))
+        return z, force, moment.reshape(3 * len(z), len(which.columns))
 
     def continued_from(self, inner: Array, frames: Array | None = None) -> LoadedTendons:
         """Those of the arm in its posture at activations of the inner arm, shape (k, bundles)."""
