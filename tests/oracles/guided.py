@@ -1,0 +1,80 @@
+"""An arm as a chain of arcs between disks that guide its tendons: least energy, by SciPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import least_squares, minimize
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Tendon:
+    """A tendon through holes of some disks."""
+
+    disks: tuple[int, ...]
+    holes: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class ArcChain:
+    """Arcs with lengths [m] and stiffnesses (K0, K1, K2, K3); a disk stands at each end of each."""
+
+    lengths: Array
+    stiffness: Array
+    tendons: tuple[Tendon, ...]
+    rest: Array | None = None
+
+    def disks(self, strains: Array) -> tuple[Array, Array]:
+        """Places and rotations of the disks at (λ - h, ω) of the arcs, shape (arc, 4)."""
+        places, turns = [np.zeros(3)], [np.eye(3)]
+        for h, (rise, x, y, z) in zip(self.lengths, strains, strict=True):
+            twist = np.array([[0, -z, y, 0], [z, 0, -x, 0], [-y, x, 0, h + rise], [0, 0, 0, 0]])
+            moved = expm(twist)
+            places.append(places[-1] + turns[-1] @ moved[:3, 3])
+            turns.append(turns[-1] @ moved[:3, :3])
+        return np.array(places), np.array(turns)
+
+    def tendon_lengths(self, strains: Array) -> Array:
+        """Sum of the straight pieces of each tendon [m]."""
+        places, turns = self.disks(strains)
+        lengths = []
+        for tendon in self.tendons:
+            holes = np.array([(*hole, 0.0) for hole in tendon.holes])
+            disks = list(tendon.disks)
+            points = places[disks] + np.einsum("kij,kj->ki", turns[disks], holes)
+            lengths.append(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        return np.array(lengths)
+
+    @property
+    def _springs(self) -> Array:
+        return np.where(self.lengths[:, None] > 0, self.stiffness / self.lengths[:, None], 0.0)
+
+    def at_tensions(self, tension: Array) -> Array:
+        """Strains of least energy under tensions [N]."""
+        size = np.sqrt(self._springs)
+        rest = np.zeros_like(size) if self.rest is None else self.rest
+
+        def energy(x: Array) -> float:
+            off = x.reshape(size.shape)
+            return 0.5 * float(x @ x) + float(tension @ self.tendon_lengths(rest + off / size))
+
+        best = minimize(energy, np.zeros(size.size), method="BFGS", options={"gtol": 1e-9})
+        return rest + best.x.reshape(size.shape) / size
+
+    def at_pulled(self, pulled: Array, stiffness: float) -> Array:
+        """Strains of least energy where tendons with a stiffness [N/m] are pulled in [m]."""
+        size, straight = (
+            np.sqrt(self._springs),
+            self.tendon_lengths(np.zeros((len(self.lengths), 4))),
+        )
+
+        def residuals(x: Array) -> Array:
+            off = self.tendon_lengths(x.reshape(size.shape) / size) - (straight - pulled)
+            return np.concatenate([x, np.sqrt(stiffness) * np.maximum(off, 0.0)])
+
+        best = least_squares(residuals, np.zeros(size.size), xtol=1e-15, ftol=1e-15, gtol=1e-13)
+        return best.x.reshape(size.shape) / size
