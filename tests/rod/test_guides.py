@@ -123,15 +123,21 @@ def test_more_guides_lead_to_a_tendon_that_follows_the_arm_at_second_order(loads
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.04)
 
 
+LOADED = sr.Loads(payload=0.02)
 CASES = {
     "by tension": (arm_of(6), TENSIONS),
     "by length": (arm_of(6, LengthTendon), pulled_in(4)),
-    "loaded": (arm_of(6, loads=sr.Loads(payload=0.02)), TENSIONS[:2]),
-    "loaded by length": (arm_of(4, LengthTendon, loads=sr.Loads(payload=0.02)), pulled_in(2)),
+    "loaded": (arm_of(6, loads=LOADED), TENSIONS[:2]),
+    "loaded by length": (arm_of(2, LengthTendon, loads=LOADED), pulled_in(2)),
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+EACH = [
+    pytest.param(case, marks=[pytest.mark.large] if "loaded by" in case else []) for case in CASES
+]
+
+
+@pytest.mark.parametrize("case", EACH)
 def test_slopes_are_those_of_differences(case):
     arm, inputs = CASES[case]
     tip_map = as_tip_map(arm, 1e-9)
@@ -143,7 +149,7 @@ def test_slopes_are_those_of_differences(case):
         np.testing.assert_allclose(slopes[..., k], difference, atol=1e-6 * np.abs(slopes).max())
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", EACH)
 def test_places_of_markers_change_with_numbers_as_in_differences(case):
     arm, inputs = CASES[case]
     names = ["pose.x", "pose.rx", "near.distance", "rings[0].material.young_modulus", "length"]

@@ -2,8 +2,8 @@
 
 Between neighboring guides the arm counts as an arc of its mean strains: λ long, turned by ω. A
 tendon from p in the section of one guide to q in that of the next is ℓ = |λ V(ω) e3 + exp(ω) q - p|
-long, theory (24), and by virtual work a tension τ loads the arcs by -τ ∂ℓ/∂(λ, ω). The linear law
-has that load of the straight arm. What bending adds are four loads on each arc,
+long, theory (24), and by virtual work a tension τ loads the arcs by -τ ∂ℓ/∂(λ, ω), theory (100).
+The linear law has that load of the straight arm. What bending adds are four loads on each arc,
 w = -Σ τ (∂ℓ - ∂ℓ of the straight arm), which the inner arm has as bundles behind all others.
 """
 
