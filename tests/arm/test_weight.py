@@ -289,6 +289,29 @@ def test_a_step_of_the_measured_bending_stiffness_is_two_beams():
     assert tip[0] == pytest.approx(sunk, rel=1e-6)
 
 
+def test_a_flat_strip_bends_about_each_axis_by_the_stiffness_about_it():
+    """Moments about d1 and d2 bend by M1/K1 and M2/K2: the shape is an arc in the plane between."""
+    first, second, away = 0.04, 0.4, 0.3
+    pull = Tendon(distance=0.008, offset=away, activation_bounds=(0.0, 4.0))
+
+    def strip(bending, loads=None):
+        measured = Measured(axial_stiffness=1e9, bending_stiffness=bending, torsion_stiffness=0.03)
+        return tube(sr.Material(), measured=measured, actuators=(pull,), loads=loads)
+
+    made = strip((first, second))
+    (tip,) = sr.tip_positions(made, [[3.0]], tol=1e-10)
+    bend = 3.0 * 0.008 * np.array([np.cos(away) / second, np.sin(away) / first])
+    kappa = np.hypot(*bend)
+    across = (1.0 - np.cos(kappa * LENGTH)) / kappa * bend / kappa
+    expected = [*across, np.sin(kappa * LENGTH) / kappa]
+    np.testing.assert_allclose(tip, expected, atol=1e-8 * LENGTH)
+    same = sr.tip_positions(strip((first, first)), [[3.0]])
+    np.testing.assert_array_equal(same, sr.tip_positions(strip(first), [[3.0]]))
+    assert sr.Manipulator.from_toml(made.to_toml()) == made
+    with pytest.raises(InvalidDesign, match=r"\(0.04, 0.4\): must be one number where loads act"):
+        strip((first, second), sr.Loads(gravity=(0.0, 0.0, 0.0)))
+
+
 def test_measured_mass_per_length_is_the_weight():
     along = Samples(stations_over_length=(0.0, 1.0), values=(0.3, 0.1), interpolation="linear")
     assert sr.describe(tube(measured=Measured(mass_per_length=along))).mass == pytest.approx(

@@ -161,8 +161,7 @@ def pull_error(arm: Manipulator) -> float:
     slopes = np.gradient(places, step, axis=1, edge_order=2)[..., pulls]
     places = places[..., pulls]
     x, y = places
-    stiffness = body.stiffness_at(z)
-    resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
+    resistance = body.resistance_at(z)
     shares = np.rint(2.0 * np.random.default_rng(0).random((_SAMPLES, arm.inputs))) / 2.0
     low, high = arm.input_bounds.T
     gamma = Driving(arm).activations(np.unique(low + shares * (high - low), axis=0))

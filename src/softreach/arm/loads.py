@@ -93,7 +93,7 @@ class Loads(Part):
 
     def section_faults(self, section: Section, length: float) -> list[Fault]:
         """Faults that keep them from acting on an arm: moduli, densities, places off the arm."""
-        faults = section.modulus_faults("where loads act")
+        faults = section.load_faults()
         if any(self.gravity):
             faults += section.density_faults("where weight counts")
         allowed = f"must be on the arm, at most {length:g} m"

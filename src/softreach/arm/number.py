@@ -139,8 +139,8 @@ class Number:
     """None is allowed."""
     named: bool = False
     """The name of a station of the arm may take its place."""
-    pair: bool = False
-    """Two values, where the part begins and where it ends, may take its place."""
+    pair: str = ""
+    """Two values that may take its place, such as "two at its ends"; "" for none."""
     each: bool = False
     """One value for each bundle of an actuator may take its place."""
     instead_of: str = ""
@@ -206,7 +206,7 @@ class Number:
             return []
         if self.along is not None and not (is_single and isinstance(value, int | float)):
             ways = [self.allowed.text] if is_single else []
-            ways += ["two at its ends"] if self.pair else []
+            ways += [self.pair] if self.pair else []
             ways += [f"{self.along.__name__} along the arm", *(["None"] if self.optional else [])]
             allowed = f"must be {', or '.join(ways)}"
         return [Fault(self.field, value, allowed or self.allowed)]
@@ -223,7 +223,7 @@ class Number:
 
     def _element(self, k: int) -> Number:
         called = {"symbol": f"{self.symbol}[{k}]", "meaning": f"{self.meaning}, number {k}"}
-        alone: dict[str, Any] = {"along": None, "pair": False, "each": False}
+        alone: dict[str, Any] = {"along": None, "pair": "", "each": False}
         return dataclasses.replace(self, shape="single", **alone, **called)
 
     def normal(self, value: Any) -> Any:
@@ -245,7 +245,7 @@ class Number:
         return self.named and isinstance(value, str | Station)
 
     def _is_pair(self, value: Any) -> bool:
-        return self.pair and as_numbers(value).shape == (2,)
+        return bool(self.pair) and as_numbers(value).shape == (2,)
 
     def _is_of_bundles(self, value: Any) -> bool:
         return self.each and _is_sequence(value) and len(value) > 0

@@ -38,10 +38,16 @@ class Measured(Part):
         "K0", "N", "axial stiffness", above=0.0, along=AlongArm, default=None
     )
     """K0 [N]."""
-    bending_stiffness: float | AlongArm | None = number(
-        "K1", "N m²", "bending stiffness", above=0.0, along=AlongArm, default=None
+    bending_stiffness: float | tuple[float, float] | AlongArm | None = number(
+        "K1",
+        "N m²",
+        "bending stiffness",
+        above=0.0,
+        along=AlongArm,
+        pair="two about d1 and d2",
+        default=None,
     )
-    """K1 = K2 [N m²]."""
+    """K1 = K2 [N m²], or (K1, K2) about d1 and d2, as of a flat strip, without loads."""
     torsion_stiffness: float | AlongArm | None = number(
         "K3", "N m²", "torsional stiffness", above=0.0, along=AlongArm, default=None
     )
@@ -54,7 +60,15 @@ class Measured(Part):
     @property
     def stiffnesses(self) -> tuple[float | AlongArm | None, ...]:
         """K0, K1 and K3, each None where it was not measured."""
-        return self.axial_stiffness, self.bending_stiffness, self.torsion_stiffness
+        bending = self.bending_stiffness
+        first = bending[0] if isinstance(bending, tuple) else bending
+        return self.axial_stiffness, first, self.torsion_stiffness
+
+    @property
+    def bending_ratio(self) -> float:
+        """K2/K1 [-]."""
+        pair = self.bending_stiffness
+        return pair[1] / pair[0] if isinstance(pair, tuple) else 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,6 +245,16 @@ class Section(Part):
         pairs = zip(self.measured.stiffnesses, stiffness, strict=True)
         return Stiffness(*(own if k is None else values_along(k, x) for k, own in pairs))
 
+    @property
+    def bending_ratio(self) -> float:
+        """K2/K1 [-]: 1 but for measured sections that are not round."""
+        return 1.0 if self.measured is None else self.measured.bending_ratio
+
+    def resistance_at(self, profile: Profile, z: ArrayLike) -> Array:
+        """K1, K2 and K3 [N m²] about the directors at stations Z [m], shape (*z.shape, 3)."""
+        _, bending, torsion = self.stiffness_at(profile, z)
+        return np.stack([bending, self.bending_ratio * bending, torsion], axis=-1)
+
     def mass_per_length_at(self, profile: Profile, z: ArrayLike) -> Array:
         """Mass per length [kg/m] at stations Z [m]: what was measured, else by the materials.
 
@@ -277,6 +301,14 @@ class Section(Part):
         """
         known = self.measured is not None and None not in self.measured.stiffnesses
         return [] if known else list(_missing(self, "young_modulus", "Pa", why))
+
+    def load_faults(self) -> list[Fault]:
+        """Faults that keep loads from acting on an arm."""
+        faults = self.modulus_faults("where loads act")
+        if self.measured is not None and self.bending_ratio != 1.0:
+            given, allowed = self.measured.bending_stiffness, "must be one number where loads act or compliance is computed"
+            faults.append(Fault("measured.bending_stiffness", given, allowed))
+        return faults
 
     def density_faults(self, why: str) -> list[Fault]:
         """A fault for each material without a density, unless the mass per length was measured."""

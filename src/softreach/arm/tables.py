@@ -65,9 +65,8 @@ def tables(arm: Body, stations: ArrayLike) -> Tables:
     z = np.atleast_1d(np.asarray(stations, float))
     loads = [Resultants(np.empty((len(z), 0)), np.empty((len(z), 3, 0)))]
     loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
-    stiffness = arm.stiffness_at(z)
-    resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
-    extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
+    axial, resistance = arm.stiffness_at(z).axial, arm.resistance_at(z)
+    extension = np.concatenate([load.force for load in loads], axis=1) / axial[:, None]
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
     for k, actuator in enumerate(arm.bundle_actuators):
         if isinstance(actuator, RestStrains):
@@ -98,9 +97,9 @@ def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
         One value for each station, shape (station,) each.
 
     Raises:
-        InvalidDesign: A material without Young's modulus.
+        InvalidDesign: A material without Young's modulus, or two bending stiffnesses.
     """
-    if faults := arm.section.modulus_faults("where loads act"):
+    if faults := arm.section.load_faults():
         raise InvalidDesign(faults)
     axial, bending, torsion = arm.stiffness_at(stations)
     return 1.0 / axial, 1.0 / bending, 1.0 / torsion
@@ -228,9 +227,9 @@ class Works:
     def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:
         """N and M of the unit loads at nodes, times weights, (node, work) and (node, 3, work)."""
         table = tables(self.arm, z)
-        stiffness = self.arm.section.stiffness_at(self.arm.profile, z)
-        resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
-        force = table.extension[:, self.columns] * (weights * stiffness.axial)[:, None]
+        axial = self.arm.section.stiffness_at(self.arm.profile, z).axial
+        resistance = self.arm.section.resistance_at(self.arm.profile, z)
+        force = table.extension[:, self.columns] * (weights * axial)[:, None]
         moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]
         return force, moment
 

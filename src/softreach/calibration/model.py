@@ -150,8 +150,9 @@ class MarkerModel:
         columns = law.columns
         stiffness = np.zeros((*table.length.shape, 4))
         if len(columns):
-            k = arm.section.stiffness_at(arm.profile, table.stations)
-            stiffness = np.stack([k.bending, k.bending, k.torsion, k.axial], axis=-1)
+            resistance = arm.section.resistance_at(arm.profile, table.stations)
+            axial = arm.section.stiffness_at(arm.profile, table.stations).axial
+            stiffness = np.concatenate([resistance, axial[..., None]], axis=-1)
         measures = np.concatenate(
             [table.curvature[..., columns], table.extension[:, :, None, columns]], axis=2
         )
@@ -232,7 +233,8 @@ class MarkerModel:
                     continue
                 made = arm.replace(base=other) if isinstance(other, Base) else other
                 _, there = self._rod(made, grid)
-                assert isinstance(there, PulledTendons) and there.guides is not None
+                assert isinstance(there, PulledTendons)
+                assert there.guides is not None
                 arcs, pulls = there.works(gamma, there.guides.works), there.guides.columns
                 loads = there.guides.on_arcs(arcs, gamma[:, pulls])
                 on_arcs[:, there.guides.loads, k] += factor * loads

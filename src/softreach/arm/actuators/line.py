@@ -55,7 +55,7 @@ class Tendon(PolarActuator):
         "distance from the axis",
         low=0.0,
         along=Samples,
-        pair=True,
+        pair="two at its ends",
         instead_of="distance_ratio",
         default=None,
     )
