@@ -48,14 +48,11 @@ class AlphaComplex:
     """
 
     triangulation: Delaunay
-    radii: np.ndarray = field(init=False, repr=False)
-    """Circumscribed radii [m], shape (m,)."""
-    volumes: np.ndarray = field(init=False, repr=False)
-    """Volumes of the tetrahedra [m³], shape (m,)."""
+    radii: np.ndarray = field(init=False, repr=False)  # circumscribed radii [m], (m,)
+    volumes: np.ndarray = field(init=False, repr=False)  # volumes of the tetrahedra [m³], (m,)
     least: np.ndarray = field(init=False, repr=False)
-    """The least radii that rounding of the coordinates leaves possible [m], shape (m,)."""
-    flat: Mask = field(init=False, repr=False)
-    """Whether a tetrahedron is no thicker than that rounding, shape (m,)."""
+    """The least that rounding leaves possible [m], shape (m,)."""
+    flat: Mask = field(init=False, repr=False)  # those no thicker than that, (m,)
 
     def __post_init__(self) -> None:
         mesh = self.triangulation
@@ -159,8 +156,8 @@ class _Piece(NamedTuple):
     faces: Faces  # Those between them and the rest, as indices of points
     sets: Index  # Set of connected tetrahedra at each face, counted from 0
     solid: Mask  # Whether each set is a region: not all of it is flat
+    # Of the tetrahedra, and of those that a part of the points has by itself [m³]
     volumes: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    """Of the tetrahedra, and of those that a part of the points has by itself [m³]."""
 
 
 class _Crowded(Exception):

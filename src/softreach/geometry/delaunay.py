@@ -41,12 +41,9 @@ class Delaunay:
     some hundreds on a curve in space, of which nearly every pair would have an edge.
     """
 
-    points: Points
-    """Positions [m], shape (n, 3)."""
-    tetrahedra: np.ndarray
-    """Vertices as indices of points, positively oriented, shape (m, 4)."""
-    neighbors: np.ndarray
-    """Neighbor i shares the face opposite vertex i; -1 outside the hull. Shape (m, 4)."""
+    points: Points  # positions [m], (n, 3)
+    tetrahedra: np.ndarray  # vertices as indices of points, positively oriented, (m, 4)
+    neighbors: np.ndarray  # number i shares the face opposite vertex i; -1 outside the hull, (m, 4)
 
 
 def lies_on_curve(points: Points) -> bool:

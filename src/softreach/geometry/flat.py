@@ -12,12 +12,9 @@ from softreach.support.arrays import Array, Faces, Index, Mask, Points
 class Plane(NamedTuple):
     """A plane in space with axes of its own: x and y in it, z its normal."""
 
-    origin: Array
-    """[m], shape (3,)."""
-    rotation: Array
-    """Its axes as rows, a rotation, shape (3, 3)."""
-    sides: Array
-    """Extents of the points along its axes [m], shape (3,)."""
+    origin: Array  # [m], (3,)
+    rotation: Array  # its axes as rows, a rotation, (3, 3)
+    sides: Array  # extents of the points along its axes [m], (3,)
 
     def coordinates(self, points: Points) -> Points:
         """Points [m] in these axes, shape (n, 3)."""

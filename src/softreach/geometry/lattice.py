@@ -18,14 +18,10 @@ _MOST_CELLS = 1 << 26
 class CellGrid:
     """Cubes whose corners lie at whole multiples of their edge, so that grids of clouds agree."""
 
-    edge: float
-    """Of a cube [m]."""
-    first: Index
-    """Lower corner in edges, shape (3,)."""
-    shape: tuple[int, ...]
-    """Number of cubes along each axis."""
-    cells: Index
-    """The cube of each point, in C order, shape (n,); their number for a point that is NaN."""
+    edge: float  # of a cube [m]
+    first: Index  # lower corner in edges, (3,)
+    shape: tuple[int, ...]  # number of cubes along each axis
+    cells: Index  # the cube of each point, in C order, (n,); their number for a point that is NaN
 
     @classmethod
     def around(cls, points: Array, edge: float) -> CellGrid:

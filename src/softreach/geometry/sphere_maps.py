@@ -84,10 +84,8 @@ def quartered(points: Array, triangles: Index) -> tuple[Array, Index]:
 class Roots(NamedTuple):
     """Points that a map takes to a value."""
 
-    points: Array
-    """Unit vectors, shape (n, 3)."""
-    determinants: Array
-    """Of the derivative, positive where the map keeps the sense of rotation; shape (n,)."""
+    points: Array  # unit vectors, (n, 3)
+    determinants: Array  # of the derivative, above 0 where the sense of rotation is kept, (n,)
 
 
 def sphere_roots(
@@ -204,12 +202,9 @@ def _unit(vectors: Array) -> Array:
 class Rings(NamedTuple):
     """Circles of latitude that go to the pole."""
 
-    points: Array
-    """One of each, all on one meridian, shape (n, 3)."""
-    signs: NDArray[np.int8]
-    """1 where the image moves away from the pole as the place does, else -1; shape (n,)."""
-    pole_sign: int
-    """The same of the pole itself, which goes to itself."""
+    points: Array  # one of each, all on one meridian, (n, 3)
+    signs: NDArray[np.int8]  # 1 where image and place both move away from the pole, else -1, (n,)
+    pole_sign: int  # the same of the pole itself, which goes to itself
 
     @property
     def complete(self) -> bool:

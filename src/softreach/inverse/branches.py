@@ -267,14 +267,10 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
 class Starts(NamedTuple):
     """Activations at which searches begin."""
 
-    target: Index
-    """Number of the target, shape (n,)."""
-    cell: Index
-    """Cell of the mesh, shape (n,)."""
-    gamma: Array
-    """Activation [-], shape (n, 3)."""
-    inverse: Array
-    """Inverse of the Jacobian there [1/m], roughly; 0 if not known, shape (n, 3, 3)."""
+    target: Index  # number of the target, (n,)
+    cell: Index  # cell of the mesh, (n,)
+    gamma: Array  # activation [-], (n, 3)
+    inverse: Array  # inverse of the Jacobian there [1/m], roughly; 0 if not known, (n, 3, 3)
 
     @staticmethod
     def empty(room: int) -> Starts:

@@ -22,14 +22,10 @@ _ASIDE = 0.02  # from a fold, where the search on its either side begins, in ran
 class Dragged(NamedTuple):
     """Result of one step of a drag."""
 
-    activation: tuple[float, ...]
-    """Of each bundle in its unit."""
-    tip: Array
-    """Place of the tip then [m], shape (3,)."""
-    gap: float
-    """Distance from there to the target [m]; 0 where the tip follows."""
-    tip_map: TipMap
-    """The tip map of the arm in the posture in which this leaves it."""
+    activation: tuple[float, ...]  # of each bundle in its unit
+    tip: Array  # place of the tip then [m], (3,)
+    gap: float  # distance from there to the target [m]; 0 where the tip follows
+    tip_map: TipMap  # the tip map of the arm in the posture in which this leaves it
 
 
 class Drag:

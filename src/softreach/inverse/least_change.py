@@ -262,16 +262,11 @@ def _cost(tip_map: TipMap, request: Request, gamma: Array) -> Array:
 class Minima(NamedTuple):
     """Ends of searches for the least change."""
 
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
-    merit: Array
-    """½|γ - near|² and the penalty of the miss, shape (n,)."""
-    proximity: Array
-    """σ of the last step, shape (n,)."""
-    penalty: Array
-    """Penalty of the miss, in 1/L: half as much again as its multiplier, shape (n,)."""
+    gamma: Array  # activations [-], (n, m)
+    residual: Array  # |tip - target| [m], (n,)
+    merit: Array  # ½|γ - near|² and the penalty of the miss, (n,)
+    proximity: Array  # σ of the last step, (n,)
+    penalty: Array  # penalty of the miss, in 1/L: half as much again as its multiplier, (n,)
 
 
 def sqp(

@@ -285,14 +285,10 @@ class Continuation:
 class BranchPoint(NamedTuple):
     """An activation with the tip map linearized there."""
 
-    gamma: Array
-    """Activation of the free bundles [-], shape (m,)."""
-    tip: Array
-    """Tip [m], shape (3,)."""
-    slope: Array
-    """∂r/∂γ [m], shape (3, m)."""
-    tip_map: TipMap
-    """The tip map, whose posture it is."""
+    gamma: Array  # activation of the free bundles [-], (m,)
+    tip: Array  # tip [m], (3,)
+    slope: Array  # ∂r/∂γ [m], (3, m)
+    tip_map: TipMap  # the tip map, whose posture it is
 
     def kept(self) -> BranchPoint:
         """The same, to go on from this posture."""
@@ -303,16 +299,11 @@ class BranchEnd(NamedTuple):
     """End of a branch as far as it was followed."""
 
     status: PathStatus
-    point: BranchPoint
-    """The last point on it."""
-    bundle: int = -1
-    """The bundle at its bound."""
-    upper: bool = False
-    """True for its upper bound."""
-    done: float = 0.0
-    """The part of the way to the next point that was followed [-]."""
-    error: float = 0.0
-    """Largest distance that the branch may go farther [m]."""
+    point: BranchPoint  # the last point on it
+    bundle: int = -1  # the bundle at its bound
+    upper: bool = False  # True for its upper bound
+    done: float = 0.0  # the part of the way to the next point that was followed [-]
+    error: float = 0.0  # largest distance that the branch may go farther [m]
 
 
 def _least_norm(slope: Array, moving: Mask) -> Array:

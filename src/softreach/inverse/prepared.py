@@ -30,12 +30,9 @@ _NODES = 16  # cells along each axis of the grid on which sheets of postures are
 class Sheet(NamedTuple):
     """Postures to which activations do not lead straight from rest."""
 
-    whole: TipMap
-    """The tip map of all bundles that goes on from the nearest of them."""
-    tip_map: TipMap
-    """That of the free bundles."""
-    starts: TornCells
-    """Of searches."""
+    whole: TipMap  # the tip map of all bundles that goes on from the nearest of them
+    tip_map: TipMap  # that of the free bundles
+    starts: TornCells  # of searches
 
 
 @dataclass(frozen=True)

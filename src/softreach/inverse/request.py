@@ -25,25 +25,15 @@ RESIDUALS = Range(1e-13, 1e-2)
 class Request:
     """Targets, and which activations to prefer where there is a choice."""
 
-    targets: Array
-    """Wanted positions of the tip [m], shape (t, 3)."""
-    residual: float
-    """|tip - target| at which a search has found its target [m]."""
-    reach_tol: float
-    """|tip - target| that the error of tips leaves open, or that is asked for [m]; `residual` at
-    least. No target so near to a tip of the arm is out of reach."""
-    near: Array
-    """Activations of the free bundles to stay near to [-], shape (t, dimension)."""
-    direction: Array | None = None
-    """Wanted tip tangents, unit vectors, shape (t, 3)."""
-    direction_weight: float = 0.0
-    """Weight of |d3 - direction| against |γ - near| or a distance in L [-]."""
-    family: int = 1
-    """Activations wanted for each target where there are infinitely many."""
-    seed: int = 0
-    """Seed of the random activations that the others stay near to."""
-    from_rest: bool = False
-    """True for postures of loaded arms to which activations lead from rest, and no others."""
+    targets: Array  # wanted positions of the tip [m], (t, 3)
+    residual: float  # |tip - target| at which a search has found its target [m]
+    reach_tol: float  # |tip - target| at which a target counts as reached [m], `residual` at least
+    near: Array  # activations of the free bundles to stay near to [-], (t, dimension)
+    direction: Array | None = None  # wanted tip tangents, unit vectors, (t, 3)
+    direction_weight: float = 0.0  # of |d3 - direction| against |γ - near| or a distance in L
+    family: int = 1  # activations wanted for each target where there are infinitely many
+    seed: int = 0  # seed of the random activations that the others stay near to
+    from_rest: bool = False  # True for postures that activations lead to from rest, and no others
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""

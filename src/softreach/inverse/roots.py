@@ -35,20 +35,13 @@ _FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
 class Roots(NamedTuple):
     """Activations of the free bundles, each a root for one of the targets or the nearest tip."""
 
-    target: Index
-    """Number of the target, shape (n,)."""
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    tip: Array
-    """Tips there [m], shape (n, 3)."""
-    slope: Array
-    """∂r/∂γ there [m], shape (n, 3, m)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
-    cell: Index
-    """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
-    sheet: Index
-    """Number of its sheet in `PreparedMap.sheets`, shape (n,)."""
+    target: Index  # number of the target, (n,)
+    gamma: Array  # activations [-], (n, m)
+    tip: Array  # tips there [m], (n, 3)
+    slope: Array  # ∂r/∂γ there [m], (n, 3, m)
+    residual: Array  # |tip - target| [m], (n,)
+    cell: Index  # cell of the mesh where the search began; -1 if in none, (n,)
+    sheet: Index  # number of its sheet in `PreparedMap.sheets`, (n,)
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
@@ -213,10 +206,8 @@ def _valley_floor(
 class Reached(NamedTuple):
     """The best place found for each target."""
 
-    gamma: Array
-    """Activations [-], shape (t, m)."""
-    residual: Array
-    """|tip - target| [m], shape (t,)."""
+    gamma: Array  # activations [-], (t, m)
+    residual: Array  # |tip - target| [m], (t,)
 
 
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:

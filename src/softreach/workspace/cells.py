@@ -78,12 +78,9 @@ class Wrap(Surface):
     """The surface, closed and outwards, a ten-thousandth of a cell outside of its tips."""
 
     tip_map: TipMap
-    gamma: Array
-    """Activations that lead to the vertices, shape (v, bundles)."""
-    cell: float
-    """Edge of the cells that it was found with [m]."""
-    tight_volume: float
-    """Volume inside of the tips themselves [m³]."""
+    gamma: Array  # activations that lead to the vertices, (v, bundles)
+    cell: float  # edge of the cells that it was found with [m]
+    tight_volume: float  # volume inside of the tips themselves [m³]
 
     @lazy
     def volume_of_tips(self) -> Estimate:
@@ -177,11 +174,9 @@ class ReachedCells:
     """Counterpart of `Image` for more than three free bundles: asked by search."""
 
     grid: ReachedGrid
-    cloud: tuple[Array, Array]
-    """Activations on faces of the box, and their tips [m]."""
+    cloud: tuple[Array, Array]  # activations on faces of the box, and their tips [m]
     wrap: Wrap
-    coarse: Wrap
-    """The same on cells one and a half times as large."""
+    coarse: Wrap  # the same on cells one and a half times as large
     hull: ConvexHull | None = None
 
     @property

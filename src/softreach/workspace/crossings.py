@@ -31,21 +31,14 @@ class Crossings:
 
     tip_map: TipMap
     lattice: Lattice
-    cell: Index
-    """The center that is reached, as a flat index, shape (n,)."""
-    axis: Index
-    """Along which axis the center that is not lies, shape (n,)."""
-    sense: Index
-    """On which side, 1 or -1, shape (n,)."""
-    low: Array
-    """In cells from the reached center, shape (n,)."""
+    cell: Index  # the center that is reached, as a flat index, (n,)
+    axis: Index  # along which axis the center that is not lies, (n,)
+    sense: Index  # on which side, 1 or -1, (n,)
+    low: Array  # in cells from the reached center, (n,)
     high: Array
-    gamma: Array
-    """Activations that reach `low`, shape (n, bundles)."""
-    beyond: Array
-    """Activations whose tips are nearest to `high`, shape (n, bundles)."""
-    place: Array
-    """Place where the plane of that tip cuts the edge, between `low` and `high`, shape (n,)."""
+    gamma: Array  # activations that reach `low`, (n, bundles)
+    beyond: Array  # activations whose tips are nearest to `high`, (n, bundles)
+    place: Array  # place where the plane of that tip cuts the edge, between `low` and `high`, (n,)
 
     @classmethod
     def of(cls, grid: ReachedGrid) -> Crossings:
@@ -168,18 +161,12 @@ def swept_crossings(grid: ReachedGrid) -> tuple[Crossings, float]:
 class Runs(NamedTuple):
     """Stretches of lines of sight that are reached, line by line, upwards; in cells."""
 
-    line: Index
-    """Index of the line, (i, j) as i · width + j over the other two axes, shape (n,)."""
-    first: Index
-    """Number of the first center, shape (n,)."""
-    last: Index
-    """Number of the last center, shape (n,)."""
-    start: Array
-    """Beginning of the run, before its first center, shape (n,)."""
-    end: Array
-    """End of the run, behind its last center, shape (n,)."""
-    width: int
-    """Number of lines along the last of the other two axes."""
+    line: Index  # index of the line, (i, j) as i · width + j over the other two axes, (n,)
+    first: Index  # number of the first center, (n,)
+    last: Index  # number of the last center, (n,)
+    start: Array  # beginning of the run, before its first center, (n,)
+    end: Array  # end of the run, behind its last center, (n,)
+    width: int  # number of lines along the last of the other two axes
 
 
 def runs_along(crossings: Crossings, axis: int) -> Runs:

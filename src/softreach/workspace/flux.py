@@ -54,14 +54,10 @@ def signed_volume(tip_map: TipMap, nodes: int | None = None, *, enough: float = 
 class Flux(NamedTuple):
     """∫ det J dγ by the divergence theorem, theory (81), and what it was computed from."""
 
-    value: float
-    """Signed volume [m³]: below zero if the map turns the orientation over."""
-    error: float
-    """Estimated error: from half as many nodes or so, and the error of the tips [m³]."""
-    cube: Array
-    """Nodes on the faces of the unit cube of the free bundles, shape (n, 3)."""
-    area: Array
-    """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
+    value: float  # signed volume [m³]: below zero if the map turns the orientation over
+    error: float  # estimated error: from half as many nodes or so, and the error of the tips [m³]
+    cube: Array  # nodes on the faces of the unit cube of the free bundles, (n, 3)
+    area: Array  # area vectors of the nodes, with their weights [m²], (n, 3)
 
 
 def _of_triangles(tip_map: TipMap, enough: float) -> Flux:

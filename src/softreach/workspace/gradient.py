@@ -248,10 +248,8 @@ class _Sum(NamedTuple):
     """Sums over nodes, by all parameters, shape (parameters,) each."""
 
     value: Array
-    size: Array
-    """Of the terms without their signs."""
-    error: Array
-    """By ∂r/∂p, and by where lines of sight lie."""
+    size: Array  # of the terms without their signs
+    error: Array  # by ∂r/∂p, and by where lines of sight lie
 
 
 def _sum(nodes: BoundarySamples | HullCorners | Flux | Wrap, tips: TipDerivatives) -> _Sum:
@@ -337,12 +335,9 @@ class MovingBoundary:
     there, to first order, by itself.
     """
 
-    places: Array
-    """Centers of the triangles [m], shape (n, 3)."""
-    area: Array
-    """Their areas [m²], shape (n,)."""
-    swept: Array
-    """v · A [m³ per unit], shape (n, parameters)."""
+    places: Array  # centers of the triangles [m], (n, 3)
+    area: Array  # their areas [m²], (n,)
+    swept: Array  # v · A [m³ per unit], (n, parameters)
 
     @classmethod
     def of(cls, solid: ReachableSet, parameters: Sequence[Parameter]) -> MovingBoundary:
@@ -421,14 +416,10 @@ class BoundarySamples:
     flows through the boundary, theory (98), and need no normals.
     """
 
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, dimension)."""
-    places: Array
-    """Places [m], shape (n, 3)."""
-    area: Array
-    """Outward area vectors [m²], shape (n, 3)."""
-    group: Index
-    """Number of the set of lines that each is on: an axis, and every other line, shape (n,)."""
+    cube: Array  # in the unit cube of the free bundles, (n, dimension)
+    places: Array  # places [m], (n, 3)
+    area: Array  # outward area vectors [m²], (n, 3)
+    group: Index  # number of the set of lines that each is on: an axis, and every other line, (n,)
 
     def derivative(self, slopes: Array, weights: Array | None = None) -> Array:
         """Derivatives of the volume, swept by the boundary, theory (98), shape (parameters,).

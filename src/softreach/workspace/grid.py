@@ -93,18 +93,12 @@ class LiftedGrid:
     """The mapped vertices of a grid, and the cells over it."""
 
     tip_map: TipMap
-    tips: Array
-    """[m]: of its nodes in C order, NaN where no posture is held, then others, shape (v, 3)."""
-    is_lifted: Mask
-    """Cells in whose place those of `lifted` are, shape (n,) * m."""
-    lifted: Index
-    """Vertices at the corners of cells, in the order of their bits, shape (k, 2^m)."""
-    lost_share: float = 0.0
-    """Share of activations at which no posture is held [-]."""
-    hysteresis_share: float = 0.0
-    """Share of activations at which two are held on one side [-]."""
-    finer: LiftedGrid | None = None
-    """A grid without sheets of which this has every so many nodes."""
+    tips: Array  # [m]: of its nodes in C order, NaN where no posture is held, then others, (v, 3)
+    is_lifted: Mask  # cells in whose place those of `lifted` are, (n,) * m
+    lifted: Index  # vertices at the corners of cells, in the order of their bits, (k, 2^m)
+    lost_share: float = 0.0  # share of activations at which no posture is held [-]
+    hysteresis_share: float = 0.0  # share of activations at which two are held on one side [-]
+    finer: LiftedGrid | None = None  # a grid without sheets of which this has every so many nodes
 
     @classmethod
     def of(

@@ -79,18 +79,12 @@ def covered_cubes(covered: Mask) -> Mask:
 class Spans(NamedTuple):
     """Pieces of lines of sight between crossings, line by line, upwards."""
 
-    column: Index
-    """Index of the line, (i, j) as i · width + j over the two axes that follow, cyclically."""
-    start: Array
-    """Beginning of the piece, in cells."""
-    length: Array
-    """Length of the piece, in cells; 0 after the last crossing of a line."""
-    cover: Index
-    """Number of activations that reach it."""
-    degree: Index
-    """Those of which the map keeps the orientation minus those that it turns over."""
-    triangle: Index
-    """Number of the critical triangle where it begins."""
+    column: Index  # its line (i, j) as i · width + j over the axes that follow, cyclically
+    start: Array  # beginning of the piece, in cells
+    length: Array  # length of the piece, in cells; 0 after the last crossing of a line
+    cover: Index  # number of activations that reach it
+    degree: Index  # those of which the map keeps the orientation minus those that it turns over
+    triangle: Index  # number of the critical triangle where it begins
 
 
 @dataclass(frozen=True, eq=False)

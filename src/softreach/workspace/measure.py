@@ -194,12 +194,9 @@ HullOf = Callable[[Points], Faces]
 class HullCorners(NamedTuple):
     """Activations whose tips are the corners of a convex hull."""
 
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, dimension)."""
-    tips: Array
-    """[m], shape (n, 3)."""
-    faces: Faces
-    """Outwards, shape (f, 3); edges of a hull in the plane z = 0, shape (e, 2)."""
+    cube: Array  # in the unit cube of the free bundles, (n, dimension)
+    tips: Array  # [m], (n, 3)
+    faces: Faces  # outwards, (f, 3); edges of a hull in the plane z = 0, (e, 2)
 
     @classmethod
     def of(cls, tips: Array, cube: Array, hull_of: HullOf = convex_faces) -> Self:
@@ -231,8 +228,7 @@ class HullCorners(NamedTuple):
 class ConvexHull(NamedTuple):
     """A hull of tips, the one that it was climbed from, and the volume of the image's own."""
 
-    volume: Estimate
-    """The middle between two bounds, and half of what is between them [m³]."""
+    volume: Estimate  # the middle between two bounds, and half of what is between them [m³]
     corners: HullCorners
     before: HullCorners
 

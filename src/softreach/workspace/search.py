@@ -42,10 +42,8 @@ CLEARLY = 0.02
 class Stop(NamedTuple):
     """When a search gives up that gets no nearer to its target."""
 
-    settled: float
-    """Gain that the linear map promises, of the distance [-]."""
-    most: int
-    """Steps."""
+    settled: float  # gain that the linear map promises, of the distance [-]
+    most: int  # steps
 
 
 ROUGHLY = Stop(settled=1e-3, most=30)
@@ -181,13 +179,9 @@ def nearest_tips(
 class Nearest(NamedTuple):
     """Ends of searches: local minima of the distance, one for each target."""
 
-    gamma: Array
-    """Activations within the bounds, shape (n, bundles)."""
-    tips: Array
-    """Their tips [m], shape (n, 3)."""
-    distance: Array
-    """From tip to target [m], shape (n,); infinite where a search began without a stable
-    equilibrium."""
+    gamma: Array  # activations within the bounds, (n, bundles)
+    tips: Array  # their tips [m], (n, 3)
+    distance: Array  # to the target [m], (n,); infinite where a start has no equilibrium
 
 
 def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest: Nearest) -> None:

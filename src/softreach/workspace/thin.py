@@ -170,14 +170,10 @@ def planar_set(tip_map: TipMap, plane: Plane, accuracy: float, progress: Progres
 
 
 class _Outline(NamedTuple):
-    tips: Array
-    """Shape (n, 3)."""
-    gamma: Array
-    """Activations that lead to them, shape (n, bundles)."""
-    edges: Index
-    """From each tip to the next of its curve, shape (e, 2)."""
-    centers: Array
-    """Of cells that are reached [m], shape (c, 3)."""
+    tips: Array  # (n, 3)
+    gamma: Array  # activations that lead to them, (n, bundles)
+    edges: Index  # from each tip to the next of its curve, (e, 2)
+    centers: Array  # of cells that are reached [m], (c, 3)
 
     @classmethod
     def of(cls, grid: ReachedGrid) -> _Outline:

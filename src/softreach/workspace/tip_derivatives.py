@@ -97,12 +97,9 @@ def _neighbors(tip_map: TipMap, shifts: Shifts, fewest: int) -> list[tuple[float
 class Shifts:
     """Designs at offsets of a parameter, and the rules for its derivative."""
 
-    offsets: Array
-    """Change of the parameter in steps, whole numbers, shape (n,)."""
-    step: float
-    """Size of a step, in the unit of the parameter."""
-    arms: tuple[Manipulator, ...]
-    """The designs, in the same order; the design itself at 0."""
+    offsets: Array  # change of the parameter in steps, whole numbers, (n,)
+    step: float  # size of a step, in the unit of the parameter
+    arms: tuple[Manipulator, ...]  # the designs, in the same order; the design itself at 0
 
     @lazy
     def weights(self) -> Array:
