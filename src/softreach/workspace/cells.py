@@ -84,11 +84,10 @@ class Wrap(Surface):
 
     @lazy
     def volume_of_tips(self) -> Estimate:
-        """The same; of a sheet that is far thinner than cells, its thickness over its area [m³].
+        """Volume inside of the tips; of a thin sheet, its thickness over its area [m³].
 
-        No search for the nearest tip sees so small a change; so from each vertex the tip is pushed
-        along its normal, to which all columns of ∂r/∂γ are nearly square, to both sides. It errs by
-        where tips count as found and by their own errors.
+        There from each vertex the tip is pushed along its normal, to which all columns of ∂r/∂γ are
+        nearly square, to both sides: no search for the nearest tip sees so small a change.
         """
         half = 0.5 * self.area
         thickness = self.tight_volume / half if half > 0.0 else np.inf
@@ -141,7 +140,7 @@ def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
     places = grid.lattice.places(at)
     first, second = (
         nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * grid.lattice.cell)
-        for cells in (end.astype(np.int64) @ grid.steps for end in (np.floor(at), np.ceil(at)))
+        for cells in (end(at).astype(np.int64) @ grid.steps for end in (np.floor, np.ceil))
     )
     closer = second.distance < first.distance
     for kept, new in zip(first, second, strict=True):
@@ -150,11 +149,7 @@ def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
 
 
 def wrapped(grid: ReachedGrid) -> Wrap:
-    """The surface around what was found.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
-    """
+    """The surface around what was found."""
     at, faces = level_set(grid.distances, DISTANCE)
     gamma, tips, _ = drawn_tight(grid, at)
     cell, away = grid.lattice.cell, grid.lattice.places(at) - tips
@@ -260,9 +255,7 @@ class ReachedCells:
         for corner in (np.rint(at), *(np.floor(at) + corner for corner in _CORNERS)):
             index = corner.astype(np.int64)
             within = ((index >= 0) & (index < self.lattice.shape)).all(axis=1)
-            cells = np.ravel_multi_index(
-                tuple(np.where(within, i, 0) for i in index.T), self.lattice.shape
-            )
+            cells = self.grid.steps @ (index.T * within)
             yield within & (self.grid.gap[cells] == 0.0), self.grid.gamma[cells]
 
     @lazy
@@ -285,14 +278,7 @@ def smallest_memory(tip_map: TipMap) -> float:
 def searched_set(
     tip_map: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
 ) -> ReachedCells:
-    """The image of a box of four free bundles or more, whose arguments are those of the set.
-
-    Cells become smaller until the volume is as accurate as asked, or the memory is used.
-
-    Raises:
-        InvalidInput: No activation has a stable equilibrium, too little memory, or cells too small
-            for it.
-    """
+    """The image of a box of more bundles, on cells as small as accuracy asks or memory allows."""
     least = smallest_memory(tip_map)
     memory = max(free_memory() / 4.0, least) if memory is None else memory
     if memory < least:
@@ -310,10 +296,8 @@ def searched_set(
         return all_reached(ReachedGrid(tip_map, shifted_lattice(tips, edge), progress), *cloud)
 
     coarse = wrapped(of_cells(_FINER * edge))
-    begin = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))[
-        :, tip_map.box.free
-    ]
-    hull = climbed_hull(tip_map, begin.clip(0.0, 1.0), accuracy)
+    begin = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))
+    hull = climbed_hull(tip_map, begin[:, tip_map.box.free].clip(0.0, 1.0), accuracy)
     while True:
         grid = of_cells(edge)
         cells = ReachedCells(grid, cloud, wrapped(grid), coarse, hull)
@@ -323,17 +307,14 @@ def searched_set(
 
 
 def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: float) -> bool:
-    """True if an accuracy is not met but may be, by cells that are no smaller than allowed.
-
-    Where nothing is seen between both sides of a sheet, its error falls as the square of the edge,
-    until the sheet is thin enough for its thickness to be found.
-    """
+    """True if an accuracy is not met but may be, by cells that are no smaller than allowed."""
     edge = cells.lattice.cell
     value, error = cells.volume
     if error <= accuracy * value or edge / _FINER < smallest:
         return False
     if cells.is_thick:
         return True
+    # The error of a sheet falls as the square of the edge, until its thickness can be found.
     is_sheet = cells.wrap.volume_of_tips.value != cells.wrap.tight_volume
     needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(value, 0.0) / error)
     return needed >= of_sheets
@@ -342,11 +323,9 @@ def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: 
 def cells_of(
     tip_map: TipMap, cell: float, inside: Callable[[Array], Mask] | None = None
 ) -> ReachedCells:
-    """What any number of free bundles reach, without its hull.
+    """What any number of free bundles reach, on 96 cells along the longest side at most, no hull.
 
-    The edge of a cell [m] is larger where it takes more than 96 along the longest side. A mask of
-    places (n, 3) [m] that are known to be reached spares searches; then nothing but the surface is
-    right.
+    With places `inside` that are known to be reached, nothing but the surface is right.
     """
     cloud = cloud_on_faces(tip_map, 0)
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)

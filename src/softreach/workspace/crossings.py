@@ -65,8 +65,8 @@ class Crossings:
             beyond=grid.gamma[outside],
             place=np.zeros(n),
         )
-        crossings._cut(np.arange(n))
-        crossings.enclose(np.arange(n))
+        crossings._cut(np.arange(n), grid.tip_map.tips(crossings.beyond))
+        crossings._enclose(np.arange(n))
         return crossings
 
     def coordinates(self, which: Index, t: Array) -> Array:
@@ -79,7 +79,7 @@ class Crossings:
         """The same [m]."""
         return self.lattice.places(self.coordinates(which, t))
 
-    def enclose(self, which: Index) -> None:
+    def _enclose(self, which: Index) -> None:
         """Bring `low` and `high` together on some of the edges."""
         guess = np.ones(len(which), bool)  # whether to trust the tangent plane
         for _ in range(_ROUNDS):
@@ -90,7 +90,7 @@ class Crossings:
             low, high, place = self.low[which], self.high[which], self.place[which]
             probe = np.minimum(low + _PROBE, 0.5 * (low + high))
             tangent = np.clip(place, low + 0.5 * _PROBE, high - 0.1 * _PROBE)
-            t = np.where(guess, np.where(place > low + 0.5 * _PROBE, tangent, probe), probe)
+            t = np.where(guess & (place > low + 0.5 * _PROBE), tangent, probe)
             probed = t == probe
             start = np.where(probed[:, None], self.gamma[which], self.beyond[which])
             reached, nearest = self._search(which, t, start)
@@ -111,10 +111,8 @@ class Crossings:
         self.gamma[which[reached]] = nearest.gamma[reached]
         return reached, nearest
 
-    def _cut(self, which: Index, tips: Array | None = None) -> None:
+    def _cut(self, which: Index, tips: Array) -> None:
         """Cut the edges by the planes through the tips nearest to `high`, square to the way."""
-        if tips is None:
-            tips = self.tip_map.tips(self.beyond[which])
         away = (self.points(which, self.high[which]) - tips) / self.lattice.cell
         distance = np.linalg.norm(away, axis=1).clip(1e-12)
         along = away[np.arange(len(which)), self.axis[which]] * self.sense[which] / distance
@@ -130,7 +128,7 @@ class Crossings:
         self.high[yes] = np.maximum(self.high[yes], 1.0)
         self.beyond[yes] = self.gamma[yes]
         self.place[yes] = 0.5 * (self.low[yes] + 1.0)
-        self.enclose(yes)
+        self._enclose(yes)
         return self.place[which] - before
 
 
@@ -188,9 +186,8 @@ def runs_along(crossings: Crossings, axis: int) -> Runs:
 def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
     """What each run adds to the length that is reached on its line, in cells, shape (runs,).
 
-    Every so many centers are looked at, from the one of number `parity` on. A stretch shorter than
-    the spacing s holds a center with a chance of length / s only: counted as s where it does, it is
-    right on average over where the centers lie. So are gaps.
+    Every so many centers are looked at, from number `parity` on. A stretch or a gap shorter than
+    the spacing s holds one with a chance of length / s only: counted as s, it is right on average.
     """
     length = np.maximum(runs.end - runs.start, 0.0)
     seen = (runs.last - parity) // spacing * spacing + parity >= runs.first
@@ -206,10 +203,8 @@ def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
 def line_volume(crossings: Crossings) -> Estimate:
     """Volume from the lines along all three axes [m³]; each counts by the square of its lines.
 
-    On average over where the lattice lies the sum of lengths is the volume, so that what it errs by
-    is noise. Every other line along each axis, looked at on every other center, tells how much: the
-    noise of twice the spacing, which at the spacing itself is no more than half of it; so
-    does how far the axes are apart. Two standard deviations of both together are stated.
+    Its error is noise by where the lattice lies: half of what every other line on every other
+    center tells of each axis, and how far the axes are apart; two standard deviations of both.
     """
     lattice = crossings.lattice
     axes = [runs_along(crossings, axis) for axis in range(3)]
@@ -229,7 +224,5 @@ def line_volume(crossings: Crossings) -> Estimate:
 def _sparse(runs: Runs) -> Array:
     """Sums of lengths from every other line along both directions and every other center, (8,)."""
     i, j = np.divmod(runs.line, runs.width)
-    sums = (length_sum(runs, 2, parity) for parity in range(2))
-    return (
-        4.0 * np.array([np.bincount(2 * (i % 2) + j % 2, each, 4) for each in sums], float).ravel()
-    )
+    group, sums = 2 * (i % 2) + j % 2, (length_sum(runs, 2, parity) for parity in range(2))
+    return 4.0 * np.array([np.bincount(group, each, 4) for each in sums], float).ravel()

@@ -16,7 +16,7 @@ from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
 from softreach.kernels.image import contour, raster
 from softreach.picture.shading import vertex_normals
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, joined, rows
 from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
@@ -111,11 +111,9 @@ class Image:
 
     @property
     def is_one_to_one(self) -> bool:
-        """True if no place is found to be reached twice.
+        """True if det J keeps its sign at the vertices, and no line of sight meets a second layer.
 
-        det J keeps its sign at the vertices, and no line of sight meets a second layer, or one that
-        both orientations cover. Pieces that none covers may have a degree: walls thinner than the
-        triangles are flat cross each other.
+        Pieces that none covers may have a degree: walls thinner than triangles are flat cross.
         """
         dets = self.grid.jacobian_dets
         return bool(dets.min() * dets.max() > 0.0) and all(
@@ -184,9 +182,8 @@ class Image:
     def signed_field(self) -> Array:
         """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
 
-        Along each axis the boundary is located to rounding between two centers. A plane that cuts
-        the axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between
-        centers gives the crossings back, to second order in the cell on a curved boundary.
+        A plane that cuts the axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear
+        interpolation between centers gives the crossings back, to second order in the cell.
         """
         inverse_square = np.zeros(self.lattice.shape)
         for axis in range(3):
@@ -223,19 +220,12 @@ class Image:
         return counts.reshape(shape), degrees.reshape(shape)
 
     def counts_at(self, points: Array) -> Index:
-        """Cover counts at any points [m], exactly but for rounding to units, shape (n,).
-
-        As `counts`, but nowhere below zero.
-        """
+        """Cover counts of 0 or more at any points [m], but for rounding to units, shape (n,)."""
         where = np.rint(self.lattice.coordinates(points) * self.unit)
-        out = np.empty(len(where), np.int64)
-        shape = self.lattice.shape[:2]
+        out, shape = np.empty(len(where), np.int64), self.lattice.shape[:2]
+        image = self.vertices, self.triangles, self.unit, shape, *self._bins
         parallel.run(
-            partial(
-                raster.cover_at,
-                *(self.vertices, self.triangles, self.unit, shape, *self._bins),
-                *(where[block], out[block]),
-            )
+            partial(raster.cover_at, *image, where[block], out[block])
             for block in parallel.blocks(len(where), _POINTS)
         )
         return np.maximum(out, 0)
@@ -273,20 +263,18 @@ class Image:
 
     def _crossings(self, axis: int) -> raster.Crossings:
         p, q = (axis + 1) % 3, (axis + 2) % 3
-        blocks = parallel.blocks(len(self.triangles), _TRIANGLES)
+        blocks, width = parallel.blocks(len(self.triangles), _TRIANGLES), self.lattice.shape[q]
         parts: list[raster.Crossings] = [raster.empty_crossings(0)] * len(blocks)
 
         def task(number: int) -> None:
-            rows = self.triangles[blocks[number]]
-            size = raster.most_crossings(self.vertices, rows, self.unit, p, q)
-            out = raster.empty_crossings(size)
-            width = self.lattice.shape[q]
-            used = raster.crossings(self.vertices, rows, self.unit, axis, width, out)
+            part = self.vertices, self.triangles[blocks[number]], self.unit
+            out = raster.empty_crossings(raster.most_crossings(*part, p, q))
+            used = raster.crossings(*part, axis, width, out)
             out.triangle[:used] += blocks[number].start
-            parts[number] = raster.first_crossings(out, used)
+            parts[number] = rows(out, slice(used))
 
         parallel.run(partial(task, number) for number in range(len(blocks)))
-        return raster.joined_crossings(parts)
+        return joined([raster.empty_crossings(0), *parts])
 
 
 def _twice_area(a: Array, b: Array) -> Array:
@@ -364,11 +352,7 @@ def _critical_triangles(
 def boundary_surface(image: Image, volume: float) -> Surface:
     """The closed surface around a volume where the field is constant, by marching cubes.
 
-    The image of a grid is a little small where it is convex: a small offset, the same everywhere,
-    gives the surface the extrapolated volume.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
+    The image of a grid is a little small where it is convex: the same offset everywhere mends it.
     """
     surface = _level_set(image, 0.0)
     if surface.area == 0.0:
@@ -388,12 +372,8 @@ def _level_set(image: Image, level: float) -> Surface:
 def wrapped_surface(image: Image, volume: float) -> Surface:
     """A closed surface around a volume without teeth and holes, however thin and rough parts are.
 
-    It is the level set one cell away from the image, evened out, each of whose vertices is then
-    moved back along its normal, all as far, until the stated volume is enclosed. Gaps below two
-    cells are filled.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
+    The level set one cell away from the image is evened out, and all its vertices are moved back as
+    far along their normals as encloses the volume. Gaps below two cells are filled.
     """
     vertices, faces = level_set(gaussian_filter(_distances(image), _EVENED), _AWAY)
     places = image.lattice.places(vertices)

@@ -205,11 +205,8 @@ class ReachableSet:
             fields |= {"count": counts.clip(0), "degree": degrees}
         variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
         lattice = self.image.lattice
-        attrs = {
-            **provenance(self.arm, self.tip_map.frame),
-            "cell": lattice.cell,
-            "length": self.tip_map.length,
-        }
+        attrs = provenance(self.arm, self.tip_map.frame)
+        attrs |= {"cell": lattice.cell, "length": self.tip_map.length}
         return xr.Dataset(variables, lattice.centers(), attrs)
 
     @lazy
@@ -328,13 +325,12 @@ class ReachableSet:
         if self.covering is not None:
             attrs |= {"route": self.route, "cell": self.covering.lattice.cell}
         dataset = xr.Dataset(self._numbers(), attrs=attrs)
-        if not self.multiplicity:
-            return dataset
-        name = {"units": "m3", "long_name": "volume that so many activations reach"}
-        volumes = xr.Variable("activations", list(self.multiplicity.values()), name)
-        return dataset.assign_coords(activations=list(self.multiplicity)).assign(
-            multiplicity=volumes
-        )
+        if self.multiplicity:
+            name = {"units": "m3", "long_name": "volume that so many activations reach"}
+            volumes = "activations", list(self.multiplicity.values()), name
+            dataset = dataset.assign_coords(activations=list(self.multiplicity))
+            dataset["multiplicity"] = volumes
+        return dataset
 
     def _numbers(self) -> _Stored:
         if not self.dimension:

@@ -55,34 +55,23 @@ CLOSELY = Stop(settled=1e-13, most=1000)
 class ReachedGrid:
     """Cell centers that are reached, grown from tips of a cloud to their neighbors.
 
-    A center is reached if a search that starts at a neighbor's activation, or at that of a tip
-    nearby, ends on it. Centers that are not have the distance to the nearest tip found, and its
-    activation: a tip that comes closer starts another search. Of a flat set, whose plane is the
-    third of five layers of the lattice, only centers in the plane are searched.
+    A center is reached if a search from the activation of a neighbor, or of a tip nearby, ends on
+    it. Others have the distance to the nearest tip found, and its activation. Of a flat set only
+    centers in its plane, the third of five layers of the lattice, are searched.
     """
 
     def __init__(
-        self,
-        tip_map: TipMap,
-        lattice: Lattice,
-        progress: Progress = silent,
-        *,
-        is_flat: bool = False,
+        self, tip_map: TipMap, lattice: Lattice, progress: Progress = silent, is_flat: bool = False
     ) -> None:
         self.tip_map, self.lattice = tip_map, lattice
         self.progress, self.is_flat = progress, is_flat
-        size = int(np.prod(lattice.shape))
-        self.gap = np.full(size, np.inf)
-        """Distance from a center to the nearest tip found, in cells; 0 where reached; -1 at the
-        sides of the lattice, where nothing is searched."""
-        self.gamma = np.zeros((size, tip_map.box.bundles))
-        """Its activation, meaningless where `gap` is infinite."""
         _, ny, nz = lattice.shape
-        sides = np.ones(lattice.shape, bool)
-        inner = slice(2, -2) if is_flat else slice(1, -1)  # of five layers in a plane one
-        sides[1:-1, 1:-1, inner] = False
-        self.gap[sides.ravel()] = -1.0
         self.steps = np.array([ny * nz, nz, 1])
+        # Of each center the distance to the nearest tip found in cells, 0 where reached, -1 at the
+        # sides of the lattice, where nothing is searched; and its activation, where that is finite.
+        gap = np.full(lattice.shape, -1.0)
+        gap[1:-1, 1:-1, slice(2, -2) if is_flat else slice(1, -1)] = np.inf
+        self.gap, self.gamma = gap.ravel(), np.zeros((gap.size, tip_map.box.bundles))
 
     @property
     def reached(self) -> Mask:
@@ -141,11 +130,10 @@ class ReachedGrid:
     def search(self, cells: Index, starts: Array) -> None:
         """Search for centers, and keep what comes closer."""
         cell = self.lattice.cell
-        for first in range(0, len(cells), _CHUNK):
-            some = cells[first : first + _CHUNK]
-            nearest = nearest_tips(
-                self.tip_map, starts[first : first + _CHUNK], self.centers(some), ENOUGH * cell
-            )
+        for block in parallel.blocks(len(cells), _CHUNK):
+            some = cells[block]
+            centers = self.centers(some)
+            nearest = nearest_tips(self.tip_map, starts[block], centers, ENOUGH * cell)
             gap = nearest.distance / cell
             gap[gap <= ENOUGH] = 0.0
             closer = gap < self.gap[some]
@@ -159,12 +147,11 @@ def nearest_tips(
 ) -> Nearest:
     """The activations whose tips come closest to targets, as far as a descent from `start` finds.
 
-    Starts are within the bounds, shape (n, bundles), and each has a target, shape (n, 3) [m], which
-    counts as reached at the distance `enough` [m]. Only stable equilibria are taken.
+    Starts (n, bundles) are within the bounds, and each has a target (n, 3) [m], which counts as
+    reached at the distance `enough` [m]. Only stable equilibria are taken.
     """
     gamma = np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
-
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
     blocks = parallel.blocks(len(targets), share)
@@ -216,10 +203,7 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
 
 
 def all_reached(grid: ReachedGrid, gamma: Array, tips: Array) -> ReachedGrid:
-    """All centers that searches find, from one cloud after the other until one finds no more.
-
-    And the distances of those around to the nearest tips.
-    """
+    """Centers that searches from clouds find until one finds no more, and distances around."""
     grid.add(gamma, tips)
     for number in range(1, _CLOUDS):
         while not grid.fits():
@@ -228,10 +212,10 @@ def all_reached(grid: ReachedGrid, gamma: Array, tips: Array) -> ReachedGrid:
         grid.add(*cloud_on_faces(grid.tip_map, number))
         if grid.fits() and np.count_nonzero(grid.gap == 0.0) == before:
             break
-    spread(grid)
+    _spread(grid)
     while not grid.fits(DISTANCE):
         grid = _wider(grid)
-        spread(grid)
+        _spread(grid)
     return grid
 
 
@@ -253,8 +237,7 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     """Activations on faces of all dimensions of the box, and their tips."""
     if isinstance(tip_map, AllPostures):
         return tip_map.with_sheets(*cloud_on_faces(tip_map.from_rest, seed))
-    box, rng = tip_map.box, np.random.default_rng(seed)
-    m = box.dimension
+    box, m, rng = tip_map.box, tip_map.box.dimension, np.random.default_rng(seed)
     cube = rng.random((CLOUD, m))
     free = np.maximum(rng.integers(0, m + 1, CLOUD), 2)
     bound = rng.random((CLOUD, m)).argsort(axis=1) >= free[:, None]
@@ -267,7 +250,7 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     return gamma[stable], tips[stable]
 
 
-def spread(grid: ReachedGrid) -> None:
+def _spread(grid: ReachedGrid) -> None:
     """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
     offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ grid.steps
     offsets = offsets[offsets != 0]

@@ -71,8 +71,7 @@ def thin_set(tip_map: TipMap) -> ReachableSet:
 def by_nodes(tip_map: TipMap) -> Estimate:
     """Length [m] or area [m²] of the image, ∫ √det(JᵀJ) dγ, and how fewer Gauss nodes change it.
 
-    As the map is smooth, the error falls faster than any power of the number of nodes. Places count
-    as often as they are reached. NaN if a node has no stable equilibrium.
+    Places count as often as they are reached; NaN if a node has no stable equilibrium.
     """
     box, tip_map, values = tip_map.box, refined(tip_map, _TOL), list[float]()
     for nodes in _NODES:
@@ -87,10 +86,10 @@ def by_nodes(tip_map: TipMap) -> Estimate:
 
 
 def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
-    """Length or area of the image, by Gauss nodes where it is one smooth sheet.
+    """Length or area of the image, by Gauss nodes where it is one smooth sheet, else by cells.
 
-    Else it is that of cells, as chords or triangles. What these err by, O(1/n²), is removed. Where
-    the map has kinks, or sheets end, it is O(1/n): the largest change by a finer grid is stated.
+    What these err by, O(1/n²), is removed. Where the map has kinks, or sheets end, it is O(1/n):
+    the largest change by a finer grid is stated.
     """
     if tip_map.is_smooth and not grid.is_torn and np.isfinite(smooth := by_nodes(tip_map)).all():
         return smooth
@@ -107,11 +106,8 @@ def _size(grid: LiftedGrid) -> float:
 
 
 def _convex_volume(grid: LiftedGrid) -> Estimate:
-    """Volume of the convex hull of mapped vertices [m³].
-
-    It is too small by O(1/n²): a grid with a quarter of the cells along each axis differs by 15
-    times the error. A tenth of the difference is stated.
-    """
+    """Volume of the convex hull of mapped vertices [m³]."""
+    # A grid with a quarter of the cells along each axis differs by 15 times the error O(1/n²).
     tips = (each.tips[np.isfinite(each.tips[:, 0])] for each in (grid, grid.coarser(4)))
     fine, coarse = (convex_hull(points).volume for points in tips)
     return Estimate(fine, abs(fine - coarse) / 10.0)
@@ -126,13 +122,7 @@ def plane_of_tips(tip_map: TipMap) -> Plane | None:
 
 
 def planar_set(tip_map: TipMap, plane: Plane, accuracy: float, progress: Progress) -> ReachableSet:
-    """The region that two bundles or more reach in a plane, as `searched_set` finds volumes.
-
-    The area is as accurate as asked; the progress counts centers that are searched.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
-    """
+    """The region that two bundles or more reach in a plane, as `searched_set` finds volumes."""
     turned = Base(
         points=tuple(map(tuple, plane.rotation.tolist())),  # pyright: ignore[reportArgumentType]
         position=tuple((-plane.rotation @ plane.origin).tolist()),  # pyright: ignore[reportArgumentType]

@@ -9,7 +9,6 @@ counts as behind it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -41,17 +40,6 @@ def empty_crossings(size: int) -> Crossings:
     """Room for as many crossings."""
     column, center, cover, degree, triangle = np.empty((5, size), np.int64)
     return Crossings(column, center, np.empty(size), cover, degree, triangle)
-
-
-def first_crossings(crossing: Crossings, size: int) -> Crossings:
-    """The rows that were written."""
-    return Crossings(*(field[:size] for field in crossing))  # pyright: ignore[reportArgumentType]
-
-
-def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
-    """The rows of all parts."""
-    fields = zip(empty_crossings(0), *parts, strict=True)
-    return Crossings(*(np.concatenate(rows) for rows in fields))
 
 
 @strict
@@ -169,13 +157,7 @@ def center_behind(base, rise, area, unit):
 
 @strict
 def add_counts(crossing, counts, degrees):
-    """Cover counts at the cell centers: what was crossed on the way there.
-
-    Args:
-        crossing: Crossings with lines along the last axis of the grid.
-        counts: Result, zeros before, shape (columns, centers).
-        degrees: The same for orientations.
-    """
+    """Count cover and degrees (columns, centers), 0 before, of crossings along the last axis."""
     for e in range(len(crossing.column)):
         counts[crossing.column[e], crossing.center[e]] += crossing.cover[e]
         degrees[crossing.column[e], crossing.center[e]] += crossing.degree[e]
@@ -187,16 +169,9 @@ def add_counts(crossing, counts, degrees):
 
 @strict
 def bin_triangles(points, triangles, unit, shape):
-    """Triangles over each square of a grid in x and y.
+    """Triangles over each of shape[0] x shape[1] squares in x and y, of an edge `unit`.
 
-    Args:
-        points: Mapped vertices, whole numbers, shape (n, 3).
-        triangles: Rows of `contour.critical_triangles`.
-        unit: Edge of a square.
-        shape: Number of squares along x and y.
-
-    Returns:
-        Triangles of square 0, of square 1, ..., and where each square's begin.
+    Returned are those of square 0, of square 1, ..., and where each square's begin.
     """
     starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
     for t in range(len(triangles)):
@@ -227,18 +202,7 @@ def squares(points, triangles, t, unit, axis):
 
 @strict
 def cover_at(points, triangles, unit, shape, members, starts, where, out):
-    """Number of tetrahedra that cover each point.
-
-    Args:
-        points: Mapped vertices, whole numbers, shape (n, 3).
-        triangles: Rows of `contour.critical_triangles`.
-        unit: Edge of a square.
-        shape: Number of squares along x and y.
-        members: From `bin_triangles`.
-        starts: From `bin_triangles`.
-        where: Points, whole numbers, shape (k, 3).
-        out: Result, shape (k,).
-    """
+    """Number (k,) of tetrahedra that cover points `where` (k, 3), by what `bin_triangles` made."""
     for n in range(len(where)):
         x, y, z = where[n, 0], where[n, 1], where[n, 2]
         i, j = int(np.floor(x / unit)), int(np.floor(y / unit))
@@ -271,12 +235,8 @@ def side_below(points, triangles, t, x, y, z):
 def claim_corners(points, number, steps, closest, owner):
     """Let each point claim the corners of its cube that none before it is as close to.
 
-    Args:
-        points: In cells from the first center, within the lattice, shape (n, 3).
-        number: Number to write where a point is closest, shape (n,).
-        steps: From a center to the next along each axis in the flat arrays, shape (3,).
-        closest: Distance in cells below which a claim counts, lowered to the closest, flat.
-        owner: Filled with the number of the closest, flat.
+    Points (n, 3) are in cells within the lattice. Where one is closer than `closest`, it is lowered
+    and its number goes to `owner`: flat arrays, in which the next centers are `steps` (3,) away.
     """
     for n in range(len(points)):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]
