@@ -115,10 +115,9 @@ class ImageLeaves:
 
 
 class TornCells(NamedTuple):
-    """Vertices of cells without an image, those that have a tip.
+    """Vertices with tips of cells without an image, of which a corner has no tip or is elsewhere.
 
-    A cell of which some corner has no tip, or is on another branch than the rest, cannot be mapped.
-    Its corners begin searches for the targets that their linearization sees within about a cell.
+    They begin searches for the targets that their linearization sees within about a cell.
     """
 
     gamma: Array  # activations [-], (n, 3)

@@ -76,10 +76,8 @@ def track_path(
     """
     points = as_points("path", path)
     tip_map = measured_bundles(as_tip_map(arm, tol, point=point))
-    if tip_map.box.dimension < 3:
-        raise InvalidInput(
-            "free bundles", tip_map.box.dimension, "3 or more to follow a path in space"
-        )
+    if (free := tip_map.box.dimension) < 3:
+        raise InvalidInput("free bundles", free, "3 or more to follow a path in space")
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
     residual = as_number("residual_over_length", residual_over_length, RESIDUALS)
@@ -174,13 +172,12 @@ class Continuation:
             torn = torn or self._torn
             if isinstance(ahead, BranchEnd):
                 # Where a bound is met, the tip may be as near as tips can tell.
-                beside = self._beside(point, target)
-                if beside is None:
+                if (beside := self._beside(point, target)) is None:
                     return ahead._replace(done=done, error=shortest * distance)
                 ahead = beside
             if isinstance(ahead, BranchPoint):
-                point, done, part = ahead.kept(), 1.0 if last else done + part, 2 * part
-                torn = False
+                point, torn = ahead.kept(), False
+                done, part = 1.0 if last else done + part, 2 * part
             elif part * ahead < (shortest_torn if torn else shortest):
                 if (beside := self._beside(point, end)) is not None:
                     return BranchEnd(PathStatus.FOLLOWED, beside, done=1.0)
@@ -191,10 +188,7 @@ class Continuation:
         return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
 
     def _predicted(self, point: BranchPoint, target: Array) -> BranchPoint | BranchEnd | float:
-        """Predict and correct; bundles that would leave their bounds are held there.
-
-        A number says by how much to shorten the substep.
-        """
+        """Predict and correct, bundles held at bounds; a number says how to shorten the substep."""
         gamma, bundle, upper, self._torn = point.gamma, -1, False, False
         moving = self.box.is_free
         while moving.sum() >= 3:

@@ -193,10 +193,10 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
         n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
-        slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
-        low, high = running.low[:n], running.high[:n]
+        at = rows(running, slice(n))
         multiplier[:n] = 0.0
-        project(center[:n], slope, wanted, softness, low, high, step[:n], multiplier[:n])
+        ends = step[:n], multiplier[:n]
+        project(center[:n], at.slope, at.wanted, at.softness, at.low, at.high, *ends)
         next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
     nowhere = nearest.distance >= NOWHERE
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
