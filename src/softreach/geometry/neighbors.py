@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -34,29 +33,17 @@ def mean_value_distance(
 ) -> tuple[Array, Index]:
     """Mean ‖v_j - v_i‖₂ over the other points j within a radius of point i, and how many they are.
 
-    The ball is closed. Point i itself is not counted; another point at the same place is.
-    Neighbors come from all points, whatever the queries.
-
-    Memory is a sorted copy of points (n, 3) and values (n, m) and a few blocks, however many pairs
-    there are; the result does not depend on blocks and threads. Queries are indices of points i,
-    shape (q,), or all; a radius of 0 [m] leaves the points at the same place.
-
-    Returns:
-        Means in the unit of the values, NaN where there is no neighbor, shape (q,); numbers of
-        neighbors, shape (q,).
-
-    Raises:
-        InvalidInput: Points or values that are not finite.
+    The ball is closed, and holds other points at the same place. Points (n, 3) are all neighbors,
+    whatever the queries i (q,). Means (q,) of values (n, m) are NaN where there is no neighbor; the
+    result does not depend on blocks and threads.
     """
     points, values = as_points("points", points, any_scale=True), check_finite("values", values)
     if len(points) == 0:
         return np.empty(0), np.empty(0, np.intp)
-    columns = _Columns.around(points, float(radius))
+    columns, near = _Columns(points, float(radius)), slice(None)
     if queries is not None and len(points) >= _MANY and len(queries) < _FEW * len(points):
         near = columns.near(points, points[queries])
-        order, cloud = columns.sorted_sample(points[near], values[near])
-    else:
-        order, cloud = columns.sorted_sample(points, values)
+    order, cloud = columns.sorted_sample(points[near], values[near])
     if queries is None:
         return _means(cloud, columns, cloud, order)
     order, chosen = columns.sorted_sample(points[queries], values[queries])
@@ -71,33 +58,22 @@ class _Sample(NamedTuple):
     values: Array  # Shape (m, n)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class _Columns:
     """Space cut into columns along the longest side of a cloud, and these into places."""
 
-    axes: Index
-    low: Array
-    widths: Array
-    reach: float
-    margin: float
-
-    @classmethod
-    def around(cls, points: Array, radius: float) -> _Columns:
-        """Columns at least a radius wide for all points, shape (n, 3)."""
-        low, high = _corners(points)
+    def __init__(self, points: Array, radius: float) -> None:
+        """Cut columns at least a radius wide for all points, shape (n, 3)."""
+        # NumPy is slow along the short axis, so one axis at a time.
+        low, high = np.array([[x.min(), x.max()] for x in points.T]).T
         extent = high - low
-        axes = np.argsort(extent, kind="stable")
-        reach = min(radius, 2.0 * float(extent.sum()))  # all points are nearer than that
-        wide = reach * (1.0 + _SLACK)
-        widths = np.maximum(extent[axes] / _CELLS, [wide, wide, 0.0])
+        self.axes = np.argsort(extent, kind="stable")
+        self.low = low[self.axes]
+        self.reach = min(radius, 2.0 * float(extent.sum()))  # all points are nearer than that
+        wide = self.reach * (1.0 + _SLACK)
         rounding = 2.0**-50 * float(np.abs([low, high]).max())
-        return cls(
-            axes=axes,
-            low=low[axes],
-            widths=np.maximum(widths, rounding / _CELLS + _SMALLEST),
-            reach=reach,
-            margin=wide + rounding,
-        )
+        self.margin = wide + rounding
+        widths = np.maximum(extent[self.axes] / _CELLS, [wide, wide, 0.0])
+        self.widths = np.maximum(widths, rounding / _CELLS + _SMALLEST)
 
     def sorted_sample(self, points: Array, values: Array) -> tuple[Index, _Sample]:
         """Points (n, 3) and values (n, m) in the order of their keys, and that order."""
@@ -155,11 +131,6 @@ def _sums(cloud: _Sample, columns: _Columns, queries: _Sample, part: slice) -> t
         find_windows(cloud.keys, first + shift, last + shift, start, stop)
         add(cloud.points, cloud.values, places, amounts, start, stop, square, total, count)
     return total, count
-
-
-def _corners(points: Array) -> tuple[Array, Array]:
-    """Lower and upper corner; NumPy is slow along the short axis, so one axis at a time."""
-    return np.array([x.min() for x in points.T]), np.array([x.max() for x in points.T])
 
 
 def _taken(components: Array, order: Index) -> Array:

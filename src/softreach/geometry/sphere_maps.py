@@ -1,8 +1,4 @@
-"""Maps of the unit sphere to itself that turning about an axis does not change.
-
-A meridian goes into its own plane, so that one angle tells all: where the image of the meridian
-passes the pole, a whole circle of latitude goes there.
-"""
+"""Places that maps of the unit sphere to itself take to a value, one by one or by whole circles."""
 
 from __future__ import annotations
 
@@ -42,11 +38,7 @@ _OFF_AXIS = 1e-6
 
 @lru_cache(maxsize=8)
 def icosphere(levels: int) -> tuple[Array, Index]:
-    """An icosahedron whose triangles are quartered some times; not to be written.
-
-    Returns:
-        Points (n, 3), and triangles (20 · 4^levels, 3), counterclockwise from outside.
-    """
+    """Points (n, 3) of an icosahedron whose triangles (20 · 4^levels, 3) are quartered; frozen."""
     if levels:
         return quartered(*icosphere(levels - 1))
     golden = 0.5 * (1.0 + np.sqrt(5.0))
@@ -65,11 +57,7 @@ def icosphere(levels: int) -> tuple[Array, Index]:
 
 
 def quartered(points: Array, triangles: Index) -> tuple[Array, Index]:
-    """Every triangle cut in four at the middles of its sides, which are put onto the sphere.
-
-    Returns:
-        All points, the old ones first, and the new triangles only.
-    """
+    """Triangles cut in four at the middles of sides, on the sphere; and points, old ones first."""
     after = triangles[:, [1, 2, 0]]
     sides = np.minimum(triangles, after) * len(points) + np.maximum(triangles, after)
     keys, which = np.unique(sides, return_inverse=True)
@@ -91,29 +79,16 @@ class Roots(NamedTuple):
 def sphere_roots(
     image: Map, value: Array, *, levels: int, caution: float, starts: Array, most: int = 10_000_000
 ) -> tuple[Roots, bool]:
-    """All places where a smooth map takes a value.
+    """All places where a smooth map takes a value (3,), and whether triangles were cut to flatness.
 
-    Args:
-        image: The map.
-        value: A unit vector, shape (3,).
-        levels: How often the triangles of the first mesh are quartered.
-        caution: How near an image must come to the value to be cut further, in its sags.
-        starts: Where to look too, shape (n, 3).
-        most: Largest number of images, about.
-
-    Returns:
-        The places, and whether the triangles were few enough to be cut until they were flat, or
-        smaller than a millionth.
+    Those of the icosphere of some levels are cut further where their images come within `caution`
+    of their sags of the value, with `most` images or so. Other starts (n, 3) are looked at, too.
     """
     frame = np.array([*tangents_at(value[None])[:, 0], value])
-
-    def seen(points: Array) -> Array:
-        return image(points) @ frame.T
-
-    centers, settled = _candidates(seen, levels, caution, most // 2)
+    centers, settled = _candidates(lambda x: image(x) @ frame.T, levels, caution, most // 2)
     every = 1 + len(centers) * _IMAGES_OF_ROOT * 2 // most
-    centers, settled = centers[::every], settled and every == 1
-    return polished_roots(image, value, np.concatenate([starts, centers])), settled
+    roots = polished_roots(image, value, np.concatenate([starts, centers[::every]]))
+    return roots, settled and every == 1
 
 
 def _candidates(seen: Map, levels: int, caution: float, most: int) -> tuple[Array, bool]:
@@ -144,12 +119,16 @@ def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
     slopes, missing = np.empty((len(points), 2, 2)), np.full(len(points), np.inf)
     working = np.arange(len(points))
     for _ in range(_TURNS):
-        ahead, slopes[working] = _linearized(image, points[working], across)
+        # Images, and derivatives between the tangent planes by differences.
+        at, tangents = points[working], tangents_at(points[working])
+        turned = _DIFFERENCE * tangents
+        places = np.concatenate([at[None], at + turned, at - turned])
+        images = image(_unit(places.reshape(-1, 3))).reshape(places.shape)
+        change, ahead = (images[1:3] - images[3:]) @ across.T / (2 * _DIFFERENCE), images[0]
+        slopes[working] = np.moveaxis(change, 0, 2)
         missing[working] = np.linalg.norm(ahead - value, axis=1)
         step = _newton(slopes[working], -(ahead @ across.T))
-        first, second = tangents_at(points[working])
-        moved = points[working] + step[:, :1] * first + step[:, 1:] * second
-        points[working] = _unit(moved)
+        points[working] = _unit(at + step[:, :1] * tangents[0] + step[:, 1:] * tangents[1])
         before, last[working] = last[working], np.linalg.norm(step, axis=1)
         # Where the map is nearly singular, rounding alone keeps steps from becoming any smaller.
         at_noise = (last[working] >= before) & (missing[working] < _RESIDUAL)
@@ -162,15 +141,6 @@ def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
         kept.append(int(left[0]))
         left = left[np.linalg.norm(points[left] - points[left[0]], axis=1) > _SAME]
     return Roots(points[kept], np.linalg.det(slopes[kept]))
-
-
-def _linearized(image: Map, points: Array, across: Array) -> tuple[Array, Array]:
-    """Images, and the derivatives between the tangent planes, shape (n, 2, 2)."""
-    turned = _DIFFERENCE * tangents_at(points)
-    places = np.concatenate([points[None], points + turned, points - turned])
-    images = image(_unit(places.reshape(-1, 3))).reshape(places.shape)
-    slopes = (images[1:3] - images[3:]) @ across.T / (2 * _DIFFERENCE)
-    return images[0], np.moveaxis(slopes, 0, 2)
 
 
 def _newton(slopes: Array, missing: Array) -> Array:
@@ -213,10 +183,7 @@ class Rings(NamedTuple):
 
 
 def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
-    """True if turning about a unit vector, and mirroring in a plane through it, changes nothing.
-
-    Images may miss by the tolerance [rad].
-    """
+    """True if turning about an axis, and mirroring through it, changes less than so much [rad]."""
     polar = np.pi * (np.arange(_POLAR) + 0.5) / _POLAR
     around = 2 * np.pi * np.arange(_AROUND) / _AROUND + 0.1
     first, second = tangents_at(axis[None])[:, 0]
@@ -229,10 +196,7 @@ def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
 
 
 def pole_rings(image: Map, axis: Array, near: Array) -> Rings:
-    """All circles of latitude that an axisymmetric map takes to its pole, the axis (3,).
-
-    `near` (3,) is on the meridian that is looked at; any meridian will do for the pole itself.
-    """
+    """Circles of latitude that an axisymmetric map takes to its pole, on the meridian of `near`."""
     aside = near - (near @ axis) * axis
     size = float(np.linalg.norm(aside))
     outward = aside / size if size > _OFF_AXIS else tangents_at(axis[None])[0, 0]
