@@ -22,18 +22,12 @@ Ints = NDArray[np.int64]
 class Crossings(NamedTuple):
     """Crossings of lines of sight and critical triangles, one row each."""
 
-    column: Ints
-    """Number of the line, (i, j) as i · width + j."""
-    center: Ints
-    """Number of the first cell center behind it, or on it."""
-    height: NDArray[np.float64]
-    """Position along the line, in cells."""
-    cover: Ints
-    """By how much the number of covering tetrahedra grows there."""
-    degree: Ints
-    """By how much the sum of their orientations grows there."""
-    triangle: Ints
-    """Number of the triangle."""
+    column: Ints  # number of the line, (i, j) as i · width + j
+    center: Ints  # number of the first cell center behind it, or on it
+    height: NDArray[np.float64]  # position along the line, in cells
+    cover: Ints  # by how much the number of covering tetrahedra grows there
+    degree: Ints  # by how much the sum of their orientations grows there
+    triangle: Ints  # number of the triangle
 
 
 def empty_crossings(size: int) -> Crossings:
@@ -55,18 +49,10 @@ def most_crossings(points, triangles, unit, p, q):
 
 @strict
 def crossings(points, triangles, unit, axis, width, out):
-    """Cross all triangles with the lines of sight through the cell centers, parallel to an axis.
+    """Cross all triangles with lines of sight through cell centers along an axis; their number.
 
-    Args:
-        points: Mapped vertices, whole numbers, shape (n, 3); cell centers are multiples of `unit`.
-        triangles: Rows of `critical_triangles`.
-        unit: Size of a cell, a power of two.
-        axis: Direction of the lines; the other two follow it cyclically.
-        width: Number of cells along the last of the other two.
-        out: Result, of type `Crossings`.
-
-    Returns:
-        Number of crossings written.
+    Points (n, 3) are whole numbers, of which cell centers are multiples of `unit`, a power of two;
+    triangles are rows of `critical_triangles`; `width` cells lie along the axis before, cyclically.
     """
     p, q = (axis + 1) % 3, (axis + 2) % 3
     count = 0
@@ -117,10 +103,7 @@ def extent(points, triangles, t, axis):
 
 @strict
 def upward(points, triangles, t, p, q):
-    """A triangle's vertices, counterclockwise as seen along the line, and which way its normal was.
-
-    1 along the line, -1 against it, 0 if the line grazes it.
-    """
+    """Vertices, counterclockwise along the line; 1, -1 if turned over, 0 if the line grazes it."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     area = twice_area(points, a, b, points[c, p], points[c, q], p, q)
     if area < 0:
