@@ -172,8 +172,7 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
     return as_tip_map(arm, float(cloud.attrs["tol"]), frame=schema.frame_of(cloud))
 
 
-CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}
-"""Format of a stored cloud."""
+CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}  # format of a stored cloud
 
 
 def _write(cloud: xr.Dataset, path: Path) -> None:

@@ -126,7 +126,12 @@ def alpha_hull(
     scaled, exponent = unit_scale(points)
     radius = float(np.ldexp(alpha, -exponent))
     most = min(parallel.threads_here(), len(points) // FEWEST) if boxes is None else boxes
-    pieces = _pieces(scaled, radius, part, _boxes(scaled, radius, most))
+    parts = [WHOLE]
+    if min(most, len(points)) > 1 and np.isfinite(radius):
+        # A sample will do: the boxes decide how long the shape takes, and nothing else.
+        chosen = np.random.default_rng(0).integers(len(points), size=SAMPLED)
+        parts = _divided(scaled[chosen], radius, WHOLE, most)
+    pieces = _pieces(scaled, radius, part, parts)
     faces, regions = _joined(pieces)
     volume, volume_of_part = (
         float(np.ldexp(_sum(np.concatenate(volumes)), 3 * exponent))
@@ -223,15 +228,6 @@ def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
         sets = above
     roots = parent == np.arange(len(parent))
     return faces[~inner & solid[sets]], int(solid[roots].sum())
-
-
-def _boxes(points: Points, alpha: float, most: int) -> list[Array]:
-    """Boxes that together are all of space, with about as many points within alpha of each."""
-    if min(most, len(points)) <= 1 or not np.isfinite(alpha):
-        return [WHOLE]
-    # A sample will do: the boxes decide how long the shape takes, and nothing else.
-    chosen = np.random.default_rng(0).integers(len(points), size=SAMPLED)
-    return _divided(points[chosen], alpha, WHOLE, most)
 
 
 def _divided(sample: Points, alpha: float, box: Array, most: int) -> list[Array]:

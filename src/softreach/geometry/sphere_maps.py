@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from softreach.kernels.points.triangles import FLAT, OPEN, judge_images
 from softreach.support.arrays import Array, Index
 
-Map = Callable[[Array], Array]
-"""Images of unit vectors (n, 3), unit vectors of the same shape."""
+Map = Callable[[Array], Array]  # images of unit vectors (n, 3), unit vectors of the same shape
 
 _MOST_LEVELS = 16
 _MOST_TRIANGLES = 200_000

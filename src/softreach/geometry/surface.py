@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.kernels.points.triangles import distances_to_faces
 from softreach.picture.shading import vertex_normals
-from softreach.support.arrays import Array, Faces, Index, Mask, Points
+from softreach.support.arrays import Array, Faces, Index, Points
 from softreach.support.errors import check_installed
 from softreach.support.lazy import lazy
 
@@ -195,24 +195,19 @@ def plane_cut(surface: Surface, axis: int, at: float) -> list[Array]:
     """
     vertices, faces = np.asarray(surface.vertices, float), np.asarray(surface.faces)
     height = vertices[:, axis] - at
-    pieces = _pieces(faces, height >= 0.0)  # a vertex in the plane counts as above it
+    above = height[faces] >= 0.0  # also a vertex in the plane
+    count = above.sum(axis=1)
+    is_cut = (count == 1) | (count == 2)
+    # Of each triangle that is cut the vertex on its own side, and the two edges from there.
+    first = (above[is_cut] == (count[is_cut] == 1)[:, None]).argmax(axis=1)[:, None]
+    a, b, c = np.take_along_axis(faces[is_cut], (first + np.arange(3)) % 3, axis=1).T
+    pieces = np.sort(np.array([[a, b], [a, c]]).transpose(2, 0, 1), axis=2)
     edges, ends = np.unique(pieces.reshape(-1, 2), axis=0, return_inverse=True)
     low, high = height[edges].T
     share = (low / (low - high))[:, None]
     places = (1.0 - share) * vertices[edges[:, 0]] + share * vertices[edges[:, 1]]
     places[:, axis] = at
     return [places[curve] for curve in _chained(ends.reshape(-1, 2), len(edges))]
-
-
-def _pieces(faces: NDArray[np.integer], above: Mask) -> NDArray[np.integer]:
-    """Of each triangle that is cut, its two edges that are, as vertices, shape (n, 2, 2)."""
-    count = above[faces].sum(axis=1)
-    cut = faces[(count == 1) | (count == 2)]
-    alone = above[cut] == (above[cut].sum(axis=1) == 1)[:, None]
-    first = alone.argmax(axis=1)[:, None]
-    apex, *others = (np.take_along_axis(cut, (first + k) % 3, axis=1)[:, 0] for k in range(3))
-    edges = [np.sort(np.stack([apex, other], axis=1), axis=1) for other in others]
-    return np.stack(edges, axis=1)
 
 
 def _chained(pieces: NDArray[np.integer], count: int) -> list[list[int]]:

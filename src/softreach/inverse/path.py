@@ -82,6 +82,7 @@ def track_path(
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
     residual = as_number("residual_over_length", residual_over_length, RESIDUALS)
     tracker = Continuation(free_bundles(tip_map), residual * tip_map.length)
+    first = None
     if start is not None:
         gamma = as_activations("start", start, tip_map.box, 1)[0]
         gamma = gamma / tip_map.measures[tip_map.box.free]
@@ -89,11 +90,15 @@ def track_path(
     else:
         options = {"residual_over_length": residual, "from_rest": True}
         (solution,) = solve_inverse(tip_map, points[:1], **options)
-        first = None
         if len(solution):
             best = solution.activations[solution.conditions.argmin()] / tip_map.measures
             first = tracker.at(best[tip_map.box.free])
-    followed, end = ([], None) if first is None else _followed(tracker, first, points)
+    end = None if first is None else BranchEnd(PathStatus.FOLLOWED, first.kept())
+    followed = [] if end is None else [end.point]
+    while end is not None and end.status == PathStatus.FOLLOWED and len(followed) < len(points):
+        end = tracker.follow(end.point, *points[len(followed) - 1 : len(followed) + 1])
+        if end.status == PathStatus.FOLLOWED:
+            followed.append(end.point)
     tolerances = {"tol": tip_map.tol, "residual_over_length": residual}
     return _dataset(tip_map, points, followed, end).assign_attrs(tolerances)
 
@@ -303,19 +308,6 @@ class BranchEnd(NamedTuple):
 def _least_norm(slope: Array, moving: Mask) -> Array:
     """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3): theory (39)."""
     return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)
-
-
-def _followed(
-    tracker: Continuation, first: BranchPoint, points: Array
-) -> tuple[list[BranchPoint], BranchEnd]:
-    end = BranchEnd(PathStatus.FOLLOWED, first.kept())
-    followed = [end.point]
-    for k in range(1, len(points)):
-        end = tracker.follow(end.point, points[k - 1], points[k])
-        if end.status != PathStatus.FOLLOWED:
-            break
-        followed.append(end.point)
-    return followed, end
 
 
 def _dataset(

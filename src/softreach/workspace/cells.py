@@ -265,8 +265,7 @@ class ReachedCells:
         return KDTree(np.concatenate([self.wrap.vertices, self.cloud[1]]))
 
 
-Covering = Image | ReachedCells
-"""What a solid covers of space."""
+Covering = Image | ReachedCells  # what a solid covers of space
 
 
 def smallest_memory(tip_map: TipMap) -> float:

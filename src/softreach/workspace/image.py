@@ -22,8 +22,7 @@ from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
 from softreach.workspace.grid import LiftedGrid
 
-DIAGONAL = math.sqrt(3.0)
-"""Of a cell, in edges."""
+DIAGONAL = math.sqrt(3.0)  # of a cell, in edges
 _DET_BITS = 50  # of the largest det J: sums of four are exact in any order
 _BYTES = 16  # of a cell: two counts, and what questions make of them
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
@@ -283,10 +282,7 @@ def _twice_area(a: Array, b: Array) -> Array:
 
 
 def image_of(
-    grid: LiftedGrid,
-    lattice: Lattice,
-    progress: Progress = silent,
-    half: LiftedGrid | None = None,
+    grid: LiftedGrid, lattice: Lattice, progress: Progress = silent, half: LiftedGrid | None = None
 ) -> Image:
     """The image of a grid of three free bundles; `half` is that of half as many cells, if known."""
     scaled, nodes = lattice.coordinates(grid.tips), (grid.n + 1) ** 3
@@ -339,9 +335,8 @@ def _critical_triangles(
     def task(number: int) -> None:
         first, last = blocks[number].start, blocks[number].stop
         out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
-        used = contour.critical_triangles(
-            vertices, jacobian_dets, axes, gaps, first, last, star, out
-        )
+        grid = vertices, jacobian_dets, axes, gaps
+        used = contour.critical_triangles(*grid, first, last, star, out)
         parts[number] = out[:used].copy()
         progress(last - first)
 
@@ -375,20 +370,16 @@ def wrapped_surface(image: Image, volume: float) -> Surface:
     The level set one cell away from the image is evened out, and all its vertices are moved back as
     far along their normals as encloses the volume. Gaps below two cells are filled.
     """
-    vertices, faces = level_set(gaussian_filter(_distances(image), _EVENED), _AWAY)
+    covered, surface = image.counts[0] > 0, image.critical_surface
+    near = covered & ~np.asarray(binary_erosion(covered), bool)
+    near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
+    near = np.asarray(binary_dilation(near, np.ones((3, 3, 3)), iterations=2), bool) & ~covered
+    # From cell centers to the image, 0 inside, in cells up to three.
+    distances, centers = np.where(covered, 0.0, _FAR), image.lattice.places(np.argwhere(near))
+    distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)
+    vertices, faces = level_set(gaussian_filter(distances, _EVENED), _AWAY)
     places = image.lattice.places(vertices)
     back = _AWAY * image.lattice.cell * vertex_normals(places, faces)
     far, near = (enclosed_volume(places - part * back, faces) for part in (0.0, 1.0))
     part = float(np.clip((far - volume) / (far - near), 0.5, 1.5))
     return Surface(vertices=places - part * back, faces=faces)
-
-
-def _distances(image: Image) -> Array:
-    """From cell centers to an image, 0 inside, in cells up to three."""
-    covered, surface = image.counts[0] > 0, image.critical_surface
-    near = covered & ~np.asarray(binary_erosion(covered), bool)
-    near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
-    near = np.asarray(binary_dilation(near, np.ones((3, 3, 3)), iterations=2), bool) & ~covered
-    distances, centers = np.where(covered, 0.0, _FAR), image.lattice.places(np.argwhere(near))
-    distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)
-    return distances

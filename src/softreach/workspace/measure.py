@@ -169,8 +169,7 @@ def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
     return np.squeeze(mean * image.lattice.cell**3)
 
 
-HullOf = Callable[[Points], Faces]
-"""Faces or edges of the convex hull of points."""
+HullOf = Callable[[Points], Faces]  # faces or edges of the convex hull of points
 
 
 class HullCorners(NamedTuple):

@@ -56,7 +56,14 @@ def payload_curve(
         SoftreachWarning: The estimated error of a volume is larger than asked.
     """
     arm = a_manipulator("arm", arm).at_point(point)
-    _check(arm)
+    if arm.loads is None or not any(arm.loads.gravity):
+        allowed = "Loads with gravity, which makes a payload heavy"
+        hint = "pass arm.replace(loads=Loads(gravity=(0, 0, -9.81)))"
+        raise InvalidInput("loads", arm.loads, allowed, hint)
+    if faults := arm.loads.section_faults(arm.section, arm.length):
+        raise InvalidDesign(faults)
+    if (free := sum(low < high for low, high in arm.input_bounds)) < 3:
+        raise InvalidInput("free bundles", int(free), "3 or more, which reach a volume")
     masses = _usual_payloads(arm) if payloads is None else as_floats("payloads", payloads).ravel()
     if not (np.isfinite(masses) & (masses >= 0)).all():
         raise InvalidInput("payloads", masses, "finite masses of 0 or more [kg]")
@@ -222,18 +229,6 @@ def _volume(arm: Manipulator, mass: float, accuracy: float) -> _Volume:
     carrying = arm.replace(loads=arm.loads.replace(payload=mass))
     reached = reachable_set(carrying, accuracy=accuracy)
     return _Volume(reached.volume, reached.volume_error, reached.lost_share)
-
-
-def _check(arm: Manipulator) -> None:
-    if arm.loads is None or not any(arm.loads.gravity):
-        allowed = "Loads with gravity, which makes a payload heavy"
-        hint = "pass arm.replace(loads=Loads(gravity=(0, 0, -9.81)))"
-        raise InvalidInput("loads", arm.loads, allowed, hint)
-    if faults := arm.loads.section_faults(arm.section, arm.length):
-        raise InvalidDesign(faults)
-    free = int(sum(low < high for low, high in arm.input_bounds))
-    if free < 3:
-        raise InvalidInput("free bundles", free, "3 or more, which reach a volume")
 
 
 def _usual_payloads(arm: Manipulator) -> Array:

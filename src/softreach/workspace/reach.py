@@ -24,8 +24,7 @@ _MOST_CELLS = 2.0**26
 _QUICK = 24  # cells, up to which sheets take no time
 _TORN = 2.0  # times the error asked for, with which they are left then
 
-ACCURACIES = Range(1e-6, 0.2)
-"""Relative errors of a volume that can be asked for."""
+ACCURACIES = Range(1e-6, 0.2)  # relative errors of a volume that can be asked for
 
 _LENGTHS, _SIZES = POSITIVE._replace(unit="m"), POSITIVE._replace(unit="bytes")
 

@@ -26,8 +26,7 @@ from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 if TYPE_CHECKING:
     import xarray as xr
 
-SIZES = "", "curve_length", "area", "volume"
-"""Names of the size of a set, by its dimension."""
+SIZES = "", "curve_length", "area", "volume"  # names of the size of a set, by its dimension
 
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MEANINGS = {

@@ -26,8 +26,7 @@ from softreach.workspace.postures import AllPostures
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 
-ENOUGH = 1e-3
-"""Distance at which a place counts as reached, in cells."""
+ENOUGH = 1e-3  # distance at which a place counts as reached, in cells
 
 _CHUNK = 1 << 16  # places searched for at a time
 CLOUD = 1 << 16  # tips in a cloud that searches start from
@@ -35,8 +34,7 @@ _CLOUDS = 8  # at most
 _FAR = 3.0  # cells, from which on distances are not told apart
 DISTANCE = 0.75
 """Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
-CLEARLY = 0.02
-"""Cells by which a tip must be closer to start another search."""
+CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 
 
 class Stop(NamedTuple):
@@ -46,10 +44,8 @@ class Stop(NamedTuple):
     most: int  # steps
 
 
-ROUGHLY = Stop(settled=1e-3, most=30)
-"""For targets that are reached or not."""
-CLOSELY = Stop(settled=1e-13, most=1000)
-"""For the nearest tip itself."""
+ROUGHLY = Stop(settled=1e-3, most=30)  # for targets that are reached or not
+CLOSELY = Stop(settled=1e-13, most=1000)  # for the nearest tip itself
 
 
 class ReachedGrid:

@@ -81,9 +81,15 @@ def box_sheets(tip_map: TipMap) -> Sheets:
 
 def _sheets(tip_map: TipMap, cube: Array, faces: Faces) -> Sheets:
     cube, faces = compact_surface(cube, faces)
-    activation, lines = tip_map.box.from_free_cube(cube), _lines(cube, faces)
+    activation = tip_map.box.from_free_cube(cube)
     if (driving := as_tip_map(tip_map).inputs.driving) is not None:
         activation = driving.with_dead_zones(activation)
+    pairs = np.sort(np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    # Those that lie on edges of the box, or that have a triangle on one side only.
+    a, b = np.moveaxis(cube[edges], 1, 0)
+    level = (a == b) & ((a == 0.0) | (a == 1.0))
+    lines = edges[(count == 1) | (level.sum(axis=1) >= 2)].astype(np.int32)
     return Sheets(vertices=_tips(tip_map, cube), faces=faces, lines=lines, activation=activation)
 
 
@@ -243,12 +249,3 @@ class _Beside:
             out = out + rest[rows, axis][:, None] * (after - before)
             before = after
         return out
-
-
-def _lines(cube: Array, faces: Faces) -> NDArray[np.int32]:
-    """Edges of triangles that lie on edges of the box, or that have a triangle on one side only."""
-    pairs = np.sort(np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
-    edges, count = np.unique(pairs, axis=0, return_counts=True)
-    ends = cube[edges]
-    level = (ends[:, 0] == ends[:, 1]) & ((ends[:, 0] == 0.0) | (ends[:, 0] == 1.0))
-    return edges[(count == 1) | (level.sum(axis=1) >= 2)].astype(np.int32)

@@ -14,8 +14,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-NOWHERE = 1e150
-"""Coordinate of tips that do not count; no distance may be infinite here."""
+NOWHERE = 1e150  # coordinate of tips that do not count; no distance may be infinite here
 FIRST_DAMPING = 1e-2
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-4, 1e4
 _BELIEVED = 0.1  # damping above which the linear map says little of what is left to gain

@@ -15,12 +15,10 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-NOWHERE = 1e100
-"""Coordinate of tips that do not count."""
+NOWHERE = 1e100  # coordinate of tips that do not count
 FIRST_PROXIMITY = 0.3
 _LEAST_PROXIMITY, _LARGEST_PROXIMITY = -0.7, 1e7
-LONGEST_STEP = 0.5
-"""In ranges."""
+LONGEST_STEP = 0.5  # in ranges
 _MET = 1e-2  # part of a miss that may be left where the linearized target is met
 _MISS = 1e-9  # in L, that counts as none
 _CREDIBLE = 1e4  # penalty above which the multiplier says no more than that nothing meets it

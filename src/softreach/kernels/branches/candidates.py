@@ -27,8 +27,7 @@ from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.image.activation_mesh import axes_of, image_faces, orientation, tetrahedron
 from softreach.kernels.vector import combination, cross, dot, matrix, minus, plus, row, times
 
-MOST_STARTS = 1024
-"""Starts kept for one target; a fold to a point has a whole curve of them."""
+MOST_STARTS = 1024  # starts kept for one target; a fold to a point has a whole curve of them
 
 _DISTINCT = 0.1  # starts nearer than this, in widths of their cells, lead to one solution
 _MARGIN = 2.0  # remainders by which a target may lie outside the image of a tetrahedron

@@ -6,8 +6,7 @@ import math
 
 from softreach.kernels.compiler import inline, kernel
 
-MOST_IN_BINS = 1024
-"""Seeds that are looked at for one target, a power of two."""
+MOST_IN_BINS = 1024  # seeds that are looked at for one target, a power of two
 _MET = 0.1  # part of the squared way to a target that may be left
 _LONG = 0.4  # step, in ranges, of which the linear map says little
 _FAR = 1e6
