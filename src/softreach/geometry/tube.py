@@ -14,11 +14,7 @@ from softreach.support.errors import InvalidInput
 
 
 def tube_surface(
-    centerline: ArrayLike,
-    normal: ArrayLike,
-    binormal: ArrayLike,
-    radii: ArrayLike,
-    sides: int = 32,
+    centerline: ArrayLike, normal: ArrayLike, binormal: ArrayLike, radii: ArrayLike, sides: int = 32
 ) -> Surface:
     """A tube of circular sections of some radii [m], capped at both ends, with outward faces.
 

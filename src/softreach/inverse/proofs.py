@@ -82,7 +82,7 @@ def _exclusion_of_block(
     least = np.where(few, enough, 0.0)
     spent = np.zeros(len(enough), np.int64)
     while len(owner):
-        blocks = [slice(first, first + _BLOCK) for first in range(0, len(owner), _BLOCK)]
+        blocks = parallel.blocks(len(owner), _BLOCK)
         each = [_distances(tip_map, half, center[b], targets[owner[b]]) for b in blocks]
         bounds = np.concatenate(each)
         spent += np.bincount(owner, minlength=len(enough))
@@ -108,9 +108,8 @@ def _distances(tip_map: TipMap, half: Array, center: Array, targets: Array) -> A
     tip_map.fill(center, TipOutputs(tips, slopes))
     away, slopes = targets - tips, slopes * half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
-    inside, force = np.empty((n, m)), np.zeros((n, 3))
-    side = np.ones((n, m))
-    project(np.zeros((n, m)), slopes, away, softness, -side, side, inside, force)
+    force, side = np.zeros((n, 3)), np.ones((n, m))
+    project(np.zeros_like(side), slopes, away, softness, -side, side, np.empty_like(side), force)
     size = np.linalg.norm(force, axis=1)
     normal = -force / np.where(size > 0, size, 1.0)[:, None]
     linear = np.einsum("ni,ni->n", normal, away)

@@ -46,7 +46,6 @@ _MEANINGS = {
     "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
     "unreachability": ("1 per unit", "derivative of the unreachability"),
 }
-
 _CELLS = 40  # along each edge of the box, where its faces are the boundary
 _BLOCK = 1 << 21  # numbers at once
 _SLIVER = 1e-2  # of the mean area: the normal of what is smaller tells nothing

@@ -390,9 +390,8 @@ class ReachableSet:
             lines.insert(0, f"{sheet}thickness {quantity(thickness.value, 'm', thickness.error)}")
         if self.multiplicity:
             again = quantity(self._several, "m³", self.multiplicity_error)
-            lines.append(
-                f"reached more than once {again}, behind folds {self._text('fold_volume')}"
-            )
+            folds = self._text("fold_volume")
+            lines.append(f"reached more than once {again}, behind folds {folds}")
         raster = "" if self.route == "flux" else f", cells of {self.image.lattice.cell:.3g} m"
         return [*lines, _ROUTES[self.route] + raster]
 
