@@ -6,7 +6,6 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -127,9 +126,20 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool 
     """
     place, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     schema.check_stored_cloud(cloud)
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    stored, chunk = schema.storable(cloud), min(cloud.sizes["sample"], _CHUNK)
+    # A checksum for each chunk, also for those of NaN alone.
+    encoding: dict[Hashable, Any] = {
+        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in stored.variables
+    }
+    for name in ("tip", "activation"):
+        encoding[name]["chunks"] = (chunk, stored[name].shape[1])
+    options = {"zarr_format": 3, "consolidated": False, "write_empty_chunks": True}
     made = replacing_folder(place, foreign_entry, overwrite=overwrite)
-    with made as partial_path, _few_chunks_at_a_time():
-        _write(schema.storable(cloud), partial_path)
+    with made as folder, _few_chunks_at_a_time():
+        stored.to_zarr(folder, mode="w", encoding=encoding, **options)
+        seal(folder)
 
 
 def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
@@ -173,21 +183,6 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
 
 
 CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}  # format of a stored cloud
-
-
-def _write(cloud: xr.Dataset, path: Path) -> None:
-    """Write all variables, with a checksum for each chunk, also for those of NaN alone."""
-    from zarr.codecs import Crc32cCodec, ZstdCodec
-
-    encoding: dict[Hashable, Any] = {
-        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in cloud.variables
-    }
-    chunk = min(cloud.sizes["sample"], _CHUNK)
-    for name in ("tip", "activation"):
-        encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
-    options = {"zarr_format": 3, "consolidated": False, "write_empty_chunks": True}
-    cloud.to_zarr(path, mode="w", encoding=encoding, **options)
-    seal(path)
 
 
 def _few_chunks_at_a_time() -> AbstractContextManager[object]:

@@ -7,20 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.kernels.points.neighbor_sums import (
-    PLACE_BITS,
-    SHIFTS,
-    find_windows,
-    neighbor_sums,
-    sort_keys,
-    stable_order,
-    window_keys,
-)
+from softreach.kernels.points import neighbor_sums as kernels
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, as_points, check_finite
 
 BLOCK = 1 << 14  # queries that one thread takes at a time
-_CELLS = 2.0 ** (PLACE_BITS - 1)  # along an axis; the other half of the keys is room for windows
+_CELLS = 2.0 ** (kernels.PLACE_BITS - 1)  # along an axis; the other half of keys is for windows
 _CUBES = 128  # along an axis, at most, to find what is near a few queries
 _FEW = 1.0 / 500  # queries to a point, below which that pays
 _MANY = 100_000  # points, from which on it does
@@ -79,9 +71,9 @@ class _Columns:
         """Points (n, 3) and values (n, m) in the order of their keys, and that order."""
         points = np.ascontiguousarray(points.T[self.axes])
         keys = np.empty(points.shape[1], np.int64)
-        sort_keys(points, self.low, 1.0 / self.widths, keys)
+        kernels.sort_keys(points, self.low, 1.0 / self.widths, keys)
         order = np.empty(len(keys), np.int64)
-        stable_order(keys, order)
+        kernels.stable_order(keys, order)
         return order, _Sample(keys[order], _taken(points, order), _taken(values.T, order))
 
     def near(self, points: Array, queries: Array) -> Index:
@@ -122,13 +114,13 @@ def _sums(cloud: _Sample, columns: _Columns, queries: _Sample, part: slice) -> t
     keys, scale = queries.keys[part], 1.0 / columns.widths[2]
     first, last = np.empty((2, len(keys)), np.int64)  # keys of what each can reach in its column
     along = queries.points[2, part]
-    window_keys(along, keys, columns.margin, columns.low[2], scale, first, last)
+    kernels.window_keys(along, keys, columns.margin, columns.low[2], scale, first, last)
     places, amounts = queries.points[:, part].T.copy(), queries.values[:, part].T.copy()
     start, stop = np.empty((2, len(first)), np.int64)
     total, count = np.zeros((2, len(first)))
-    add, square = neighbor_sums(len(cloud.values)), columns.reach**2
-    for shift in SHIFTS:
-        find_windows(cloud.keys, first + shift, last + shift, start, stop)
+    add, square = kernels.neighbor_sums(len(cloud.values)), columns.reach**2
+    for shift in kernels.SHIFTS:
+        kernels.find_windows(cloud.keys, first + shift, last + shift, start, stop)
         add(cloud.points, cloud.values, places, amounts, start, stop, square, total, count)
     return total, count
 

@@ -14,15 +14,11 @@ from softreach.kernels.points.triangles import FLAT, OPEN, judge_images
 from softreach.support.arrays import Array, Index
 
 Map = Callable[[Array], Array]  # images of unit vectors (n, 3), unit vectors of the same shape
-
 _MOST_LEVELS = 16
 _MOST_TRIANGLES = 200_000
 _MOST_STARTS = 1000  # of triangles that are not flat
 _IMAGES_OF_ROOT = 60  # that Newton's method asks for, of most starts
-
-_FLAT = 2.5
-"""Least altitude of a flat image, in sags of the one that it was cut from, of which it has 1/4."""
-
+_FLAT = 2.5  # least altitude of a flat image, in sags of the one that it was cut from: it has 1/4
 _TURNS = 30
 _WIDEST = 0.3  # Newton step [rad]
 _DIFFERENCE = 3e-6  # of numerical derivatives [rad]

@@ -43,7 +43,6 @@ from softreach.inverse.roots import (
     roots_at,
 )
 from softreach.kernels.branches import candidates, newton
-from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined, joined_by, rows
@@ -145,26 +144,19 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
         return no_roots(tip_map)
     low, high, n = tip_map.box.low.copy(), tip_map.box.high.copy(), len(goal)
     start = _improved(tip_map, goal, starts)
-    search = Search(
-        target=goal,
-        gamma=start.copy(),
-        slope=np.zeros((n, 3, 3)),
-        residual=np.full(n, 1e300),
-        step=np.zeros((n, 3)),
-        damping=np.ones(n),
-        trial=start.copy(),
-        state=np.full(n, RUNNING),
-    )
+    slope, residual, step = np.zeros((n, 3, 3)), np.full(n, 1e300), np.zeros((n, 3))
+    damping, trial, state = np.ones(n), start.copy(), np.full(n, newton.RUNNING)
+    search = newton.Search(goal, start.copy(), slope, residual, step, damping, trial, state)
     for _ in range(_MOST_ITERATIONS):
-        if not len(active := np.flatnonzero(search.state == RUNNING)):
+        if not len(active := np.flatnonzero(search.state == newton.RUNNING)):
             break
         tips, slopes = tip_map.tips_and_slopes(search.trial[active])
         newton.newton_step(search, active, tips, slopes, low, high, request.residual)
         if tip_map.supports_unstable:
             # A search whose step leads nowhere has ended, as where the tip moves without limit.
             lost = active[~np.isfinite(search.trial[active]).all(axis=1)]
-            search.trial[lost], search.state[lost] = search.gamma[lost], STAGNATED
-    converged = np.flatnonzero(search.state == CONVERGED)
+            search.trial[lost], search.state[lost] = search.gamma[lost], newton.STAGNATED
+    converged = np.flatnonzero(search.state == newton.CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     trial, goal = search.trial[converged], goal[converged]
     gamma = tip_map.box.clip(trial)

@@ -17,15 +17,8 @@ from softreach.inverse.direction import constrained_minima
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Reached, descend, first_of_each, reach
+from softreach.kernels.box import sequential_projection as kernels
 from softreach.kernels.box.box_projection import project
-from softreach.kernels.box.sequential_projection import (
-    FIRST_PROXIMITY,
-    LONGEST_STEP,
-    NOWHERE,
-    Running,
-    judge,
-    next_trials,
-)
 from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs
 from softreach.support import parallel
@@ -258,7 +251,7 @@ def sqp(
     start: Array,
     *,
     penalty: float = 0.0,
-    proximity: Array | float = FIRST_PROXIMITY,
+    proximity: Array | float = kernels.FIRST_PROXIMITY,
     settled: float = 1e-6,
     most: int = 60,
 ) -> Minima:
@@ -296,28 +289,28 @@ def _searched(
     bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
     running = _room(min(total, _TOGETHER), box.bundles)
     tips, ahead = np.empty_like(running.miss), np.empty_like(running.slope)
-    wanted_of_all, length, begun, n = (request.targets, request.near), tip_map.length, 0, 0
+    wanted, length, begun, n = (owner, request.targets, request.near), tip_map.length, 0, 0
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
         new, old = slice(n, n + more), slice(begun, begun + more)
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
         running.trial[new], running.proximity[new] = ends.gamma[old], ends.proximity[old]
         running.penalty[new], running.multiplier[new] = penalty, 0.0
-        running.reach[new] = LONGEST_STEP
+        running.reach[new] = kernels.LONGEST_STEP
         n, begun = n + more, begun + more
         tip_map.fill(running.trial[:n], TipOutputs(tips[:n], ahead[:n]))
         if tip_map.supports_unstable:
             lost = np.isnan(tips[:n, 0])
-            tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
-        n = judge(running, n, tips, ahead, owner, *wanted_of_all, bounds, length, limits, ends)
+            tips[:n][lost], ahead[:n][lost] = kernels.NOWHERE, 0.0
+        n = kernels.judge(running, n, tips, ahead, *wanted, bounds, length, limits, ends)
         at = rows(running, slice(n))
         step = at.trial, at.multiplier
         project(at.center, at.slope, at.wanted, at.softness, at.low, at.high, *step)
-        next_trials(running, n, owner, request.near)
+        kernels.next_trials(running, n, owner, request.near)
 
 
-def _room(n: int, m: int) -> Running:
-    return Running(
+def _room(n: int, m: int) -> kernels.Running:
+    return kernels.Running(
         row=np.empty(n, np.int64),
         steps=np.empty(n, np.int64),
         slope=np.empty((n, 3, m)),

@@ -318,8 +318,7 @@ def _dataset(
     box, n = tip_map.box, len(followed)
     units = activation_attributes(tip_map.arm, box.names)
     outcome = PathStatus.NO_START if end is None else end.status
-    status = np.full(len(points), int(outcome), np.int8)
-    status[:n] = PathStatus.FOLLOWED
+    status = np.where(np.arange(len(points)) < n, PathStatus.FOLLOWED, outcome).astype(np.int8)
     activation, measures = np.full((len(points), box.bundles), np.nan), tip_map.measures
     lengths, error = np.linalg.norm(np.diff(points, axis=0), axis=1), np.full(len(points), np.nan)
     length = length_error = np.nan

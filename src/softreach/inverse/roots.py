@@ -22,7 +22,6 @@ searches from anywhere."""
 _SEED = 1
 _BEYOND = 1e-3  # of the residual, to which a descent goes on
 _MOST_STEPS = 60
-
 _BLOCK = 500  # targets at once
 _MOST_ITERATIONS = 60
 _LONGEST_STEP = 0.3  # in ranges

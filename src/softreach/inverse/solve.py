@@ -105,15 +105,14 @@ def solve_inverse(
     prepared = prepared_map(arm, tol, frame=frame, point=point)
     points, box = as_points("targets", targets), prepared.whole.box
     preferred = np.zeros(box.bundles) if near is None else near
-    measures = prepared.whole.measures
+    measures, length = prepared.whole.measures, prepared.whole.length
     unit = None if direction is None else as_directions("direction", direction, len(points))
-    least = as_number("residual_over_length", residual_over_length, RESIDUALS)
-    residual = least * prepared.whole.length
+    residual = as_number("residual_over_length", residual_over_length, RESIDUALS) * length
     within = as_number("within", within, Range(0.0, unit="m"))
     request = Request(
         targets=points,
         residual=residual,
-        reach_tol=max(residual, prepared.whole.tol * prepared.whole.length, within),
+        reach_tol=max(residual, prepared.whole.tol * length, within),
         near=as_activations("near", preferred, box, len(points)) / measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),

@@ -1,11 +1,9 @@
 """Reach of the tip with four free bundles or more, by search instead of by simplices.
 
-The box of m activations has m! simplices to a cell of its grid, its image has one boundary. So the
-image is found in space: a lattice tells how far its centers are from the nearest tip. A level set
-of these distances goes around both sides of a sheet and its rim, of whatever thinness; each of its
-vertices is drawn to the nearest tip. Where this leaves a larger error, lines of sight through the
-centers that are reached add up to the volume. Each place that counts as reached has an activation
-that proves it; what searches miss is missing from the volume.
+A lattice tells how far its centers are from the nearest tip. A level set of these distances goes
+around both sides of a sheet and its rim, and each of its vertices is drawn to the nearest tip.
+Where this leaves a larger error, lines of sight through the centers that are reached add up to the
+volume. What counts as reached has an activation that proves it; what searches miss is missing.
 """
 
 from __future__ import annotations
@@ -52,7 +50,6 @@ _ON = 1e-2  # cells from a tip, where a place counts as reached
 _THICK = 3.0  # cells, on average
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
-
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
 _RULE = 2.5  # cells along the mean side of the bounding box, times the root of the accuracy
 _FEWEST = 16.0
@@ -68,9 +65,7 @@ _WIDEST = 0.99  # of all thicknesses are below the one that the next pushes go b
 _STRETCH = 30.0  # times as much as one to the side, a miss along the normal counts
 _PUSHES, _PASSES = 12, 4
 _DAMPING = 1e-8  # of the mean square of the slopes
-CLIMBERS = 1024
-"""Tips of a cloud from which the convex hull is climbed, beside those on the boundary: more make
-countless facets."""
+CLIMBERS = 1024  # tips from which the convex hull is climbed beside the boundary: more make facets
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -52,21 +52,12 @@ class Crossings:
             for side, places in ((1, leaving), (-1, entering)):
                 parts.append((places, np.full(len(places), k), np.full(len(places), side)))
         cell, axis, sense = (np.concatenate(column) for column in zip(*parts, strict=True))
-        n, outside = len(cell), cell + sense * grid.steps[axis]
-        crossings = cls(
-            tip_map=grid.tip_map,
-            lattice=grid.lattice,
-            cell=cell,
-            axis=axis,
-            sense=sense,
-            low=np.zeros(n),
-            high=np.ones(n),
-            gamma=grid.gamma[cell],
-            beyond=grid.gamma[outside],
-            place=np.zeros(n),
-        )
-        crossings._cut(np.arange(n), grid.tip_map.tips(crossings.beyond))
-        crossings._enclose(np.arange(n))
+        every, low, high = np.arange(len(cell)), np.zeros(len(cell)), np.ones(len(cell))
+        gamma, beyond = grid.gamma[cell], grid.gamma[cell + sense * grid.steps[axis]]
+        edges = cell, axis, sense, low, high, gamma, beyond
+        crossings = cls(grid.tip_map, grid.lattice, *edges, place=low.copy())
+        crossings._cut(every, grid.tip_map.tips(beyond))
+        crossings._enclose(every)
         return crossings
 
     def coordinates(self, which: Index, t: Array) -> Array:

@@ -22,7 +22,6 @@ _LEFT = 0.35  # of what is removed of hulls; for four bundles 0.28 to 0.34 of it
 SURE_ACCURACY = 3e-3  # down from which integrals are as exact as a raster can ever use
 FLUX_PART = 0.01  # of a larger accuracy: relative error of what flows through the faces
 _NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
-
 _ROUNDS = 8
 _LESS = 0.5  # of the error before, that another round must leave
 _CLIMBS = 25  # steps of a climb

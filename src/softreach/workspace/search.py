@@ -8,13 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.kernels.box.bounded_descent import (
-    FIRST_DAMPING,
-    NOWHERE,
-    Running,
-    judge,
-    next_trials,
-)
+from softreach.kernels.box import bounded_descent as kernels
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs, no_equilibrium
@@ -25,15 +19,12 @@ from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.postures import AllPostures
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
-
 ENOUGH = 1e-3  # distance at which a place counts as reached, in cells
-
 _CHUNK = 1 << 16  # places searched for at a time
 CLOUD = 1 << 16  # tips in a cloud that searches start from
 _CLOUDS = 8  # at most
 _FAR = 3.0  # cells, from which on distances are not told apart
-DISTANCE = 0.75
-"""Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
+DISTANCE = 0.75  # of the level set, in cells: below 0.71 a thread has holes, below 0.5 a sheet
 CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 
 
@@ -174,7 +165,7 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
     size, m = min(total, _TOGETHER), box.bundles
     shapes = (), (), (3, m), (3,), (), (m,), (m,), (m,)
     numbers = (np.zeros((size, *shape)) for shape in shapes)
-    running = Running(np.zeros(size, np.int64), np.zeros(size, np.int64), *numbers)
+    running = kernels.Running(np.zeros(size, np.int64), np.zeros(size, np.int64), *numbers)
     center = np.zeros((size, m))
     tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
     step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
@@ -183,18 +174,18 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
         more = min(total - begun, len(tips) - n)
         new, old = slice(n, n + more), slice(begun, begun + more)
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
-        running.trial[new], running.damping[new] = nearest.gamma[old], FIRST_DAMPING
+        running.trial[new], running.damping[new] = nearest.gamma[old], kernels.FIRST_DAMPING
         n, begun = n + more, begun + more
         tip_map.fill(running.trial[:n], TipOutputs(tips[:n], ahead[:n]))
         if torn:
-            tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
+            tips[np.isnan(tips[:n, 0]).nonzero()[0]] = kernels.NOWHERE
+        n = kernels.judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
         at = rows(running, slice(n))
         multiplier[:n] = 0.0
         ends = step[:n], multiplier[:n]
         project(center[:n], at.slope, at.wanted, at.softness, at.low, at.high, *ends)
-        next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
-    nowhere = nearest.distance >= NOWHERE
+        kernels.next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
+    nowhere = nearest.distance >= kernels.NOWHERE
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
 
 
