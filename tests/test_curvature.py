@@ -50,17 +50,13 @@ def test_moments_and_extremes_are_those_of_the_configurations(cloud, shapes):
         np.testing.assert_allclose(found[f"{name}_quantile"], ends, rtol=1e-12, atol=1e-12)
 
 
-def test_quantiles_are_good_to_a_bin(cloud, shapes):
+def test_every_sample_is_counted_once_and_quantiles_are_good_to_a_bin(cloud, shapes):
     shares = (0.05, 0.5, 0.95)
     found = curvature_statistics(cloud, quantiles=shares, bins=256)
     u = shapes.curvature.values
     truth = np.quantile(np.hypot(u[..., 0], u[..., 1]), shares, axis=0).T
     width = np.diff(found.bending_edge.values[:, :2], axis=1)
     assert (np.abs(found.bending_quantile.values - truth) <= width).all()
-
-
-def test_every_sample_is_counted_once_inside_the_range_of_the_box(cloud):
-    found = curvature_statistics(cloud, bins=64)
     for name in ("bending", "torsion", "extension"):
         assert (found[f"{name}_count"].sum("bin") == cloud.sizes["sample"]).all()
 

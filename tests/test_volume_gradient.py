@@ -19,7 +19,6 @@ from softreach.arm import (
 )
 from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.rod.rods import as_tip_map
-from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
 from softreach.workspace.flux import signed_volume
@@ -125,36 +124,23 @@ SHARED = {
         {"core.poisson_ratio": 0.3, "rings[1].material.poisson_ratio": 0.4},
     ),
 }
-of_shared = pytest.mark.parametrize(
+
+
+@pytest.mark.parametrize(
     "name",
     [
         pytest.param(name, marks=[pytest.mark.large] if name in ("upper", "extent") else [])
         for name in SHARED
     ],
 )
-
-
-def parts_of(arm: Manipulator, name: str) -> dict[str, float]:
-    """Single parameters of those that share one, and their values; of revolutions those turned."""
-    known = parameters(arm)
-    return {one: x for one in known if one.endswith(f".{name}") and (x := known[one].value(arm))}
-
-
-def ways(name: str, values: Array) -> Array:
-    """Where the values go when the shared one grows: revolutions grow in their own sense."""
-    return np.sign(values) if name == "revolution" else np.ones(len(values))
-
-
-@cache
-def by_shared(name: str) -> VolumeGradient:
-    """Derivatives by a shared parameter, then by each of those that share it."""
-    names = (name, *parts_of(SHARED[name], name))
-    return volume_gradient(SHARED[name], names, accuracy=1e-2)
-
-
-@of_shared
 def test_the_derivative_by_what_parts_share_is_the_sum_of_theirs(name):
-    found, way = by_shared(name), ways(name, np.array([*parts_of(SHARED[name], name).values()]))
+    """Revolutions grow in their own sense."""
+    known = parameters(SHARED[name])
+    own = {one: known[one].value(SHARED[name]) for one in known if one.endswith(f".{name}")}
+    values = {one: value for one, value in own.items() if value}
+    found = volume_gradient(SHARED[name], (name, *values), accuracy=1e-2)
+    signs = np.sign([*values.values()])
+    way = signs if name == "revolution" else np.ones(len(signs))
     assert found.route == "flux"
     assert found.volume[0] == pytest.approx(way @ found.volume[1:], rel=1e-6)
     off = abs(found.convex_volume[0] - way @ found.convex_volume[1:])

@@ -322,23 +322,12 @@ def test_cells_of_small_random_clouds_equal_those_of_qhull(n, seed):
 
 
 @every_degenerate
-def test_degenerate_clouds_give_an_exact_delaunay_triangulation(name):
+def test_degenerate_clouds_give_an_exact_delaunay_triangulation_of_their_hull(name):
+    """Every distinct point is a vertex, none is beyond an outer face, and volumes sum up."""
     mesh = delaunay(DEGENERATE[name])
     assert_adjacency(mesh)
     assert_delaunay(mesh)
-
-
-@every_degenerate
-def test_every_distinct_point_is_a_vertex(name):
-    points = DEGENERATE[name]
-    mesh = delaunay(points)
-    assert len(np.unique(mesh.tetrahedra)) == len(np.unique(points, axis=0))
-
-
-@every_degenerate
-def test_the_hull_of_the_cells_is_convex_and_filled_once(name):
-    """No point beyond any outer face, and the volumes sum up to what these faces enclose."""
-    mesh = delaunay(DEGENERATE[name])
+    assert len(np.unique(mesh.tetrahedra)) == len(np.unique(mesh.points, axis=0))
     points, _ = unit_scale(mesh.points)
     for t, i in np.argwhere(mesh.neighbors < 0):
         a, b, c = mesh.tetrahedra[t][FACES[i]]
