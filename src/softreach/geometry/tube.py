@@ -43,7 +43,7 @@ def tube_surface(
 
 
 def ribbon_surface(lower: ArrayLike, upper: ArrayLike) -> Surface:
-    """The closed skin between two patches (stations, across, 3) [m], lower one first.
+    """The closed skin between two patches (stations, across, 3) [m]; the lower comes first.
 
     The upper one is on the side that (along x across) points to; faces are outward.
     """

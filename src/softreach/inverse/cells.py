@@ -115,7 +115,7 @@ class ImageLeaves:
 
 
 class TornCells(NamedTuple):
-    """Vertices with tips of cells without an image, of which a corner has no tip or is elsewhere.
+    """Vertices with tips of cells without an image: a corner has no tip or is on another branch.
 
     They begin searches for the targets that their linearization sees within about a cell.
     """

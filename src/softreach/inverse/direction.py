@@ -28,7 +28,7 @@ _PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
 
 
 def compromises(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
-    """Minimize |tip - target|²/L² + w² |d3 - direction|² from starts (n, m), and half of it."""
+    """Least |tip - target|²/L² + w² |d3 - direction|² from starts (n, m): where, and half of it."""
     return minimize(partial(objective, tip_map, request, 1.0, None), start, tip_map.box)
 
 
@@ -121,7 +121,7 @@ def objective(
 def _expanded(
     evaluate: Evaluate, which: Index, gamma: Array, scales: Array, curved: Mask
 ) -> tuple[Array, Array, Array]:
-    """Values, gradients and, where `curved`, Hessians by gradients beside, of one call."""
+    """Values, gradients and, where `curved`, Hessians by differences of these, in one call."""
     n, m = gamma.shape
     k = int(curved.sum())
     displaced = np.repeat(gamma[curved, None], m, axis=1)

@@ -73,7 +73,7 @@ class Seeds:
     def near(
         self, targets: Array, near: Array, count: int, most: int, least_distance: float
     ) -> tuple[Index, Array]:
-        """Seeds with tips near targets (t, 3) [m], nearest to activations (t, m), and whose.
+        """Numbers of targets (t, 3) [m], and seeds with tips nearby, closest to activations (t, m).
 
         Chosen twice: after each is moved to where its linearized tip meets the target, and as they
         are. At least `count` are looked at; of either kind a target gets `most` that lie apart.
@@ -110,7 +110,7 @@ class Seeds:
     def starts(
         self, candidates: Array, most: int = _STARTS, least_distance: float = _APART
     ) -> tuple[Index, Array]:
-        """Of candidates (t, k, m) a few for each target, best first, that lie apart, and whose."""
+        """Numbers of targets and a few candidates (t, k, m) of each, best first, that lie apart."""
         chosen = np.zeros(candidates.shape[:2], bool)
         choose_apart(candidates, self.scales, most, least_distance, chosen)
         return np.nonzero(chosen)[0], candidates[chosen]

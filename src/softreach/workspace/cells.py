@@ -317,7 +317,7 @@ def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: 
 def cells_of(
     tip_map: TipMap, cell: float, inside: Callable[[Array], Mask] | None = None
 ) -> ReachedCells:
-    """What any number of free bundles reach, on 96 cells along the longest side at most, no hull.
+    """What any number of free bundles reach, on 96 cells along the longest side, without hull.
 
     With places `inside` that are known to be reached, nothing but the surface is right.
     """

@@ -57,7 +57,7 @@ class Flux(NamedTuple):
 
 
 def _of_triangles(tip_map: TipMap, enough: float) -> Flux:
-    """By the mapped triangles of two grids on the faces as nodes of one flux, free of O(1/n²)."""
+    """By mapped triangles of two grids on the faces, together nodes of a flux without O(1/n²)."""
     enough = max(enough, _ROUGH_ENOUGH * tip_map.supports_unstable)
     coarse = fine = _triangle_nodes(tip_map, _KINKED[0])
     removed = np.inf
@@ -89,7 +89,7 @@ def flux_tol(tip_map: TipMap) -> float:
 
 
 def face_image(tip_map: TipMap, cells: int = _CELLS) -> Surface:
-    """The closed image of the surface of the box of three bundles, outwards, of so many cells.
+    """The closed image of the faces of a box of three bundles, of so many cells along each edge.
 
     The map is one to one inside. Vertices lie on the boundary to the tolerance of the tips, NaN
     where there is no stable equilibrium, and so do edges of the box: sharp rims stay sharp.

@@ -28,7 +28,7 @@ _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of th
 
 
 def grid_ticks(tip_map: TipMap, cells: int) -> list[Array]:
-    """Ticks along each free bundle in the unit cube, with 4 k cells between kinks of the map."""
+    """Ticks along each free bundle in the unit cube, a multiple of four cells between kinks."""
     box, ticks = tip_map.box, list[Array]()
     for k in box.free:
         places = np.unique((tip_map.kinks[k] - box.low[k]) / box.widths[k])
@@ -249,7 +249,7 @@ def _joined(held: Held, states: Index) -> Index:
 
 
 def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
-    """Numbers (k, 2^m) of places where branches end on the way to corners without a posture.
+    """Numbers (k, 2^m) of the places where branches end on the way to corners, and the places.
 
     All cells of a branch share its place beside one node, so that its sheet has no cracks.
     """

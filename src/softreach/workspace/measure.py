@@ -48,9 +48,9 @@ def named(**estimates: Estimate) -> dict[str, Any]:
 
 
 def extrapolated(fine: float, coarse: float, share: float = 1.0) -> Estimate:
-    """The limit of numbers that err by O(1/n²), from n and n/2 cells; a share of what it removes.
+    """The limit of numbers that err by O(1/n²), from grids of n and n/2 cells.
 
-    That is the error stated: all of it, unless dense sets have shown that less will do.
+    A share of what is removed is the error stated: all, unless dense sets show that less will do.
     """
     removed = (fine - coarse) / 3.0
     return Estimate(fine + removed, share * abs(removed))
@@ -91,7 +91,7 @@ def torn_volume(image: Image) -> Estimate:
 
 
 def multiply_covered(image: Image) -> tuple[dict[int, float], float]:
-    """Volumes reached by each number of activations from 2 [m³], and by how much half a grid errs.
+    """Volumes reached by 2, 3, ... activations [m³], and how their sum changes on half the cells.
 
     A number whose volume is below the error, or changes by more than itself on half as fine a
     grid, is not a finding but the roughness of a fold: such places count with the next smaller.

@@ -190,7 +190,7 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
 
 
 def all_reached(grid: ReachedGrid, gamma: Array, tips: Array) -> ReachedGrid:
-    """Centers that searches from clouds find until one finds no more, and distances around."""
+    """All centers that searches find, from one cloud after the other, and distances around."""
     grid.add(gamma, tips)
     for number in range(1, _CLOUDS):
         while not grid.fits():

@@ -38,7 +38,7 @@ class Running(NamedTuple):
 
 @kernel
 def judge(running, n, tips, ahead, targets, ends, enough, stop, bounds):
-    """Take in the trials of the first n, and set up the next steps of those that go on; how many.
+    """Take in the trials of the first n; set up the next steps and return how many of them go on.
 
     Trials have tips (n, 3), `NOWHERE` if they do not count, and ∂r/∂γ `ahead` (n, 3, m); targets
     (all, 3) and ends, the best activations, tips and distances, are those of all searches. A search

@@ -54,7 +54,7 @@ class Running(NamedTuple):
 
 @kernel
 def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, ends):
-    """Take in the trials of the first n, and set up the next steps of those that go on; how many.
+    """Take in the trials of the first n; set up the next steps and return how many of them go on.
 
     Trials have tips (n, 3) and ∂r/∂γ `ahead` (n, 3, m); owners (all,) are the targets (t, 3) of all
     searches, which stay near to activations (t, m). `box` holds bounds and ranges, `limits` the

@@ -49,7 +49,7 @@ def most_crossings(points, triangles, unit, p, q):
 
 @strict
 def crossings(points, triangles, unit, axis, width, out):
-    """Cross all triangles with lines of sight through cell centers along an axis; their number.
+    """Cross all triangles with lines of sight through cell centers along an axis; return how many.
 
     Points (n, 3) are whole numbers, of which cell centers are multiples of `unit`, a power of two;
     triangles are rows of `critical_triangles`; `width` cells lie along the axis before, cyclically.
