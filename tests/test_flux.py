@@ -203,11 +203,8 @@ def test_the_flux_is_the_integral_of_det_j_whether_the_map_folds_or_not():
         assert signed_volume(rod).value == pytest.approx(whole, rel=1e-8)
 
 
-def test_the_paper_s_design_folds_in_a_corner_and_is_rasterized():
+def test_the_paper_s_design_folds_in_a_corner_and_is_rasterized_and_so_are_loaded_arms():
     assert solid(ARM, accuracy=0.02).route == "raster"
-
-
-def test_loaded_arms_are_always_rasterized():
     arm = rubber(ONE_TO_ONE["minimal trunk"], Loads(payload=1e-6))
     assert solid(arm, accuracy=0.1).route == "raster"
 

@@ -75,11 +75,7 @@ def test_the_tip_map_of_the_free_bundles_is_that_of_all_on_a_face_of_the_box(bun
     assert np.array_equal(part.strains(free, stations)[0], whole.strains(gamma, stations)[0])
     assert np.array_equal(part.radius(stations), whole.radius(stations))
     assert np.array_equal(part.status(free), whole.status(gamma))
-
-
-def test_the_tip_map_of_an_arm_without_held_bundles_is_itself_that_of_its_free_ones(trunk):
-    rod = as_tip_map(trunk)
-    assert free_bundles(rod) is rod
+    assert free_bundles(part) is part
 
 
 @pytest.mark.parametrize(
@@ -88,12 +84,8 @@ def test_the_tip_map_of_an_arm_without_held_bundles_is_itself_that_of_its_free_o
 def test_one_of_four_bundles_held_at_rest_leaves_every_solution_of_the_arm_without_it(bundle):
     four = designs.redundant_trunk(np.radians(36), np.radians(3))
     held, three = holding(four, {bundle: 0.0}), without(four, bundle)
-    targets = np.concatenate(
-        [
-            tip_positions(three, in_box(three, 100), tol=FINE),
-            np.random.default_rng(0).uniform(-1, 1, (4, 3)),
-        ]
-    )
+    anywhere = np.random.default_rng(0).uniform(-1, 1, (4, 3))
+    targets = np.concatenate([tip_positions(three, in_box(three, 100), tol=FINE), anywhere])
     found = solve_inverse(held, targets, tol=FINE)
     expected = solve_inverse(three, targets, tol=FINE)
     assert np.array_equal(found.counts, expected.counts)

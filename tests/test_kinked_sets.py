@@ -22,10 +22,7 @@ from softreach.arm import (
 from softreach.arm.actuators import LengthTendon
 from softreach.arm.loads import PointLoad
 from softreach.rod.rods import as_tip_map, effective, free_bundles, measured_bundles
-from softreach.workspace import (
-    reachable_set,
-    volume_gradient,
-)
+from softreach.workspace import reachable_set, volume_gradient
 from softreach.workspace.sheets import _zero
 
 RUBBER = Material(young_modulus=1e6, poisson_ratio=0.5, density=1000.0)
@@ -145,15 +142,9 @@ def test_four_tendons_by_length_reach_circular_arcs():
 
 
 def test_a_tip_map_knows_whether_it_is_smooth_through_every_wrapper():
-    kinked, plain = (
-        as_tip_map(driven((-1.0, 1.0), 0.1)),
-        as_tip_map(driven((-0.2, 0.2), offset=1.0)),
-    )
-    for rod, smooth in (
-        (kinked, False),
-        (plain, True),
-        (as_tip_map(by_length(3, (0, 0.02))), False),
-    ):
+    kinked, slack = as_tip_map(driven((-1.0, 1.0), 0.1)), as_tip_map(by_length(3, (0, 0.02)))
+    plain = as_tip_map(driven((-0.2, 0.2), offset=1.0))
+    for rod, smooth in ((kinked, False), (plain, True), (slack, False)):
         placed = as_tip_map(rod.arm.replace(base=rod.arm.base.replace(points="down")))
         for each in (rod, placed, free_bundles(rod), measured_bundles(rod), effective(rod)):
             assert each.is_smooth == smooth, each

@@ -149,9 +149,7 @@ def test_the_set_of_a_marker_holds_its_places(name):
 
 def test_the_area_of_sheets_is_that_of_finer_grids_to_its_error():
     arm = loaded("lce", 30, "up")
-    two = arm.with_bounds(
-        [*arm.bounds[:2], (-1.5, -1.5)]
-    )  # between forks, which grids meet by luck
+    two = arm.with_bounds([*arm.bounds[:2], (-1.5, -1.5)])  # between forks, met by luck
     found = reachable_set(two)
     assert found.dimension == 2
     assert found.area_error < 0.1 * found.area

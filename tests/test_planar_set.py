@@ -65,10 +65,7 @@ def test_four_bundles_reach_as_much_as_pixels_count(region):
     tips = rod.tips(rod.box.from_cube(cube))
     flat = tips @ np.array([[math.cos(0.4), 0.0], [math.sin(0.4), 0.0], [0.0, 1.0]])
     counts = []
-    for pixels in (
-        100,
-        200,
-    ):  # each pixel that is touched counts in full, which the limit takes off
+    for pixels in (100, 200):  # those touched count in full, which the limit takes off
         side = np.ptp(flat[:, 0]) / pixels
         touched = np.unique(np.floor(flat / side).astype(int), axis=0)
         counts.append(len(touched) * side**2)
@@ -111,11 +108,9 @@ def test_two_bundles_have_the_area_that_green_tells():
 
 @pytest.mark.parametrize(("pairs", "chamber"), [(1, True), (2, True), (3, False)])
 def test_any_number_of_bundles_leaves_an_area_wherever_the_base_points(pairs, chamber):
-    upright = reachable_set(planar(pairs=pairs, chamber=chamber), accuracy=0.02)
-    leaning = reachable_set(
-        planar(pairs=pairs, chamber=chamber, points="-x", turn=0.3, position=(1.0, 2.0, 3.0)),
-        accuracy=0.02,
-    )
+    bases = {}, {"points": "-x", "turn": 0.3, "position": (1.0, 2.0, 3.0)}
+    arms = [planar(pairs=pairs, chamber=chamber, **base) for base in bases]
+    upright, leaning = (reachable_set(arm, accuracy=0.02) for arm in arms)
     assert upright.outline is not None
     assert leaning.outline is not None
     error = upright.area_error + leaning.area_error

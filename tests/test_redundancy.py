@@ -126,15 +126,9 @@ def test_the_summary_counts_points_and_cells():
 
 
 def test_medians_and_shares_of_many_draws_scatter_by_their_errors(strewn):
-    rng, sample = np.random.default_rng(2), np.arange(400)
-    summaries = [
-        redundancy_summary(
-            strewn,
-            xr.DataArray(rng.exponential(size=400), {"sample": sample}, ("sample",)),
-            threshold=1.5,
-        )
-        for _ in range(300)
-    ]
+    drawn, sample = np.random.default_rng(2).exponential(size=(300, 400)), np.arange(400)
+    made = (xr.DataArray(values, {"sample": sample}, ("sample",)) for values in drawn)
+    summaries = [redundancy_summary(strewn, distance, threshold=1.5) for distance in made]
     for name in ("median", "redundant_points"):
         scatter = np.std([getattr(one, name) for one in summaries])
         stated = np.mean([getattr(one, f"{name}_error") for one in summaries])
@@ -183,9 +177,8 @@ def test_a_map_puts_every_value_where_its_tip_is():
     tip = np.array([[-0.26, 0.0, 0.51], [0.31, 0.2, 0.49], [0.31, 0.2, 0.49]])
     cloud = made_up(tip, [[0, 0, 0], [1, 0, 0], [3, 0, 0]])
     grid = distance_map(cloud, activation_distance(cloud, 0.0), cell=0.1)
-    assert float(
-        grid.activation_distance.sel(x=0.35, y=0.25, z=0.45, method="nearest")
-    ) == pytest.approx(2.0)
+    there = grid.activation_distance.sel(x=0.35, y=0.25, z=0.45, method="nearest")
+    assert float(there) == pytest.approx(2.0)
     assert float(grid.activation_distance.count()) == 1.0
     assert grid.x.attrs["units"] == "m"
 

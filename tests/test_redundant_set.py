@@ -10,7 +10,6 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
-from softreach.kernels.box.box_projection import project
 from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import ReachableSet, reachable_set
@@ -89,15 +88,15 @@ def test_tips_of_faces_of_every_dimension_are_inside_to_a_part_of_a_cell(five):
 
 
 @pytest.mark.parametrize(
-    ("arm", "accuracy"),
+    ("design", "accuracy"),
     [
-        pytest.param(six_bundles(), 1e-2, id="six at 1 %"),
-        pytest.param(twelve_bundles(), 5e-2, id="twelve at 5 %"),
-        pytest.param(five_bundles(), 3e-3, id="five at the default", marks=pytest.mark.large),
+        (six_bundles, 1e-2),
+        (twelve_bundles, 5e-2),
+        pytest.param(five_bundles, 3e-3, marks=pytest.mark.large),
     ],
 )
-def test_many_bundles_keep_the_accuracy_asked(arm, accuracy):
-    found = solid(arm, accuracy=accuracy, memory=5e8)
+def test_many_bundles_keep_the_accuracy_asked(design, accuracy):
+    found = solid(design(), accuracy=accuracy, memory=5e8)
     assert 0 < found.volume_error <= accuracy * found.volume
     assert found.volume < found.convex_volume + found.convex_volume_error
 
@@ -107,11 +106,10 @@ def test_the_surface_of_a_set_with_a_thin_rim_is_closed_and_in_one_piece():
     from scipy.sparse.csgraph import connected_components
 
     four = solid(designs.redundant_trunk(), accuracy=5e-2)
-    surface = four.surface()
-    sides = np.stack([surface.faces, np.roll(surface.faces, -1, axis=1)], -1).reshape(-1, 2)
+    surface, count = four.surface(), len(four.surface().vertices)
     assert is_closed(surface.faces)
-    count = len(surface.vertices)
-    near = coo_array((np.ones(len(sides)), tuple(sides.T)), shape=(count, count))
+    starts, ends = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
+    near = coo_array((np.ones(len(starts)), (starts, ends)), shape=(count, count))
     assert connected_components(near, directed=False)[0] == 1
     assert surface.volume == pytest.approx(four.volume, abs=four.volume_error)
     assert four.distance(surface.vertices).max() < 0.5 * four.grid.attrs["cell"]
@@ -128,26 +126,3 @@ def test_little_memory_means_larger_cells_a_larger_error_and_a_warning():
     assert abs(found.volume - fine.volume) < found.volume_error + fine.volume_error
     with pytest.raises(InvalidInput, match="memory"):
         reachable_set(arm, memory=0.9 * least)
-
-
-def test_damped_steps_solve_linear_problems_within_bounds():
-    # Optimality of a bounded least squares problem: the gradient pushes outward at every bound.
-    rng = np.random.default_rng(0)
-    n, m = 200, 7
-    low, high = -rng.random(m), rng.random(m)
-    gamma = rng.uniform(low, high, (n, m))
-    residual, slopes = rng.normal(size=(n, 3)), rng.normal(size=(n, 3, m))
-    widths = high - low
-    weight = 1e-3 * ((slopes * widths) ** 2).sum(axis=(1, 2)) / 3
-    step, multiplier, scaled = np.empty((n, m)), np.zeros((n, 3)), slopes * widths
-    room = (low - gamma) / widths, (high - gamma) / widths
-    project(np.zeros((n, m)), scaled, -residual, weight, *room, step, multiplier)
-    trial, left = gamma + step * widths, weight * np.linalg.norm(multiplier, axis=1)
-    ahead = residual + np.einsum("nij,nj->ni", scaled, step)
-    assert np.linalg.norm(ahead, axis=1) == pytest.approx(left, abs=1e-9)
-    gradient = np.einsum("nij,ni->nj", scaled, ahead) + weight[:, None] * step
-    at_low, at_high = trial <= low + 1e-9, trial >= high - 1e-9
-    small = 1e-6
-    assert (gradient[at_low] > -small).all()
-    assert (gradient[at_high] < small).all()
-    assert (np.abs(gradient[~at_low & ~at_high]) < small).all()

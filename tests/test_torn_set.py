@@ -14,10 +14,7 @@ from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held, TipMap, TipStatus
 from softreach.support.errors import InvalidInput
-from softreach.workspace import (
-    ReachableSet,
-    reachable_set,
-)
+from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.reach import rasterized_set
 from softreach.workspace.search import nearest_tips
 from tests.bodies import rubber

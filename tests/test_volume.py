@@ -66,15 +66,11 @@ def test_the_corrected_volume_holds_bridges_over_gaps_narrower_than_two_radii(ga
     assert (bridge(gap, alpha) > 0.03 * 2 * BALL) == (gap < 2 * alpha)
 
 
-def test_the_hull_states_what_it_was_made_of():
+def test_a_hull_prints_its_numbers_and_what_it_was_made_of():
     hull = concave_hull(in_ball(3000), alpha=0.5)
     assert (hull.n, hull.alpha, hull.regions) == (3000, 0.5, 1)
     assert hull.spacing == pytest.approx((hull.volume / 3000) ** (1 / 3))
-    assert hull.volume_corrected is None
-    assert hull.bias is None
-
-
-def test_a_hull_prints_its_numbers_and_what_it_was_made_of():
+    assert hull.volume_corrected is hull.bias is None
     hull = concave_hull(in_ball(20_000), alpha=0.3, bias=True)
     size, origin = repr(hull).splitlines()
     assert size.startswith(f"Hull: volume {hull.volume:.5g} m³ (without sampling bias about 4.")
@@ -92,15 +88,11 @@ def test_a_hull_as_a_dataset_encloses_the_volume_that_it_states():
     assert set(found.attrs) == {"softreach_version", "schema_version"}
 
 
-def test_labeled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
+def test_labeled_tips_have_a_default_radius_and_their_axes_in_either_order(tips):
     with pytest.warns(SoftreachWarning, match="mean spacings"):
-        labeled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
+        labeled, plain = concave_hull(tips.T), concave_hull(tips.values, alpha=0.05)
     assert labeled.alpha == 0.05
     assert labeled.volume == plain.volume
-
-
-def test_labeled_tips_may_have_their_axes_in_either_order(tips):
-    assert concave_hull(tips.T, 0.2).volume == concave_hull(tips, 0.2).volume
 
 
 def test_points_without_a_length_need_a_radius():
@@ -132,15 +124,10 @@ def test_threads_change_nothing(tips, monkeypatch):
         np.testing.assert_array_equal(hull.vertices[hull.faces], hulls[0].vertices[hulls[0].faces])
 
 
-def test_where_the_quarter_is_too_sparse_there_is_no_estimate_but_a_warning():
-    with pytest.warns(SoftreachWarning, match=r"no estimate of the bias.* of 500 points"):
-        hull = concave_hull(in_ball(2000), alpha=0.4, bias=True)
-    assert hull.volume_corrected is None
-
-
-def test_a_quarter_of_fewer_than_four_points_gives_no_estimate():
-    with pytest.warns(SoftreachWarning, match=r"no estimate of the bias: 3 points"):
-        hull = concave_hull(in_ball(15), alpha=10.0, bias=True)
+@pytest.mark.parametrize(("n", "alpha", "said"), [(2000, 0.4, ".* of 500"), (15, 10.0, ": 3")])
+def test_where_the_quarter_is_too_sparse_there_is_no_estimate_but_a_warning(n, alpha, said):
+    with pytest.warns(SoftreachWarning, match=f"no estimate of the bias{said} points"):
+        hull = concave_hull(in_ball(n), alpha=alpha, bias=True)
     assert hull.volume > 0.0
     assert hull.volume_corrected is None
 

@@ -14,12 +14,7 @@ from softreach.geometry.hull import convex_hull
 from softreach.inverse import solve_inverse
 from softreach.rod import as_tip_map, tip_positions
 from softreach.support.errors import InvalidInput, NotPossible, SoftreachWarning
-from softreach.workspace import (
-    ReachableSet,
-    Surface,
-    reach,
-    reachable_set,
-)
+from softreach.workspace import ReachableSet, Surface, reach, reachable_set
 from softreach.workspace.image import Image
 from softreach.workspace.reach import rasterized_set
 from tests.laws import arm_of
@@ -43,11 +38,12 @@ def several(found: ReachableSet) -> float:
     return sum(volume for k, volume in found.multiplicity.items() if k > 1)
 
 
-def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
+def test_the_best_design_reaches_0691_and_little_of_it_twice_and_without_taper_06325(best):
     assert best.volume == pytest.approx(0.691, abs=0.001)
     assert best.volume_error < 1e-4
     assert several(best) == pytest.approx(1e-4 * best.volume, rel=0.5)
     assert sum(best.multiplicity.values()) == pytest.approx(best.volume)
+    assert reachable_set(trunk_at(108, 0)).volume == pytest.approx(0.6325, abs=5e-4)
 
 
 @pytest.mark.large
@@ -61,10 +57,6 @@ def test_doubled_resolutions_agree_within_the_errors(best, folded):
         assert abs(fine.convex_volume - coarse.convex_volume) < coarse.convex_volume_error
         assert abs(fine.unreachability - coarse.unreachability) < coarse.unreachability_error
         assert coarse.unreachability_error < 2e-3
-
-
-def test_without_taper_it_is_06325():
-    assert reachable_set(trunk_at(108, 0)).volume == pytest.approx(0.6325, abs=5e-4)
 
 
 def test_at_75_degrees_and_3_of_taper_some_percent_are_reached_twice(folded):
@@ -155,9 +147,8 @@ def test_the_surface_has_no_staircase(best):
     surface = best.surface()
     a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
     normal = np.cross(b - a, c - a)
-    assert np.abs(normal).sum() / np.linalg.norm(normal, axis=1).sum() == pytest.approx(
-        1.5, abs=0.1
-    )
+    share = np.abs(normal).sum() / np.linalg.norm(normal, axis=1).sum()
+    assert share == pytest.approx(1.5, abs=0.1)
     # vertices lie on the image of the grid, not half a cell away
     off = np.abs(best.distance(surface.vertices + 1e-9))
     assert np.quantile(off, 0.99) < 0.1 * best.grid.attrs["cell"]
@@ -226,10 +217,10 @@ def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
 def test_two_free_bundles_sweep_an_area(trunk):
     arm = trunk.with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
     sheet = reachable_set(arm)
-    assert sheet.dimension == 2
     assert (sheet.dimension, sheet.volume, sheet.unreachability) == (2, 0.0, 1.0)
     assert sheet.surface().area == pytest.approx(sheet.area, rel=1e-3)
-    finer = convex_hull(tip_positions(arm, fine_grid(arm, 200)))
+    grid = np.indices((200, 200)).reshape(2, -1).T / 199
+    finer = convex_hull(tip_positions(arm, as_tip_map(arm).box.from_free_cube(grid)))
     assert 0 < finer.volume - sheet.convex_volume < sheet.convex_volume_error < 1e-3
     assert "<img" in sheet._repr_html_()
     assert repr(sheet).startswith(f"ReachableSet: area {sheet.area:.3f}"[:-1])
@@ -238,20 +229,11 @@ def test_two_free_bundles_sweep_an_area(trunk):
     assert sheet.distance(tip_positions(arm, gamma)).max() < 1e-4
 
 
-def fine_grid(arm: Manipulator, n: int) -> np.ndarray:
-    """Activations of n^2 points of two free bundles, corners included."""
-    ticks = np.linspace(0, 1, n)
-    return as_tip_map(arm).box.from_free_cube(
-        np.stack(np.meshgrid(ticks, ticks), -1).reshape(-1, 2)
-    )
-
-
 def test_one_free_bundle_draws_a_curve():
     # A straight fiber that bends the arm: the tip's path, chord by chord.
     fiber = FiberArchitecture(helical_angle=0.0, offset=0.0, extent=0.8)
     arm = arm_of(fiber, activation_bounds=(-5 / 3, 0.0))
     curve = reachable_set(arm)
-    assert curve.dimension == 1
     path = tip_positions(arm, np.linspace(-5 / 3, 0, 4001)[:, None])
     chords = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
     assert (curve.dimension, curve.volume) == (1, 0.0)
@@ -265,7 +247,6 @@ def test_one_free_bundle_draws_a_curve():
 
 def test_no_free_bundle_leaves_a_point(trunk):
     point = reachable_set(trunk.with_bounds((-0.5, -0.5)))
-    assert point.dimension == 0
     assert (point.dimension, point.volume, point.convex_volume) == (0, 0.0, 0.0)
     assert np.isnan([point.unreachability, point.unreachability_error]).all()
     assert repr(point).startswith("ReachableSet: (")
@@ -287,16 +268,11 @@ def test_a_grid_that_is_too_coarse_is_warned_of(monkeypatch):
 
 @pytest.mark.parametrize(
     ("argument", "value", "allowed"),
-    [
-        ("accuracy", 0.0, ">= 1e-06"),
-        ("cell", 1e-9, "at least"),
-        ("cell", np.nan, "> 0"),
-    ],
+    [("accuracy", 0.0, ">= 1e-06"), ("cell", 1e-9, "at least"), ("cell", np.nan, "> 0")],
 )
 def test_a_wrong_argument_is_named(trunk, argument, value, allowed):
-    with pytest.raises(InvalidInput, match=allowed) as caught:
+    with pytest.raises(InvalidInput, match=f"^{argument} = .*{allowed}"):
         reachable_set(trunk, **{argument: value})
-    assert caught.value.name == argument
 
 
 def test_distance_to_a_slab_is_its_height_and_beyond_it_to_its_edges():

@@ -85,18 +85,11 @@ def test_the_ball_is_closed():
     assert mean_value_distance(lattice, values, 1.0)[1][center] == 6
 
 
-def test_the_point_itself_is_not_counted_but_another_at_its_place_is():
-    points, values = np.zeros((3, 3)), np.array([[0.0], [1.0], [3.0]])
+def test_another_point_at_the_place_is_counted_and_an_isolated_one_has_no_mean():
+    points, values = np.array([[0.0] * 3] * 3 + [[1.0] * 3]), np.array([[0.0], [1.0], [3.0], [7.0]])
     mean, count = mean_value_distance(points, values, 0.0)
-    np.testing.assert_array_equal(count, 2)
-    np.testing.assert_allclose(mean, [2.0, 1.5, 2.5])
-
-
-def test_an_isolated_point_has_no_mean():
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [1.1, 0, 0]])
-    mean, count = mean_value_distance(points, np.eye(3), 0.5)
-    np.testing.assert_array_equal(count, [0, 1, 1])
-    np.testing.assert_allclose(mean, [np.nan, np.sqrt(2), np.sqrt(2)])
+    np.testing.assert_array_equal(count, [2, 2, 2, 0])
+    np.testing.assert_allclose(mean, [2.0, 1.5, 2.5, np.nan])
 
 
 @pytest.mark.parametrize("radius", [0.0, 0.02, 200.0, np.inf])

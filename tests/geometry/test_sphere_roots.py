@@ -153,23 +153,13 @@ def test_four_parts_cover_what_was_cut():
 WORK = scratch()
 
 
-def general(rng: np.random.Generator) -> np.ndarray:
+def uniform(rng: np.random.Generator) -> np.ndarray:
     return rng.uniform(-1.0, 1.0, (5, 3))
 
 
-def lattice(rng: np.random.Generator) -> np.ndarray:
-    return rng.integers(-3, 4, (5, 3)) / 8.0
-
-
-def rounded(rng: np.random.Generator) -> np.ndarray:
-    return np.round(rng.uniform(-1.0, 1.0, (5, 3)), 1)
-
-
 def almost_coplanar(rng: np.random.Generator) -> np.ndarray:
-    points = rng.uniform(-1.0, 1.0, (5, 3))
-    points[3] = (
-        points[0] + rng.random() * (points[1] - points[0]) + rng.random() * (points[2] - points[0])
-    )
+    points, (s, t) = uniform(rng), rng.random(2)
+    points[3] = points[0] + s * (points[1] - points[0]) + t * (points[2] - points[0])
     return points / 4.0
 
 
@@ -179,32 +169,24 @@ def almost_cospherical(rng: np.random.Generator) -> np.ndarray:
 
 
 def almost_equal(rng: np.random.Generator) -> np.ndarray:
-    points = rng.uniform(-1.0, 1.0, (5, 3))
+    points = uniform(rng)
     points[3:] = points[:2] + 1e-15 * rng.integers(-3, 4, (2, 3))
     return points
 
 
-def unit_in_the_last_place(rng: np.random.Generator) -> np.ndarray:
-    return 0.5 + rng.integers(-4, 5, (5, 3)) * 2.0**-53
+KINDS = {
+    "general": uniform,
+    "lattice": lambda rng: rng.integers(-3, 4, (5, 3)) / 8.0,
+    "rounded": lambda rng: np.round(uniform(rng), 1),
+    "almost coplanar": almost_coplanar,
+    "almost cospherical": almost_cospherical,
+    "almost equal": almost_equal,
+    "unit in the last place": lambda rng: 0.5 + rng.integers(-4, 5, (5, 3)) * 2.0**-53,
+    "widely scaled": lambda rng: np.round(uniform(rng) * 2.0 ** rng.integers(-150, 0, (5, 3)), 60),
+}
 
 
-def widely_scaled(rng: np.random.Generator) -> np.ndarray:
-    return np.round(rng.uniform(-1, 1, (5, 3)) * 2.0 ** rng.integers(-150, 0, (5, 3)), 60)
-
-
-KINDS = [
-    general,
-    lattice,
-    rounded,
-    almost_coplanar,
-    almost_cospherical,
-    almost_equal,
-    unit_in_the_last_place,
-    widely_scaled,
-]
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 def test_signs_equal_those_of_rational_arithmetic(kind, rng):
     for _ in range(150):
         points = kind(rng)
@@ -322,23 +304,12 @@ def test_cells_of_small_random_clouds_equal_those_of_qhull(n, seed):
 
 
 @every_degenerate
-def test_degenerate_clouds_give_an_exact_delaunay_triangulation(name):
+def test_degenerate_clouds_give_an_exact_delaunay_triangulation_of_their_hull(name):
+    """Every distinct point is a vertex, none is beyond an outer face, and volumes sum up."""
     mesh = delaunay(DEGENERATE[name])
     assert_adjacency(mesh)
     assert_delaunay(mesh)
-
-
-@every_degenerate
-def test_every_distinct_point_is_a_vertex(name):
-    points = DEGENERATE[name]
-    mesh = delaunay(points)
-    assert len(np.unique(mesh.tetrahedra)) == len(np.unique(points, axis=0))
-
-
-@every_degenerate
-def test_the_hull_of_the_cells_is_convex_and_filled_once(name):
-    """No point beyond any outer face, and the volumes sum up to what these faces enclose."""
-    mesh = delaunay(DEGENERATE[name])
+    assert len(np.unique(mesh.tetrahedra)) == len(np.unique(mesh.points, axis=0))
     points, _ = unit_scale(mesh.points)
     for t, i in np.argwhere(mesh.neighbors < 0):
         a, b, c = mesh.tetrahedra[t][FACES[i]]

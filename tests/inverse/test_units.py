@@ -40,14 +40,8 @@ def test_the_least_change_does_not_depend_on_units():
 
     Both are found to the step at which a search ends, in ranges.
     """
-    soft, stiff = (
-        arm_of(TENDONS, CHAMBER),
-        arm_of(
-            TENDONS.replace(activation_bounds=(0, 80)),
-            CHAMBER.replace(activation_bounds=(0, 5e5)),
-            modulus=1e6,
-        ),
-    )
+    strong = TENDONS.replace(activation_bounds=(0, 80)), CHAMBER.replace(activation_bounds=(0, 5e5))
+    soft, stiff = arm_of(TENDONS, CHAMBER), arm_of(*strong, modulus=1e6)
     targets = sr.tip_positions(soft, in_box(soft, 50))
     one, other = (
         sr.solve_inverse(arm, targets).activations / arm.bounds[:, 1] for arm in (soft, stiff)

@@ -11,30 +11,28 @@ from softreach.inverse.cells import ImageLeaves, image_tree
 from softreach.kernels.branches import candidates, newton
 from softreach.kernels.branches.candidates import MOST_STARTS, find_starts
 from softreach.kernels.branches.space_tree import SpaceTree, leaf_at
+from softreach.kernels.image.activation_mesh import ActivationMesh
 from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic, sampled
 
 SEEDS = st.integers(0, 2**32 - 1)
 LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
 
 
+def starts_in(mesh: ActivationMesh, tree: SpaceTree, targets: np.ndarray, with_root: bool = True):
+    """Number of the target, cell, activation and inverse of the Jacobian of every start."""
+    room = MOST_STARTS * (1 + len(targets))
+    out = np.empty(room, int), np.empty(room, int), np.empty((room, 3)), np.empty((room, 3, 3))
+    done, count = find_starts(mesh, tree, targets, LOW, HIGH, with_root, *out)
+    assert done == len(targets)
+    return [values[:count] for values in out]
+
+
 def starts_of(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = True):
-    """Number of the target and activation of every start."""
-    return starts_and_inverses(f, targets, cells, with_root)[:2]
-
-
-def starts_and_inverses(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = True):
-    """The same, and the inverse of the Jacobian at each."""
+    """Number of the target, activation and inverse of the Jacobian of every start."""
     mesh = mesh_of(f, cells)
     mesh = mesh._replace(remainder=np.maximum(mesh.remainder, 1e-14))  # rounding, if f is affine
-    tree = image_tree(mesh)
-    room = MOST_STARTS * (1 + len(targets))
-    target, cell, start = np.empty(room, int), np.empty(room, int), np.empty((room, 3))
-    inverse = np.empty((room, 3, 3))
-    done, found = find_starts(
-        mesh, tree, targets, LOW, HIGH, with_root, target, cell, start, inverse
-    )
-    assert done == len(targets)
-    return target[:found], start[:found], inverse[:found]
+    target, _, start, inverse = starts_in(mesh, image_tree(mesh), targets, with_root)
+    return target, start, inverse
 
 
 @given(seed=SEEDS, with_root=st.booleans())
@@ -44,7 +42,7 @@ def test_the_root_of_an_affine_map_is_found_exactly(seed, with_root):
     b = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ np.diag(rng.uniform(0.1, 1, 3))
     f = Quadratic(rng.normal(size=3), b, np.zeros((3, 3, 3)))
     gamma = rng.uniform(-1, 1, (60, 3))
-    target, start = starts_of(f, f.values(gamma), 4, with_root)
+    target, start, _ = starts_of(f, f.values(gamma), 4, with_root)
     assert set(target) == set(range(60))
     assert start == pytest.approx(gamma[target], abs=1e-10)
 
@@ -57,13 +55,8 @@ def test_starts_do_not_depend_on_how_space_is_divided(seed):
     mesh, targets = mesh_of(f, 6), f.values(rng.uniform(-1.1, 1.1, (40, 3)))
     trees = image_tree(mesh), ImageLeaves(mesh).around(targets)
     assert [len(tree.child) > 1 for tree in trees] == [True, False]
-    found = []
-    for tree in trees:
-        room = MOST_STARTS * (1 + len(targets))
-        out = np.empty(room, int), np.empty(room, int), np.empty((room, 3)), np.empty((room, 3, 3))
-        _, count = find_starts(mesh, tree, targets, LOW, HIGH, True, *out)
-        found.append([values[:count].tobytes() for values in out])
-    assert found[0] == found[1]
+    first, second = (starts_in(mesh, tree, targets) for tree in trees)
+    assert all(map(np.array_equal, first, second))
 
 
 @given(seed=SEEDS)
@@ -71,7 +64,7 @@ def test_starts_do_not_depend_on_how_space_is_divided(seed):
 def test_a_start_knows_the_inverse_of_the_jacobian_there(seed):
     f = random_quadratic(np.random.default_rng(seed), bend=0.02)
     gamma = np.random.default_rng(seed).uniform(-1, 1, (60, 3))
-    _, start, inverse = starts_and_inverses(f, f.values(gamma), 4)
+    _, start, inverse = starts_of(f, f.values(gamma), 4)
     product = np.einsum("nij,njk->nik", inverse, f.slopes(start))
     assert np.median(np.abs(product - np.eye(3)).max(axis=(1, 2))) < 1e-3
 
@@ -84,7 +77,7 @@ def test_both_roots_of_a_fold_have_a_start(seed):
     f, y = fold.quadratic(), rng.uniform(-0.2, 0.2, (60, 3))
     y[:, 0] += np.where(y[:, 0] < 0, -0.25, 0.25)
     gamma = y @ fold.r  # inside the box, and so are the mirror images
-    target, start = starts_of(f, f.values(gamma), 5)
+    target, start, _ = starts_of(f, f.values(gamma), 5)
     for roots in (gamma, fold.mirrored(gamma)):
         apart = np.abs(start - roots[target]).max(axis=1)
         nearest = np.full(60, np.inf)
@@ -96,7 +89,7 @@ def test_both_roots_of_a_fold_have_a_start(seed):
 
 def test_a_target_out_of_reach_has_no_start():
     f = Quadratic(np.zeros(3), np.eye(3), np.zeros((3, 3, 3)))
-    target, _ = starts_of(f, np.array([[1.1, 0.0, 0.0], [0.0, -2.0, 0.0], [9.0, 9.0, 9.0]]), 4)
+    target, *_ = starts_of(f, np.array([[1.1, 0.0, 0.0], [0.0, -2.0, 0.0], [9.0, 9.0, 9.0]]), 4)
     assert len(target) == 0
 
 

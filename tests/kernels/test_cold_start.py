@@ -35,7 +35,7 @@ NEWTON = {
     "newton.newton_step",
     "newton.conditions",
     "newton.merge_equal",
-    "folds.second_preimages",
+    "newton.second_preimages",
 }
 KERNELS = {
     "cloud": ROD,

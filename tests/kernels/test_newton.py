@@ -24,16 +24,9 @@ LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
 
 def solved(f: Quadratic, targets: np.ndarray, start: np.ndarray, rounds: int) -> Search:
     n = len(start)
-    search = Search(
-        target=targets,
-        gamma=start.copy(),
-        slope=np.zeros((n, 3, 3)),
-        residual=np.full(n, 1e300),
-        step=np.zeros((n, 3)),
-        damping=np.ones(n),
-        trial=start.copy(),
-        state=np.full(n, RUNNING),
-    )
+    slope, residual, step = np.zeros((n, 3, 3)), np.full(n, 1e300), np.zeros((n, 3))
+    damping, state = np.ones(n), np.full(n, RUNNING)
+    search = Search(targets, start.copy(), slope, residual, step, damping, start.copy(), state)
     for _ in range(rounds):
         active = np.flatnonzero(search.state == RUNNING)
         trial = search.trial[active]
@@ -42,7 +35,7 @@ def solved(f: Quadratic, targets: np.ndarray, start: np.ndarray, rounds: int) ->
 
 
 @given(seed=SEEDS, exponent=st.floats(-5, 0))
-def test_singular_values_are_those_of_lapack(seed, exponent):
+def test_singular_values_are_those_of_lapack_and_condition_numbers_may_be_infinite(seed, exponent):
     rng = np.random.default_rng(seed)
     u, v = np.linalg.qr(rng.normal(size=(2, 200, 3, 3)))[0]
     sigma = np.sort(10.0 ** rng.uniform(exponent, 0, (200, 3)))[:, ::-1]
@@ -52,14 +45,10 @@ def test_singular_values_are_those_of_lapack(seed, exponent):
     exact = np.linalg.svd(matrices, compute_uv=False)
     assert np.allclose(smallest, exact[:, 2], rtol=0, atol=1e-13)
     assert np.allclose(condition, exact[:, 0] / exact[:, 2], rtol=1e-13 * 10 ** (-2 * exponent))
-
-
-def test_singular_matrices_have_an_infinite_condition_number():
-    matrices = np.array([np.zeros((3, 3)), np.ones((3, 3)), np.diag([1.0, 2.0, 0.0])])
-    smallest, condition = np.empty(3), np.empty(3)
-    conditions(matrices, smallest, condition)
-    assert (smallest == 0).all()
-    assert np.isinf(condition).all()
+    singular = np.array([np.zeros((3, 3)), np.ones((3, 3)), np.diag([1.0, 2.0, 0.0])])
+    conditions(singular, smallest[:3], condition[:3])
+    assert (smallest[:3] == 0).all()
+    assert np.isinf(condition[:3]).all()
 
 
 @given(seed=SEEDS)

@@ -26,6 +26,7 @@ from softreach.kernels.box.simplices import (
 from softreach.kernels.image import contour, raster
 from softreach.kernels.image.activation_mesh import ActivationMesh, face_planes
 from softreach.rod import as_tip_map, tip_positions
+from softreach.support.arrays import rows
 from tests.inverse.test_many_bundles import six_bundles
 from tests.kernels.maps import Quadratic, mesh_of, random_quadratic, sampled
 from tests.laws import arm_of
@@ -57,7 +58,7 @@ def counts(vertices: np.ndarray, cells: Cells, size: int) -> tuple[np.ndarray, .
     out = raster.empty_crossings(raster.most_crossings(vertices, triangles, UNIT, 0, 1))
     used = raster.crossings(vertices, triangles, UNIT, 2, size, out)
     cover, degree = np.zeros((2, size * size, size), np.int32)
-    raster.add_counts(raster.first_crossings(out, used), cover, degree)
+    raster.add_counts(rows(out, slice(used)), cover, degree)
     return cover.reshape((size,) * 3), degree.reshape((size,) * 3)
 
 

@@ -6,11 +6,9 @@ from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
@@ -19,7 +17,6 @@ from softreach.rod.tip_map import BLOCK, Frame, TipMap, TipOutputs
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
-from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import place_to_read, replacing_folder
 from softreach.support.files.formats import FileFormat, Formats
@@ -88,17 +85,27 @@ def compute_cloud(
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
-    status = np.empty(n if tip_map.supports_unstable else 0, np.int8)
+    status = np.empty(n, np.int8) if tip_map.supports_unstable else None
     show_bar = report is None and n > _LONG
-    cubes = cube_blocks(sampler, n, bundles, seed, BLOCK)
     tip_map.prepare()
+
+    def fill(rows: slice, progress: Progress | None) -> None:
+        kept = None if status is None else status[rows]
+        tip_map.fill(activation[rows], TipOutputs(tip[rows], status=kept))
+        if progress:
+            progress(rows.stop - rows.start)
+
+    def tasks(progress: Progress | None) -> Iterator[Callable[[], object]]:
+        cubes = cube_blocks(sampler, n, bundles, seed, BLOCK)
+        for rows, cube in zip(parallel.blocks(n, BLOCK), cubes, strict=True):
+            tip_map.box.from_cube(cube, out=activation[rows])
+            yield partial(fill, rows, progress)
+
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
-        parallel.run(_tasks(tip_map, activation, tip, status, cubes, shown))
-    drawn = {"seed": seed, "sampler": sampler}
-    cloud = schema.cloud_dataset(
-        tip_map.arm, activation, tip, **drawn, tol=tip_map.tol, frame=tip_map.frame
-    )
-    return schema.with_status(cloud, status) if tip_map.supports_unstable else cloud
+        parallel.run(tasks(shown))
+    made = {"seed": seed, "sampler": sampler, "tol": tip_map.tol, "frame": tip_map.frame}
+    cloud = schema.cloud_dataset(tip_map.arm, activation, tip, **made)
+    return cloud if status is None else schema.with_status(cloud, status)
 
 
 def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -117,14 +124,22 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool 
             something else is there.
         NotWritten: It cannot be written.
     """
-    place = as_path("path", path)
-    overwrite = as_flag("overwrite", overwrite)
+    place, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     schema.check_stored_cloud(cloud)
-    with (
-        replacing_folder(place, foreign_entry, overwrite=overwrite) as partial_path,
-        _few_chunks_at_a_time(),
-    ):
-        _write(schema.storable(cloud), partial_path)
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    stored, chunk = schema.storable(cloud), min(cloud.sizes["sample"], _CHUNK)
+    # A checksum for each chunk, also for those of NaN alone.
+    encoding: dict[Hashable, Any] = {
+        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in stored.variables
+    }
+    for name in ("tip", "activation"):
+        encoding[name]["chunks"] = (chunk, stored[name].shape[1])
+    options = {"zarr_format": 3, "consolidated": False, "write_empty_chunks": True}
+    made = replacing_folder(place, foreign_entry, overwrite=overwrite)
+    with made as folder, _few_chunks_at_a_time():
+        stored.to_zarr(folder, mode="w", encoding=encoding, **options)
+        seal(folder)
 
 
 def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
@@ -167,50 +182,7 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
     return as_tip_map(arm, float(cloud.attrs["tol"]), frame=schema.frame_of(cloud))
 
 
-def _tasks(
-    tip_map: TipMap,
-    activation: Array,
-    tip: Array,
-    status: NDArray[np.int8],
-    cubes: Iterator[Array],
-    progress: Progress | None,
-) -> Iterator[Callable[[], object]]:
-    def fill(rows: slice) -> None:
-        kept = status[rows] if len(status) else None
-        tip_map.fill(activation[rows], TipOutputs(tip[rows], status=kept))
-        if progress:
-            progress(rows.stop - rows.start)
-
-    first = 0
-    for cube in cubes:
-        rows = slice(first, first := first + len(cube))
-        tip_map.box.from_cube(cube, out=activation[rows])
-        yield partial(fill, rows)
-
-
-CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}
-"""Format of a stored cloud."""
-
-
-def _write(cloud: xr.Dataset, path: Path) -> None:
-    """Write all variables, with a checksum for each chunk, also for those of NaN alone."""
-    from zarr.codecs import Crc32cCodec, ZstdCodec
-
-    encoding: dict[Hashable, Any] = {
-        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in cloud.variables
-    }
-    chunk = min(cloud.sizes["sample"], _CHUNK)
-    for name in ("tip", "activation"):
-        encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
-    cloud.to_zarr(
-        path,
-        mode="w",
-        zarr_format=3,
-        consolidated=False,
-        encoding=encoding,
-        write_empty_chunks=True,
-    )
-    seal(path)
+CLOUD_STORE: Formats = {".zarr": FileFormat(foreign=foreign_entry)}  # format of a stored cloud
 
 
 def _few_chunks_at_a_time() -> AbstractContextManager[object]:

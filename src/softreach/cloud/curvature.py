@@ -1,13 +1,11 @@
-"""Bend, twist and stretch of an arm over an entire cloud, station by station (section 4).
+"""Bend, twist and stretch over a cloud (section 4): blocks of samples fill histograms.
 
-The statistics are streamed: blocks of samples fill histograms whose bins span what the activation
-box allows, and no array of all samples by stations ever exists.
+Their bins span what the activation box allows; no array of all samples by stations ever exists.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +22,7 @@ from softreach.rod.tip_map import Strains, TipMap, no_equilibrium
 from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer
-from softreach.support.arrays import Array, Index, as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -121,12 +119,12 @@ def stream_statistics(
     places = distal_stations(tip_map) if stations is None else stations
     z = tip_map.check_stations(np.atleast_1d(as_floats("stations", places)), ascending=False)
     tallies = {
-        name: _Tally.between(ends, bins)
+        name: _Tally(ends, bins)
         for name, ends in zip(QUANTITIES, strain_ranges(tip_map, z), strict=True)
     }
     for strains in _strains(tip_map, activations, z):
         for k in range(len(z)):
-            u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
+            u1, u2, u3 = strains.curvature[:, k].T
             tallies["bending"].add(k, np.hypot(u1, u2))  # theory (7), (45)
             tallies["torsion"].add(k, u3)
             tallies["extension"].add(k, strains.extension[:, k])
@@ -158,9 +156,6 @@ def strain_ranges(tip_map: ArmMap, z: Array) -> tuple[Array, Array, Array]:
     Exact but for bending, which is at most 1e-5 too large for fibers and muscles, and with tendons
     and chambers by as much as their ζ differs. Under loads, and with tendons driven by length, they
     are those of samples: others may strain the arm a little more.
-
-    Raises:
-        InvalidInput: Under loads no sample has an equilibrium.
     """
     driving, inner = tip_map.inputs.driving, tip_map.rod
     if driving is not None and not driving.is_bundles:
@@ -176,18 +171,24 @@ def strain_ranges(tip_map: ArmMap, z: Array) -> tuple[Array, Array, Array]:
 
 
 def _sampled(strains: Strains) -> tuple[Array, Array, Array]:
-    bend = np.hypot(strains.curvature[..., 0], strains.curvature[..., 1])
-    torsion, extension = (
+    u1, u2, u3 = np.moveaxis(strains.curvature, 2, 0)
+    bending, torsion, extension = (
         np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
-        for values in (strains.curvature[..., 2], strains.extension)
+        for values in (np.hypot(u1, u2), u3, strains.extension)
     )
-    return np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1), torsion, extension
+    bending[:, 0] = 0.0
+    return bending, torsion, extension
 
 
 def _exact(table: Tables, box: ActivationBox) -> tuple[Array, Array, Array]:
     bounds = np.stack([box.low, box.high], axis=1)
-    most, torsion = _most_bending(table.curvature[:, :2], bounds), table.curvature[:, 2]
-    bending, torsion = np.stack([np.zeros_like(most), most], axis=1), ends_over(torsion, bounds)
+    # An upper bound of √(u1² + u2²): the support of (u1, u2) toward many headings.
+    heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
+    toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    along = np.einsum("hc,scb->shb", toward, table.curvature[:, :2])
+    most = (along[..., None] * bounds).max(-1).sum(-1).max(axis=1) / np.cos(np.pi / _HEADINGS)
+    bending = np.stack([np.zeros_like(most), most], axis=1)
+    torsion = ends_over(table.curvature[:, 2], bounds)
     extension = 1.0 + ends_over(table.extension, bounds)
     if table.has_forces:  # η/ζ = 1 - (ζ - η)/ζ
         forces = ends_over(table.extension - table.rest_length_factor, bounds)
@@ -202,35 +203,17 @@ def _products(first: Array, second: Array) -> Array:
     return np.stack([all_ends.min(axis=1), all_ends.max(axis=1)], axis=1)
 
 
-def _most_bending(plane: Array, bounds: Array) -> Array:
-    """An upper bound of √(u1² + u2²): the support of (u1, u2) toward many headings."""
-    heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
-    toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    along = np.einsum("hc,scb->shb", toward, plane)
-    support = (along[..., None] * bounds).max(-1).sum(-1)
-    return support.max(axis=1) / np.cos(np.pi / _HEADINGS)
-
-
-@dataclass(frozen=True, eq=False)
 class _Tally:
     """Histogram, extremes and moments of one quantity at every station."""
 
-    low: Array
-    width: Array
-    count: Index
-    extremes: Array
-    moments: Array
-
-    @classmethod
-    def between(cls, ends: Array, bins: int) -> _Tally:
-        """No values yet, in bins from the lower to the upper end of each row."""
-        low, high = ends.T
-        stations = len(low)
+    def __init__(self, ends: Array, bins: int) -> None:
+        """Begin without values, with bins from the lower to the upper end of each row."""
+        self.low, high = ends.T
         # A quantity that cannot vary still needs bins of some width.
-        width = np.maximum(high - low, 1e-12 * np.maximum(np.abs(high), 1.0)) / bins
-        count = np.zeros((stations, bins), np.int64)
-        extremes = np.tile([np.inf, -np.inf], (stations, 1))
-        return cls(low, width, count, extremes, np.zeros((stations, 2)))
+        self.width = np.maximum(high - self.low, 1e-12 * np.maximum(np.abs(high), 1.0)) / bins
+        self.count = np.zeros((len(ends), bins), np.int64)
+        self.extremes = np.tile([np.inf, -np.inf], (len(ends), 1))
+        self.moments = np.zeros((len(ends), 2))
 
     def add(self, k: int, values: Array) -> None:
         if not len(values):
@@ -251,21 +234,15 @@ class _Tally:
 
     def quantiles(self, shares: Array) -> Array:
         """Quantiles, linear within a bin and inside the extremes, shape (station, quantile)."""
-        rows = zip(self.count, self.edges, self.extremes, strict=True)
-        return np.array([_quantiles(*row, shares) for row in rows])
-
-    def mean_and_std(self) -> tuple[Array, Array]:
-        """Mean and standard deviation, shape (station,) each."""
-        first, second = (self.moments / self.count.sum(axis=1, keepdims=True)).T
-        return self.low + first, np.sqrt(np.maximum(second - first**2, 0.0))
-
-
-def _quantiles(count: Index, edges: Array, extremes: Array, shares: Array) -> Array:
-    below = np.concatenate([[0], np.cumsum(count)]) / count.sum()
-    # Empty bins make flat pieces of the distribution; its inverse jumps over them.
-    rises = np.flatnonzero(np.diff(below) > 0)
-    corners = np.unique(np.concatenate([rises, rises + 1]))
-    return np.clip(np.interp(shares, below[corners], edges[corners]), *extremes)
+        quantiles = np.empty((len(self.low), len(shares)))
+        for k, (count, edges) in enumerate(zip(self.count, self.edges, strict=True)):
+            below = np.concatenate([[0], np.cumsum(count)]) / count.sum()
+            # Empty bins make flat pieces of the distribution; its inverse jumps over them.
+            rises = np.flatnonzero(np.diff(below) > 0)
+            corners = np.unique(np.concatenate([rises, rises + 1]))
+            within = np.interp(shares, below[corners], edges[corners])
+            quantiles[k] = np.clip(within, *self.extremes[k])
+        return quantiles
 
 
 def _dataset(tip_map: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Array) -> xr.Dataset:
@@ -274,7 +251,8 @@ def _dataset(tip_map: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: A
     variables = {}
     for name, tally in tallies.items():
         unit, meaning = QUANTITIES[name]
-        mean, std = tally.mean_and_std()
+        first, second = (tally.moments / tally.count.sum(axis=1, keepdims=True)).T
+        mean, std = tally.low + first, np.sqrt(np.maximum(second - first**2, 0.0))
         of = {"units": unit, "long_name": meaning}
         variables |= {
             f"{name}_count": (("station", "bin"), tally.count, {"units": "1"}),

@@ -58,10 +58,8 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     for rows in parallel.blocks(n, 8 * BLOCK):
         _, slope = tip_map.tips_and_slopes(cloud.activation[rows].values)
         results = slope, measure[rows], condition[rows], sign[rows]
-        parallel.run(
-            partial(_measure, *(each[part] for each in results))
-            for part in parallel.blocks(len(slope), 4096)
-        )
+        parts = parallel.blocks(len(slope), 4096)
+        parallel.run(partial(_measure, *(each[part] for each in results)) for part in parts)
     unit = manipulability_unit(activation_units(cloud["activation"]))
     status = {"status": cloud.coords["status"]} if "status" in cloud.coords else {}
     result = xr.Dataset(coords=status, attrs=cloud.attrs)
@@ -129,14 +127,14 @@ def manipulability_unit(inputs: Sequence[str], length: str = "m") -> str:
 
 def _product(inputs: Sequence[str], count: int) -> str:
     """Unit of the product of so many inputs; empty for numbers."""
-    kinds = set(inputs)
-    if not count or kinds == {"1"}:
+    kinds = dict.fromkeys(inputs)
+    if not count or list(kinds) == ["1"]:
         return ""
     if len(kinds) == 1:
         return _power(inputs[0], count)
     if count < len(inputs):
         return "mixed"
-    units = [_power(unit, inputs.count(unit)) for unit in dict.fromkeys(inputs) if unit != "1"]
+    units = [_power(unit, inputs.count(unit)) for unit in kinds if unit != "1"]
     return units[0] if len(units) == 1 else f"({' '.join(units)})"
 
 
@@ -146,8 +144,7 @@ def _power(unit: str, count: int) -> str:
 
 def _measure(slope: Array, measure: Array, condition: Array, sign: Signs) -> None:
     known = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
-    if not known.all():
-        slope = np.where(known[:, None, None], slope, 0.0)
+    slope = np.where(known[:, None, None], slope, 0.0)
     sigma = np.linalg.svd(slope, compute_uv=False)
     sigma[~known] = np.nan
     measure[:] = sigma.prod(axis=1)  # theory (41)

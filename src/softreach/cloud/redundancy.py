@@ -75,21 +75,15 @@ def activation_distance(
     else:
         mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
         mask, number = stable[sample], np.cumsum(stable) - 1
-        among = number[sample[mask]]
-        known = mean_value_distance(tip[stable], activation[stable], radius, among)
-        mean[mask], others[mask] = known
+        values = tip[stable], activation[stable]
+        mean[mask], others[mask] = mean_value_distance(*values, radius, number[sample[mask]])
     counted = {"long_name": "other tips within the radius", "units": "1"}
-    return xr.DataArray(
-        mean,
-        {"sample": sample, "neighbors": ("sample", others, counted)},
-        ("sample",),
-        name="activation_distance",
-        attrs={
-            **cloud.attrs,
-            "long_name": "mean activation-space distance D̄",
-            "units": cloud["activation"].attrs.get("units", "1"),
-            "radius": radius,
-        },
+    coordinates = {"sample": sample, "neighbors": ("sample", others, counted)}
+    distance = xr.DataArray(mean, coordinates, ("sample",), "activation_distance", cloud.attrs)
+    return distance.assign_attrs(
+        long_name="mean activation-space distance D̄",
+        units=cloud["activation"].attrs.get("units", "1"),
+        radius=radius,
     )
 
 
@@ -159,12 +153,10 @@ def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
         density=(count / grid.volume, name),
         density_error=(np.sqrt(count) / grid.volume, error),
     ).assign_attrs(
-        {
-            **cloud.attrs,
-            "coefficient_of_variation": float(variation),
-            "chance": float(chance),
-            "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
-        }
+        **cloud.attrs,
+        coefficient_of_variation=float(variation),
+        chance=float(chance),
+        heterogeneity=float(np.sqrt(max(variation**2 - chance**2, 0.0))),
     )
 
 

@@ -70,9 +70,7 @@ def concave_hull(
     References:
         [EdelsbrunnerMuecke1994]
     """
-    bias = as_flag("bias", bias)
-    positions = _positions(points)
-    radius = _radius(alpha, points)
+    bias, positions, radius = as_flag("bias", bias), _positions(points), _radius(alpha, points)
     quarter = None
     if bias:  # a random quarter: every fourth point of a Sobol sequence lies in one part of the box
         quarter = np.zeros(len(positions), bool)
@@ -177,19 +175,18 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
 
 def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> float | str:
     """The radius [m], by default that for the length of the arm, or ``"critical"``."""
-    allowed = "a radius > 0 [m], 'critical', or None"
     if alpha is None:
         if (length := getattr(points, "attrs", {}).get("length")) is None:
             hint = "only points with attrs['length'] [m], as cloud.tip has, have a default"
             hint = f"{hint} of {DEFAULT_RADIUS} of it"
             raise InvalidInput("alpha", None, "a radius [m] for these points", hint)
         return DEFAULT_RADIUS * float(length)
-    if isinstance(alpha, str) and alpha == "critical":
-        return alpha
     radius = plain(alpha)
+    if isinstance(radius, str) and radius == "critical":
+        return radius
     if POSITIVE.admits(radius) or (isinstance(radius, float) and radius == np.inf):
         return float(radius)  # infinity keeps every tetrahedron
-    raise InvalidInput("alpha", as_given(alpha), allowed)
+    raise InvalidInput("alpha", as_given(alpha), "a radius > 0 [m], 'critical', or None")
 
 
 def _shape(positions: np.ndarray, radius: float | str, part: Mask | None) -> tuple[Hull, float]:
@@ -214,11 +211,8 @@ def _warn_if_fine(hull: Hull, positions: np.ndarray) -> None:
     in_box = float(np.cbrt(np.ptp(positions, axis=0) / hull.n ** (1 / 3)).prod())
     if hull.alpha >= SPACINGS * max(hull.spacing, SPARSE * in_box):
         return  # the convex hull is no larger than the box
-    if hull.volume > 0:
-        convex_volume = hulls.convex_hull(positions).volume
-    else:  # nor has it any on a curve
-        convex_volume = alpha_hull(positions, np.inf)[0].volume
-    spacing = max(hull.spacing, SPARSE * float(np.cbrt(convex_volume / hull.n)))
+    convex = hulls.convex_hull(positions) if hull.volume > 0 else alpha_hull(positions, np.inf)[0]
+    spacing = max(hull.spacing, SPARSE * convex.spacing)  # none on a curve
     if hull.alpha < SPACINGS * spacing:
         warn(
             f"alpha = {_in_spacings(hull, spacing)}: below {SPACINGS:g} the shape has holes "

@@ -1,18 +1,15 @@
 """Alpha shapes: of every radius from one triangulation, of one radius box by box.
 
 A tetrahedron whose circumscribed sphere has a radius R <= α and its center in a box is Delaunay if
-and only if it is so among the points within α of the box. So boxes that together are all of space
-give the whole shape of radius α, each on a thread of its own. Points enter every triangulation in
-the same order, which decides how cospherical ones are cut (`kernels.points.bowyer_watson`): the
-tetrahedra are those of one triangulation, to the last, whatever the boxes. So are volume and
-surface, as sums are taken and faces listed in an order of their own.
+and only if it is so among the points within α of the box: boxes that together are all of space give
+the whole shape, each on a thread. Points enter every triangulation in the same order, and sums and
+faces have an order of their own: whatever the boxes, all are those of one triangulation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
@@ -36,7 +33,6 @@ WORTHWHILE = 1.4  # times as many points in a box as without overlap, at most
 WHOLE = np.array([[-np.inf] * 3, [np.inf] * 3])
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class AlphaComplex:
     """A triangulation with the radius from which on each tetrahedron belongs to the shape.
 
@@ -47,18 +43,9 @@ class AlphaComplex:
     rounding has no volume and is no region (`kernels.points.alpha`).
     """
 
-    triangulation: Delaunay
-    radii: np.ndarray = field(init=False, repr=False)
-    """Circumscribed radii [m], shape (m,)."""
-    volumes: np.ndarray = field(init=False, repr=False)
-    """Volumes of the tetrahedra [m³], shape (m,)."""
-    least: np.ndarray = field(init=False, repr=False)
-    """The least radii that rounding of the coordinates leaves possible [m], shape (m,)."""
-    flat: Mask = field(init=False, repr=False)
-    """Whether a tetrahedron is no thicker than that rounding, shape (m,)."""
-
-    def __post_init__(self) -> None:
-        mesh = self.triangulation
+    def __init__(self, *, triangulation: Delaunay) -> None:
+        """Measure all tetrahedra."""
+        self.triangulation = mesh = triangulation
         points, exponent = unit_scale(mesh.points)
         radii, least, volumes = np.empty((3, len(mesh.tetrahedra)))
         flat, names = np.empty(len(mesh.tetrahedra), bool), np.arange(len(points))
@@ -69,10 +56,10 @@ class AlphaComplex:
             return partial(kernels.measure_cells, points, cells, names, WHOLE, scratch(), *results)
 
         parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))
-        sizes = np.ldexp(radii, exponent), np.ldexp(least, exponent)
-        results = (*sizes, np.ldexp(volumes, 3 * exponent), flat)
-        for name, values in zip(("radii", "least", "volumes", "flat"), results, strict=True):
-            object.__setattr__(self, name, values)
+        # Circumscribed radii [m], and the least that rounding of the coordinates leaves possible.
+        self.radii, self.least = np.ldexp(radii, exponent), np.ldexp(least, exponent)
+        self.volumes = np.ldexp(volumes, 3 * exponent)  # [m³]
+        self.flat = flat  # whether a tetrahedron is no thicker than that rounding
 
     @lazy
     def _curve(self) -> tuple[np.ndarray, np.ndarray]:
@@ -95,10 +82,8 @@ class AlphaComplex:
     def critical_alpha(self) -> float:
         """The smallest radius [m] at which one region covers all points; inf for a flat cloud.
 
-        The true smallest: below the radius that covers every point no radius will do, and from
-        there on the tetrahedra are added one by one. The number of regions is not monotone in the
-        radius, so a bisection over it can settle on a larger one. Neither this radius nor the
-        volume there converges as a random cloud grows: its most isolated point decides.
+        From the radius that covers every point the tetrahedra are added one by one: the number of
+        regions is not monotone in the radius, so that a bisection can settle on a larger one.
         """
         mesh = self.triangulation
         at_points = np.full(len(mesh.points), -1.0)
@@ -113,10 +98,8 @@ class AlphaComplex:
             return float(max(radius, self.least[self.least <= alike].max()))
         later = np.flatnonzero(self.least > alike)
         order = later[np.argsort(self.least[later])]
-        sizes = self.radii, self.least
-        return float(
-            kernels.radius_of_one_region(mesh.neighbors, *sizes, solid, parent, regions, order)
-        )
+        joined = self.radii, self.least, solid, parent, regions
+        return float(kernels.radius_of_one_region(mesh.neighbors, *joined, order))
 
     def _joined(self, alpha: float) -> tuple[np.ndarray, Mask, int]:
         """Sets for `kernels.added_regions` to add tetrahedra to, and the number of regions."""
@@ -138,13 +121,17 @@ def alpha_hull(
 ) -> tuple[Hull, float]:
     """`AlphaComplex.hull` of one radius on all threads, and the volume [m³] of that of a part.
 
-    The part, a mask of points, comes first into the triangulation and is measured on the way. There
-    are as many boxes as threads, or fewer if so many are given.
+    The part, a mask of points, comes first into the triangulation and is measured on the way.
     """
     scaled, exponent = unit_scale(points)
     radius = float(np.ldexp(alpha, -exponent))
     most = min(parallel.threads_here(), len(points) // FEWEST) if boxes is None else boxes
-    pieces = _pieces(scaled, radius, part, _boxes(scaled, radius, most))
+    parts = [WHOLE]
+    if min(most, len(points)) > 1 and np.isfinite(radius):
+        # A sample will do: the boxes decide how long the shape takes, and nothing else.
+        chosen = np.random.default_rng(0).integers(len(points), size=SAMPLED)
+        parts = _divided(scaled[chosen], radius, WHOLE, most)
+    pieces = _pieces(scaled, radius, part, parts)
     faces, regions = _joined(pieces)
     volume, volume_of_part = (
         float(np.ldexp(_sum(np.concatenate(volumes)), 3 * exponent))
@@ -159,8 +146,8 @@ class _Piece(NamedTuple):
     faces: Faces  # Those between them and the rest, as indices of points
     sets: Index  # Set of connected tetrahedra at each face, counted from 0
     solid: Mask  # Whether each set is a region: not all of it is flat
+    # Of the tetrahedra, and of those that a part of the points has by itself [m³]
     volumes: tuple[Array, Array] = (np.empty(0), np.empty(0))
-    """Of the tetrahedra, and of those that a part of the points has by itself [m³]."""
 
 
 class _Crowded(Exception):
@@ -228,11 +215,9 @@ def _kept_piece(cells: np.ndarray, neighbors: np.ndarray, kept: Mask, flat: Mask
 def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
     """The faces around the regions of all pieces together, and the number of regions."""
     solid = np.concatenate([piece.solid for piece in pieces])
-    counts = np.array([len(piece.solid) for piece in pieces])
-    firsts = np.cumsum(counts) - counts
+    firsts = np.cumsum([0, *(len(piece.solid) for piece in pieces)])
     faces = np.concatenate([piece.faces for piece in pieces])
-    each = zip(firsts, pieces, strict=True)
-    sets = np.concatenate([first + piece.sets for first, piece in each])
+    sets = np.concatenate([k + piece.sets for k, piece in zip(firsts, pieces, strict=False)])
     if len(pieces) == 1:
         return faces[solid[sets]], int(solid.sum())
     inner = np.zeros(len(faces), bool)
@@ -243,15 +228,6 @@ def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
         sets = above
     roots = parent == np.arange(len(parent))
     return faces[~inner & solid[sets]], int(solid[roots].sum())
-
-
-def _boxes(points: Points, alpha: float, most: int) -> list[Array]:
-    """Boxes that together are all of space, with about as many points within alpha of each."""
-    if min(most, len(points)) <= 1 or not np.isfinite(alpha):
-        return [WHOLE]
-    # A sample will do: the boxes decide how long the shape takes, and nothing else.
-    chosen = np.random.default_rng(0).integers(len(points), size=SAMPLED)
-    return _divided(points[chosen], alpha, WHOLE, most)
 
 
 def _divided(sample: Points, alpha: float, box: Array, most: int) -> list[Array]:
@@ -285,11 +261,11 @@ def _near(points: Points, alpha: float, box: Array) -> Mask:
     """Mask of the points in a box widened by the largest radius kept, and by rounding."""
     margin = alpha * (1.0 + 2.0 * kernels.LARGEST_SLACK) + 2.0**-50
     near = np.ones(len(points), bool)
-    for axis in range(3):
-        if box[0, axis] > -np.inf:
-            near &= points[:, axis] >= box[0, axis] - margin
-        if box[1, axis] < np.inf:
-            near &= points[:, axis] <= box[1, axis] + margin
+    for x, low, high in zip(points.T, *box, strict=True):
+        if low > -np.inf:
+            near &= x >= low - margin
+        if high < np.inf:
+            near &= x <= high + margin
     return near
 
 

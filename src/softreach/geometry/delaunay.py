@@ -17,12 +17,9 @@ _NEIGHBORS = 16
 
 
 def delaunay(points: np.ndarray) -> Delaunay:
-    """Triangulate a cloud of points, by exact predicates and so right for any input.
+    """Triangulate finite points (n, 3) [m], by exact predicates and so right for any input.
 
     Coordinates smaller than 2^-200 of the largest count as zero.
-
-    Args:
-        points: Finite positions [m], shape (n, 3).
     """
     scaled, _ = unit_scale(points)
     tetrahedra = neighbors = np.empty((0, 4), np.int32)
@@ -41,12 +38,9 @@ class Delaunay:
     some hundreds on a curve in space, of which nearly every pair would have an edge.
     """
 
-    points: Points
-    """Positions [m], shape (n, 3)."""
-    tetrahedra: np.ndarray
-    """Vertices as indices of points, positively oriented, shape (m, 4)."""
-    neighbors: np.ndarray
-    """Neighbor i shares the face opposite vertex i; -1 outside the hull. Shape (m, 4)."""
+    points: Points  # positions [m], (n, 3)
+    tetrahedra: np.ndarray  # vertices as indices of points, positively oriented, (m, 4)
+    neighbors: np.ndarray  # number i shares the face opposite vertex i; -1 outside the hull, (m, 4)
 
 
 def lies_on_curve(points: Points) -> bool:
@@ -57,13 +51,9 @@ def lies_on_curve(points: Points) -> bool:
 def local_dimension(points: Points) -> float:
     """The power with which the number of neighbors grows with distance: 1 on a curve, 2, 3.
 
-    The estimate of largest likelihood over the 16 nearest others of 512 points at most; its
-    standard error is some percent. Bends and borders make it smaller, noise larger. 0 for fewer
-    than 17 different points.
-
-    References:
-        Levina, Bickel (2004), Maximum likelihood estimation of intrinsic dimension, NIPS 17.
-        MacKay, Ghahramani (2005), Comments on it: likelihoods are multiplied, not estimates added.
+    The estimate of largest likelihood over the 16 nearest others of 512 points at most (Levina,
+    Bickel 2004, NIPS 17; likelihoods multiplied: MacKay, Ghahramani 2005), to some percent; 0 for
+    fewer than 17 different points.
     """
     from scipy.spatial import KDTree  # lazily
 

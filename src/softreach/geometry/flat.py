@@ -12,12 +12,9 @@ from softreach.support.arrays import Array, Faces, Index, Mask, Points
 class Plane(NamedTuple):
     """A plane in space with axes of its own: x and y in it, z its normal."""
 
-    origin: Array
-    """[m], shape (3,)."""
-    rotation: Array
-    """Its axes as rows, a rotation, shape (3, 3)."""
-    sides: Array
-    """Extents of the points along its axes [m], shape (3,)."""
+    origin: Array  # [m], (3,)
+    rotation: Array  # its axes as rows, a rotation, (3, 3)
+    sides: Array  # extents of the points along its axes [m], (3,)
 
     def coordinates(self, points: Points) -> Points:
         """Points [m] in these axes, shape (n, 3)."""
@@ -29,10 +26,7 @@ class Plane(NamedTuple):
 
 
 def plane_of(points: Points, thickness: float) -> Plane | None:
-    """The plane that points (n, 3) lie in to a thickness [m]; None if they lie in none.
-
-    Its axes are the principal ones of the points; the first is that of the largest extent.
-    """
+    """The plane that points (n, 3) lie in to a thickness [m], its axes their principal ones."""
     origin = points.mean(axis=0)
     rotation = np.linalg.svd(points - origin, full_matrices=len(points) < 3)[2]
     rotation[2] *= np.sign(np.linalg.det(rotation))
@@ -60,10 +54,7 @@ def enclosed_area(points: Points, edges: Faces) -> float:
 
 
 def are_inside(points: Points, edges: Array) -> Mask:
-    """Mask of points inside of closed curves in the plane z = 0, by an odd number of crossings.
-
-    Edges are given by both of their ends, shape (e, 2, 3).
-    """
+    """Mask of points inside of closed curves in the plane z = 0, of edges (e, 2, 3)."""
     odd = np.zeros(len(points), bool)
     for (x, y, _), (u, v, _) in edges:
         if y != v:

@@ -62,18 +62,17 @@ class Hull:
         import xarray as xr
 
         numbers = {
-            "volume": (self.volume, "m3", "volume"),
-            "area": (self.area, "m2", "area of the surface, inner walls included"),
-            "alpha": (self.alpha, "m", "radius of the alpha shape"),
-            "regions": (self.regions, "1", "parts connected through faces"),
-            "n": (self.n, "1", "points of the cloud"),
+            "volume": ("m3", "volume"),
+            "area": ("m2", "area of the surface, inner walls included"),
+            "alpha": ("m", "radius of the alpha shape"),
+            "regions": ("1", "parts connected through faces"),
+            "n": ("1", "points of the cloud"),
+            "volume_corrected": ("m3", "volume without sampling bias (estimate)"),
         }
-        if self.volume_corrected is not None:
-            meaning = "volume without sampling bias (estimate)"
-            numbers["volume_corrected"] = (self.volume_corrected, "m3", meaning)
         variables: dict[str, Any] = {
             name: ((), value, {"units": unit, "long_name": meaning})
-            for name, (value, unit, meaning) in numbers.items()
+            for name, (unit, meaning) in numbers.items()
+            if (value := getattr(self, name)) is not None
         }
         variables["vertices"] = (("vertex", "axis"), self.vertices, {"units": "m"})
         variables["faces"] = (("face", "corner"), self.faces, {"units": "1"})
@@ -95,16 +94,12 @@ class Hull:
 
 
 def convex_hull(points: np.ndarray) -> Hull:
-    """The convex hull of a cloud (n, 3) [m] by Qhull.
-
-    Points in one plane, on one line or fewer than four have volume 0 and no faces.
-    """
+    """The convex hull of a cloud (n, 3) [m] by Qhull; without faces if it is flat."""
     vertices, faces = compact_surface(points, convex_faces(points))
-    volume = enclosed_volume(vertices, faces)
     return Hull(
         vertices=vertices,
         faces=faces,
-        volume=volume,
+        volume=enclosed_volume(vertices, faces),
         area=surface_area(vertices, faces),
         alpha=np.inf,
         regions=int(len(faces) > 0),
@@ -123,9 +118,8 @@ def convex_faces(points: Points) -> Faces:
         hull = ConvexHull(scaled - scaled.mean(axis=0))
     except QhullError:
         return np.empty((0, 3), np.int32)
-    corners = hull.points[hull.simplices]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    inward = np.einsum("fi,fi->f", normals, hull.equations[:, :3]) < 0
+    a, b, c = np.moveaxis(hull.points[hull.simplices], 1, 0)
+    inward = np.einsum("fi,fi->f", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     faces = hull.simplices.copy()
     faces[inward] = faces[inward][:, ::-1]
     return faces

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,23 +19,14 @@ _MOST_CELLS = 1 << 26
 class CellGrid:
     """Cubes whose corners lie at whole multiples of their edge, so that grids of clouds agree."""
 
-    edge: float
-    """Of a cube [m]."""
-    first: Index
-    """Lower corner in edges, shape (3,)."""
-    shape: tuple[int, ...]
-    """Number of cubes along each axis."""
-    cells: Index
-    """The cube of each point, in C order, shape (n,); their number for a point that is NaN."""
+    edge: float  # of a cube [m]
+    first: Index  # lower corner in edges, (3,)
+    shape: tuple[int, ...]  # number of cubes along each axis
+    cells: Index  # the cube of each point, in C order, (n,); their number for a point that is NaN
 
     @classmethod
     def around(cls, points: Array, edge: float) -> CellGrid:
-        """The grid around points [m], shape (n, 3); rows of NaN are in no cube.
-
-        Raises:
-            InvalidInput: Points of another shape, infinite or none; an edge that is not positive,
-                or so small that the grid would not fit into memory.
-        """
+        """The grid around points [m], shape (n, 3); rows of NaN are in no cube."""
         placed = np.asarray(~np.isnan(points).all(axis=-1))
         points = as_points("points", points[placed], any_scale=True)
         if len(points) == 0:
@@ -62,24 +54,20 @@ class CellGrid:
 
     def count(self, points: Index | slice = slice(None)) -> Index:
         """Number of points in each cube, of some of them or, by default, of all."""
-        return self._shaped(np.bincount(self.cells[points], minlength=self._size))
+        return self._sums(self.cells[points])
 
     def sum(self, values: Array) -> Array:
         """Sum of a value of every point in each cube."""
-        return self._shaped(np.bincount(self.cells, values, self._size).astype(float))
+        return self._sums(self.cells, values).astype(float)
 
     def mean(self, values: Array, points: Index | slice = slice(None)) -> Array:
         """Mean of the finite values of some points in each cube; NaN where there is none."""
         known = np.isfinite(values)
         cells = self.cells[points][known]
-        total, count = (np.bincount(cells, of, self._size) for of in (values[known], None))
-        mean = np.full(len(total), np.nan)
-        return self._shaped(np.divide(total, count, out=mean, where=count > 0))
+        total, count = self._sums(cells, values[known]), self._sums(cells)
+        return np.divide(total, count, out=np.full(self.shape, np.nan), where=count > 0)
 
-    def _shaped(self, of_cubes: NDArray[Any]) -> NDArray[Any]:
-        """Values of the cubes in their shape, without that of the points in none."""
-        return of_cubes[: self._size].reshape(self.shape)
-
-    @property
-    def _size(self) -> int:
-        return int(np.prod(self.shape))
+    def _sums(self, cells: Index, values: Array | None = None) -> NDArray[Any]:
+        """Sums of values, or numbers of points, in each cube but of the points in none."""
+        size = math.prod(self.shape)
+        return np.bincount(cells, values, size)[:size].reshape(self.shape)

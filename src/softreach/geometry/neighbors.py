@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from softreach.kernels.points.neighbor_sums import (
-    PLACE_BITS,
-    SHIFTS,
-    find_windows,
-    neighbor_sums,
-    sort_keys,
-    stable_order,
-    window_keys,
-)
+from softreach.kernels.points import neighbor_sums as kernels
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, as_points, check_finite
 
 BLOCK = 1 << 14  # queries that one thread takes at a time
-_CELLS = 2.0 ** (PLACE_BITS - 1)  # along an axis; the other half of the keys is room for windows
+_CELLS = 2.0 ** (kernels.PLACE_BITS - 1)  # along an axis; the other half of keys is for windows
 _CUBES = 128  # along an axis, at most, to find what is near a few queries
 _FEW = 1.0 / 500  # queries to a point, below which that pays
 _MANY = 100_000  # points, from which on it does
@@ -34,29 +25,17 @@ def mean_value_distance(
 ) -> tuple[Array, Index]:
     """Mean ‖v_j - v_i‖₂ over the other points j within a radius of point i, and how many they are.
 
-    The ball is closed. Point i itself is not counted; another point at the same place is.
-    Neighbors come from all points, whatever the queries.
-
-    Memory is a sorted copy of points (n, 3) and values (n, m) and a few blocks, however many pairs
-    there are; the result does not depend on blocks and threads. Queries are indices of points i,
-    shape (q,), or all; a radius of 0 [m] leaves the points at the same place.
-
-    Returns:
-        Means in the unit of the values, NaN where there is no neighbor, shape (q,); numbers of
-        neighbors, shape (q,).
-
-    Raises:
-        InvalidInput: Points or values that are not finite.
+    The ball is closed, and holds other points at the same place. Points (n, 3) are all neighbors,
+    whatever the queries i (q,). Means (q,) of values (n, m) are NaN where there is no neighbor; the
+    result does not depend on blocks and threads.
     """
     points, values = as_points("points", points, any_scale=True), check_finite("values", values)
     if len(points) == 0:
         return np.empty(0), np.empty(0, np.intp)
-    columns = _Columns.around(points, float(radius))
+    columns, near = _Columns(points, float(radius)), slice(None)
     if queries is not None and len(points) >= _MANY and len(queries) < _FEW * len(points):
         near = columns.near(points, points[queries])
-        order, cloud = columns.sorted_sample(points[near], values[near])
-    else:
-        order, cloud = columns.sorted_sample(points, values)
+    order, cloud = columns.sorted_sample(points[near], values[near])
     if queries is None:
         return _means(cloud, columns, cloud, order)
     order, chosen = columns.sorted_sample(points[queries], values[queries])
@@ -71,41 +50,30 @@ class _Sample(NamedTuple):
     values: Array  # Shape (m, n)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class _Columns:
     """Space cut into columns along the longest side of a cloud, and these into places."""
 
-    axes: Index
-    low: Array
-    widths: Array
-    reach: float
-    margin: float
-
-    @classmethod
-    def around(cls, points: Array, radius: float) -> _Columns:
-        """Columns at least a radius wide for all points, shape (n, 3)."""
-        low, high = _corners(points)
+    def __init__(self, points: Array, radius: float) -> None:
+        """Cut columns at least a radius wide for all points, shape (n, 3)."""
+        # NumPy is slow along the short axis, so one axis at a time.
+        low, high = np.array([[x.min(), x.max()] for x in points.T]).T
         extent = high - low
-        axes = np.argsort(extent, kind="stable")
-        reach = min(radius, 2.0 * float(extent.sum()))  # all points are nearer than that
-        wide = reach * (1.0 + _SLACK)
-        widths = np.maximum(extent[axes] / _CELLS, [wide, wide, 0.0])
+        self.axes = np.argsort(extent, kind="stable")
+        self.low = low[self.axes]
+        self.reach = min(radius, 2.0 * float(extent.sum()))  # all points are nearer than that
+        wide = self.reach * (1.0 + _SLACK)
         rounding = 2.0**-50 * float(np.abs([low, high]).max())
-        return cls(
-            axes=axes,
-            low=low[axes],
-            widths=np.maximum(widths, rounding / _CELLS + _SMALLEST),
-            reach=reach,
-            margin=wide + rounding,
-        )
+        self.margin = wide + rounding
+        widths = np.maximum(extent[self.axes] / _CELLS, [wide, wide, 0.0])
+        self.widths = np.maximum(widths, rounding / _CELLS + _SMALLEST)
 
     def sorted_sample(self, points: Array, values: Array) -> tuple[Index, _Sample]:
         """Points (n, 3) and values (n, m) in the order of their keys, and that order."""
         points = np.ascontiguousarray(points.T[self.axes])
         keys = np.empty(points.shape[1], np.int64)
-        sort_keys(points, self.low, 1.0 / self.widths, keys)
+        kernels.sort_keys(points, self.low, 1.0 / self.widths, keys)
         order = np.empty(len(keys), np.int64)
-        stable_order(keys, order)
+        kernels.stable_order(keys, order)
         return order, _Sample(keys[order], _taken(points, order), _taken(values.T, order))
 
     def near(self, points: Array, queries: Array) -> Index:
@@ -146,20 +114,15 @@ def _sums(cloud: _Sample, columns: _Columns, queries: _Sample, part: slice) -> t
     keys, scale = queries.keys[part], 1.0 / columns.widths[2]
     first, last = np.empty((2, len(keys)), np.int64)  # keys of what each can reach in its column
     along = queries.points[2, part]
-    window_keys(along, keys, columns.margin, columns.low[2], scale, first, last)
+    kernels.window_keys(along, keys, columns.margin, columns.low[2], scale, first, last)
     places, amounts = queries.points[:, part].T.copy(), queries.values[:, part].T.copy()
     start, stop = np.empty((2, len(first)), np.int64)
     total, count = np.zeros((2, len(first)))
-    add, square = neighbor_sums(len(cloud.values)), columns.reach**2
-    for shift in SHIFTS:
-        find_windows(cloud.keys, first + shift, last + shift, start, stop)
+    add, square = kernels.neighbor_sums(len(cloud.values)), columns.reach**2
+    for shift in kernels.SHIFTS:
+        kernels.find_windows(cloud.keys, first + shift, last + shift, start, stop)
         add(cloud.points, cloud.values, places, amounts, start, stop, square, total, count)
     return total, count
-
-
-def _corners(points: Array) -> tuple[Array, Array]:
-    """Lower and upper corner; NumPy is slow along the short axis, so one axis at a time."""
-    return np.array([x.min() for x in points.T]), np.array([x.max() for x in points.T])
 
 
 def _taken(components: Array, order: Index) -> Array:

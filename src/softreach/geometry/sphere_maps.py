@@ -1,8 +1,4 @@
-"""Maps of the unit sphere to itself that turning about an axis does not change.
-
-A meridian goes into its own plane, so that one angle tells all: where the image of the meridian
-passes the pole, a whole circle of latitude goes there.
-"""
+"""Places that maps of the unit sphere to itself take to a value, one by one or by whole circles."""
 
 from __future__ import annotations
 
@@ -17,17 +13,12 @@ from numpy.typing import NDArray
 from softreach.kernels.points.triangles import FLAT, OPEN, judge_images
 from softreach.support.arrays import Array, Index
 
-Map = Callable[[Array], Array]
-"""Images of unit vectors (n, 3), unit vectors of the same shape."""
-
+Map = Callable[[Array], Array]  # images of unit vectors (n, 3), unit vectors of the same shape
 _MOST_LEVELS = 16
 _MOST_TRIANGLES = 200_000
 _MOST_STARTS = 1000  # of triangles that are not flat
 _IMAGES_OF_ROOT = 60  # that Newton's method asks for, of most starts
-
-_FLAT = 2.5
-"""Least altitude of a flat image, in sags of the one that it was cut from, of which it has 1/4."""
-
+_FLAT = 2.5  # least altitude of a flat image, in sags of the one that it was cut from: it has 1/4
 _TURNS = 30
 _WIDEST = 0.3  # Newton step [rad]
 _DIFFERENCE = 3e-6  # of numerical derivatives [rad]
@@ -42,11 +33,7 @@ _OFF_AXIS = 1e-6
 
 @lru_cache(maxsize=8)
 def icosphere(levels: int) -> tuple[Array, Index]:
-    """An icosahedron whose triangles are quartered some times; not to be written.
-
-    Returns:
-        Points (n, 3), and triangles (20 · 4^levels, 3), counterclockwise from outside.
-    """
+    """Points (n, 3) of an icosahedron whose triangles (20 · 4^levels, 3) are quartered; frozen."""
     if levels:
         return quartered(*icosphere(levels - 1))
     golden = 0.5 * (1.0 + np.sqrt(5.0))
@@ -65,11 +52,7 @@ def icosphere(levels: int) -> tuple[Array, Index]:
 
 
 def quartered(points: Array, triangles: Index) -> tuple[Array, Index]:
-    """Every triangle cut in four at the middles of its sides, which are put onto the sphere.
-
-    Returns:
-        All points, the old ones first, and the new triangles only.
-    """
+    """Triangles cut in four at the middles of sides, on the sphere; and points, old ones first."""
     after = triangles[:, [1, 2, 0]]
     sides = np.minimum(triangles, after) * len(points) + np.maximum(triangles, after)
     keys, which = np.unique(sides, return_inverse=True)
@@ -84,38 +67,23 @@ def quartered(points: Array, triangles: Index) -> tuple[Array, Index]:
 class Roots(NamedTuple):
     """Points that a map takes to a value."""
 
-    points: Array
-    """Unit vectors, shape (n, 3)."""
-    determinants: Array
-    """Of the derivative, positive where the map keeps the sense of rotation; shape (n,)."""
+    points: Array  # unit vectors, (n, 3)
+    determinants: Array  # of the derivative, above 0 where the sense of rotation is kept, (n,)
 
 
 def sphere_roots(
     image: Map, value: Array, *, levels: int, caution: float, starts: Array, most: int = 10_000_000
 ) -> tuple[Roots, bool]:
-    """All places where a smooth map takes a value.
+    """All places where a smooth map takes a value (3,), and whether triangles were cut to flatness.
 
-    Args:
-        image: The map.
-        value: A unit vector, shape (3,).
-        levels: How often the triangles of the first mesh are quartered.
-        caution: How near an image must come to the value to be cut further, in its sags.
-        starts: Where to look too, shape (n, 3).
-        most: Largest number of images, about.
-
-    Returns:
-        The places, and whether the triangles were few enough to be cut until they were flat, or
-        smaller than a millionth.
+    Those of the icosphere of some levels are cut further where their images come within `caution`
+    of their sags of the value, with `most` images or so. Other starts (n, 3) are looked at, too.
     """
     frame = np.array([*tangents_at(value[None])[:, 0], value])
-
-    def seen(points: Array) -> Array:
-        return image(points) @ frame.T
-
-    centers, settled = _candidates(seen, levels, caution, most // 2)
+    centers, settled = _candidates(lambda x: image(x) @ frame.T, levels, caution, most // 2)
     every = 1 + len(centers) * _IMAGES_OF_ROOT * 2 // most
-    centers, settled = centers[::every], settled and every == 1
-    return polished_roots(image, value, np.concatenate([starts, centers])), settled
+    roots = polished_roots(image, value, np.concatenate([starts, centers[::every]]))
+    return roots, settled and every == 1
 
 
 def _candidates(seen: Map, levels: int, caution: float, most: int) -> tuple[Array, bool]:
@@ -146,12 +114,16 @@ def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
     slopes, missing = np.empty((len(points), 2, 2)), np.full(len(points), np.inf)
     working = np.arange(len(points))
     for _ in range(_TURNS):
-        ahead, slopes[working] = _linearized(image, points[working], across)
+        # Images, and derivatives between the tangent planes by differences.
+        at, tangents = points[working], tangents_at(points[working])
+        turned = _DIFFERENCE * tangents
+        places = np.concatenate([at[None], at + turned, at - turned])
+        images = image(_unit(places.reshape(-1, 3))).reshape(places.shape)
+        change, ahead = (images[1:3] - images[3:]) @ across.T / (2 * _DIFFERENCE), images[0]
+        slopes[working] = np.moveaxis(change, 0, 2)
         missing[working] = np.linalg.norm(ahead - value, axis=1)
         step = _newton(slopes[working], -(ahead @ across.T))
-        first, second = tangents_at(points[working])
-        moved = points[working] + step[:, :1] * first + step[:, 1:] * second
-        points[working] = _unit(moved)
+        points[working] = _unit(at + step[:, :1] * tangents[0] + step[:, 1:] * tangents[1])
         before, last[working] = last[working], np.linalg.norm(step, axis=1)
         # Where the map is nearly singular, rounding alone keeps steps from becoming any smaller.
         at_noise = (last[working] >= before) & (missing[working] < _RESIDUAL)
@@ -164,15 +136,6 @@ def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
         kept.append(int(left[0]))
         left = left[np.linalg.norm(points[left] - points[left[0]], axis=1) > _SAME]
     return Roots(points[kept], np.linalg.det(slopes[kept]))
-
-
-def _linearized(image: Map, points: Array, across: Array) -> tuple[Array, Array]:
-    """Images, and the derivatives between the tangent planes, shape (n, 2, 2)."""
-    turned = _DIFFERENCE * tangents_at(points)
-    places = np.concatenate([points[None], points + turned, points - turned])
-    images = image(_unit(places.reshape(-1, 3))).reshape(places.shape)
-    slopes = (images[1:3] - images[3:]) @ across.T / (2 * _DIFFERENCE)
-    return images[0], np.moveaxis(slopes, 0, 2)
 
 
 def _newton(slopes: Array, missing: Array) -> Array:
@@ -204,12 +167,9 @@ def _unit(vectors: Array) -> Array:
 class Rings(NamedTuple):
     """Circles of latitude that go to the pole."""
 
-    points: Array
-    """One of each, all on one meridian, shape (n, 3)."""
-    signs: NDArray[np.int8]
-    """1 where the image moves away from the pole as the place does, else -1; shape (n,)."""
-    pole_sign: int
-    """The same of the pole itself, which goes to itself."""
+    points: Array  # one of each, all on one meridian, (n, 3)
+    signs: NDArray[np.int8]  # 1 where image and place both move away from the pole, else -1, (n,)
+    pole_sign: int  # the same of the pole itself, which goes to itself
 
     @property
     def complete(self) -> bool:
@@ -218,10 +178,7 @@ class Rings(NamedTuple):
 
 
 def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
-    """True if turning about a unit vector, and mirroring in a plane through it, changes nothing.
-
-    Images may miss by the tolerance [rad].
-    """
+    """True if turning about an axis, and mirroring through it, changes less than so much [rad]."""
     polar = np.pi * (np.arange(_POLAR) + 0.5) / _POLAR
     around = 2 * np.pi * np.arange(_AROUND) / _AROUND + 0.1
     first, second = tangents_at(axis[None])[:, 0]
@@ -234,10 +191,7 @@ def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
 
 
 def pole_rings(image: Map, axis: Array, near: Array) -> Rings:
-    """All circles of latitude that an axisymmetric map takes to its pole, the axis (3,).
-
-    `near` (3,) is on the meridian that is looked at; any meridian will do for the pole itself.
-    """
+    """Circles of latitude that an axisymmetric map takes to its pole, on the meridian of `near`."""
     aside = near - (near @ axis) * axis
     size = float(np.linalg.norm(aside))
     outward = aside / size if size > _OFF_AXIS else tangents_at(axis[None])[0, 0]

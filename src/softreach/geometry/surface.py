@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.kernels.points.triangles import distances_to_faces
 from softreach.picture.shading import vertex_normals
-from softreach.support.arrays import Array, Faces, Index, Mask, Points
+from softreach.support.arrays import Array, Faces, Index, Points
 from softreach.support.errors import check_installed
 from softreach.support.lazy import lazy
 
@@ -84,14 +84,7 @@ class Surface:
 
 
 def level_set(field: Array, level: float) -> tuple[Points, Faces]:
-    """Triangles where a field on a grid (i, j, k) has a value, by marching cubes.
-
-    Returns:
-        Places in edges of the grid, shape (v, 3), and triangles toward larger values, (f, 3).
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
-    """
+    """Places (v, 3) in edges of a grid (i, j, k), and triangles toward larger values of a field."""
     check_installed("skimage")
     from skimage.measure import marching_cubes
 
@@ -108,10 +101,7 @@ def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
 
 
 def without_flakes(surface: Surface, error: float) -> Surface:
-    """A closed surface without its smallest parts that add up to less than an error [m³].
-
-    The largest part always stays.
-    """
+    """A closed surface without the smallest parts that add up to less than an error [m³]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -123,7 +113,7 @@ def without_flakes(surface: Surface, error: float) -> Surface:
         return surface
     a, b, c = np.moveaxis((vertices - vertices.mean(axis=0))[faces], 1, 0)
     volumes = np.bincount(part[faces[:, 0]], np.einsum("fi,fi->f", a, np.cross(b, c)) / 6.0, count)
-    order = np.argsort(np.abs(volumes))[:-1]
+    order = np.argsort(np.abs(volumes))[:-1]  # the largest part always stays
     left_out = order[np.cumsum(np.abs(volumes[order])) <= error]
     vertices, faces = compact_surface(vertices, faces[~np.isin(part[faces[:, 0]], left_out)])
     return Surface(vertices=vertices, faces=faces)
@@ -132,8 +122,7 @@ def without_flakes(surface: Surface, error: float) -> Surface:
 def simplified(vertices: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
     """A coarser surface of so many triangles at most, for pictures: vertices in a cube become one.
 
-    Those that face other ways are kept apart, so that thin parts have two sides. The surface is
-    closed where it was, but may touch itself.
+    Those that face other ways are kept apart, so that thin parts have two sides.
     """
     facing = vertex_normals(vertices, faces)
     way = np.abs(facing).argmax(axis=1)
@@ -164,10 +153,7 @@ def enclosed_volume(vertices: Points, faces: Faces) -> float:
 
 
 def corner_areas(vertices: Points, faces: Faces) -> Points:
-    """∂V/∂r of each vertex of an oriented closed surface [m²]: what it sweeps as it moves, (v, 3).
-
-    The volume is a sum of triple products over 6: linear in each corner. V = Σ r · ∂V/∂r / 3.
-    """
+    """∂V/∂r of each vertex of an oriented closed surface [m²], (v, 3): V = Σ r · ∂V/∂r / 3."""
     area, corners = np.zeros_like(vertices), (vertices - vertices.mean(axis=0))[faces]
     for k in range(3):
         share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
@@ -203,32 +189,25 @@ def surface_area(vertices: Points, faces: Faces) -> float:
 
 
 def plane_cut(surface: Surface, axis: int, at: float) -> list[Array]:
-    """Cut a surface by the plane where the coordinate along an axis has a value.
+    """Curves (n, 3) of a surface in the plane where the coordinate along an axis has a value.
 
-    A vertex in the plane counts as above it, so that every triangle that is cut gives one piece.
-    Curves have the shape (n, 3). Those of a closed surface are closed: they end where they begin.
+    Those of a closed surface end where they begin.
     """
     vertices, faces = np.asarray(surface.vertices, float), np.asarray(surface.faces)
     height = vertices[:, axis] - at
-    above = height >= 0.0
-    pieces = _pieces(faces, above)
+    above = height[faces] >= 0.0  # also a vertex in the plane
+    count = above.sum(axis=1)
+    is_cut = (count == 1) | (count == 2)
+    # Of each triangle that is cut the vertex on its own side, and the two edges from there.
+    first = (above[is_cut] == (count[is_cut] == 1)[:, None]).argmax(axis=1)[:, None]
+    a, b, c = np.take_along_axis(faces[is_cut], (first + np.arange(3)) % 3, axis=1).T
+    pieces = np.sort(np.array([[a, b], [a, c]]).transpose(2, 0, 1), axis=2)
     edges, ends = np.unique(pieces.reshape(-1, 2), axis=0, return_inverse=True)
-    low, high = (height[edges[:, side]] for side in range(2))
+    low, high = height[edges].T
     share = (low / (low - high))[:, None]
     places = (1.0 - share) * vertices[edges[:, 0]] + share * vertices[edges[:, 1]]
     places[:, axis] = at
     return [places[curve] for curve in _chained(ends.reshape(-1, 2), len(edges))]
-
-
-def _pieces(faces: NDArray[np.integer], above: Mask) -> NDArray[np.integer]:
-    """Of each triangle that is cut, its two edges that are, as vertices, shape (n, 2, 2)."""
-    count = above[faces].sum(axis=1)
-    cut = faces[(count == 1) | (count == 2)]
-    alone = above[cut] == (above[cut].sum(axis=1) == 1)[:, None]
-    first = alone.argmax(axis=1)[:, None]
-    apex, *others = (np.take_along_axis(cut, (first + k) % 3, axis=1)[:, 0] for k in range(3))
-    edges = [np.sort(np.stack([apex, other], axis=1), axis=1) for other in others]
-    return np.stack(edges, axis=1)
 
 
 def _chained(pieces: NDArray[np.integer], count: int) -> list[list[int]]:
@@ -257,9 +236,8 @@ def unit_scale(points: Points) -> tuple[Points, int]:
 def parted(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     """A closed surface with two triangles at every edge; one that has them, or is open, as it is.
 
-    A closed surface may touch itself along edges, as the boundary of an α-shape does: four of its
-    triangles meet there, and the solid fills wedges between them. Slicers need two. Each wedge
-    gets a corner of its own, in the middle of the edge and a little within.
+    Where it touches itself along edges, as the boundary of an α-shape does, each wedge that the
+    solid fills gets a corner of its own, in the middle of the edge and a little within.
     """
     faces = np.asarray(faces, np.int64)
     starts, ends = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -272,7 +250,7 @@ def parted(vertices: Points, faces: Faces) -> tuple[Points, Faces]:
     order = np.argsort(edge, kind="stable")
     first = np.cumsum(count) - count
     corners = np.full(faces.size, -1)  # of the middle of each side, by face and side
-    middles: list[Array] = []
+    middles = list[Array]()
     for k in several:
         sides = order[first[k] : first[k] + count[k]]
         for side, other, place in _wedges(vertices, faces, sides):

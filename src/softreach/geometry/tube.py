@@ -14,27 +14,12 @@ from softreach.support.errors import InvalidInput
 
 
 def tube_surface(
-    centerline: ArrayLike,
-    normal: ArrayLike,
-    binormal: ArrayLike,
-    radii: ArrayLike,
-    sides: int = 32,
+    centerline: ArrayLike, normal: ArrayLike, binormal: ArrayLike, radii: ArrayLike, sides: int = 32
 ) -> Surface:
-    """A tube of circular sections, capped at both ends, with outward faces.
+    """A tube of circular sections of some radii [m], capped at both ends, with outward faces.
 
-    Args:
-        centerline: Centers of the sections [m], shape (stations, 3), two or more.
-        normal: Unit vectors in the sections, shape (stations, 3).
-        binormal: The same; normal x binormal points along the centerline.
-        radii: Radius of each section, or one for all [m].
-        sides: Corners of each section.
-
-    Returns:
-        stations * sides + 2 vertices, ring by ring with the centers of the two caps last;
-        2 * stations * sides faces.
-
-    Raises:
-        InvalidInput: Fewer than two stations or three sides.
+    Centers [m] and unit vectors in the sections have shape (stations, 3); normal x binormal points
+    along the centerline. Vertices come ring by ring, the centers of both caps last.
     """
     center = np.asarray(centerline, float)
     if center.ndim != 2 or center.shape[1] != 3 or len(center) < 2:
@@ -58,19 +43,18 @@ def tube_surface(
 
 
 def ribbon_surface(lower: ArrayLike, upper: ArrayLike) -> Surface:
-    """The closed skin between two patches (stations, across, 3) [m]: a ribbon with a thickness.
+    """The closed skin between two patches (stations, across, 3) [m]; the lower comes first.
 
-    The upper one is on the side that (along x across) points to. Vertices of the lower one come
-    first; faces are outward.
+    The upper one is on the side that (along x across) points to; faces are outward.
     """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     index = np.arange(low.shape[0] * low.shape[1]).reshape(low.shape[:2])
     rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
-    wall = np.column_stack([rim, np.roll(rim, -1)])
-    quads = [_grid(index)[:, ::-1], _grid(index) + index.size]
-    quads += [np.column_stack([wall, wall[:, ::-1] + index.size])]
+    after, grid = np.roll(rim, -1), _grid(index)
+    wall = np.column_stack([rim, after, after + index.size, rim + index.size])
+    quads = np.concatenate([grid[:, ::-1], grid + index.size, wall])
     vertices = np.concatenate([low.reshape(-1, 3), high.reshape(-1, 3)])
-    return Surface(vertices=vertices, faces=_halves(np.concatenate(quads)))
+    return Surface(vertices=vertices, faces=_halves(quads))
 
 
 def grid_faces(stations: int, across: int) -> Faces:

@@ -35,15 +35,14 @@ from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import (
     Roots,
+    closed_form,
     conditions,
     descend,
     no_roots,
     placed,
     roots_at,
-    smallest_singular_values,
 )
 from softreach.kernels.branches import candidates, newton
-from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, joined, joined_by, rows
@@ -67,10 +66,7 @@ _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is loo
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
-    """All roots inside the bounds of three free bundles, sorted by target.
-
-    Sets of targets are solved together, each on a thread of its own.
-    """
+    """All roots inside the bounds of three free bundles, sorted by target."""
     count = len(request.targets)
     if not count:
         return no_roots(prepared.tip_map)
@@ -79,8 +75,11 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     if not prepared.tip_map.supports_unstable:  # enough for kernels, and enough sets for threads
         share = -(-count // (_SHARES * parallel.thread_count()))
         size = min(_LARGEST, max(_SMALLEST, share))
-    # Groups of neighbors, alike in work, from everywhere.
-    order, number = spatial_order(request.targets), -(-count // size)
+    # Groups of neighbors, which share most candidates, alike in work, from everywhere.
+    low, extent = request.targets.min(axis=0), np.ptp(request.targets, axis=0)
+    places = ((request.targets - low) * (_PLACES / np.maximum(extent, 1e-300))).astype(np.int64)
+    order = np.argsort(places.clip(max=_PLACES - 1) @ [_PLACES**2, _PLACES, 1], kind="stable")
+    number = -(-count // size)
     groups = [order[block] for block in parallel.blocks(count, _SMALLEST)]
     sets = [np.concatenate(groups[k::number]) for k in range(number)]
     if prepared.tip_map.supports_unstable or len(sets) == 1:
@@ -122,8 +121,12 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
     # Where the quadratics say that nothing leads there, look once more without believing them.
     missing = roots.missing(len(chosen), some.residual)
     again = starts_from_cells(prepared, some, missing, with_root=False)
-    roots = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
-    roots = _with_partners(prepared, some, roots)
+    roots = fresh = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
+    for _ in range(2):  # a partner may have a partner of its own where two folds meet
+        before, fresh = len(roots.target), _newton(prepared, some, _partner_starts(prepared, fresh))
+        roots = distinct(prepared, some, roots.joined(fresh))
+        if len(roots.target) == before:
+            break
     missing = roots.missing(len(chosen), some.residual)
     starts = starts_from_cells(prepared, some, missing)
     if len(starts.target):  # step 9
@@ -141,39 +144,26 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
         return no_roots(tip_map)
     low, high, n = tip_map.box.low.copy(), tip_map.box.high.copy(), len(goal)
     start = _improved(tip_map, goal, starts)
-    search = Search(
-        target=goal,
-        gamma=start.copy(),
-        slope=np.zeros((n, 3, 3)),
-        residual=np.full(n, 1e300),
-        step=np.zeros((n, 3)),
-        damping=np.ones(n),
-        trial=start.copy(),
-        state=np.full(n, RUNNING),
-    )
+    slope, residual, step = np.zeros((n, 3, 3)), np.full(n, 1e300), np.zeros((n, 3))
+    damping, trial, state = np.ones(n), start.copy(), np.full(n, newton.RUNNING)
+    search = newton.Search(goal, start.copy(), slope, residual, step, damping, trial, state)
     for _ in range(_MOST_ITERATIONS):
-        if not len(active := np.flatnonzero(search.state == RUNNING)):
+        if not len(active := np.flatnonzero(search.state == newton.RUNNING)):
             break
         tips, slopes = tip_map.tips_and_slopes(search.trial[active])
         newton.newton_step(search, active, tips, slopes, low, high, request.residual)
         if tip_map.supports_unstable:
             # A search whose step leads nowhere has ended, as where the tip moves without limit.
             lost = active[~np.isfinite(search.trial[active]).all(axis=1)]
-            search.trial[lost], search.state[lost] = search.gamma[lost], STAGNATED
-    converged = np.flatnonzero(search.state == CONVERGED)
+            search.trial[lost], search.state[lost] = search.gamma[lost], newton.STAGNATED
+    converged = np.flatnonzero(search.state == newton.CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     trial, goal = search.trial[converged], goal[converged]
     gamma = tip_map.box.clip(trial)
-    tips = placed(tip_map, gamma)
-    roots = Roots(
-        starts.target[converged],
-        gamma,
-        tips,
-        search.slope[converged],
-        np.linalg.norm(tips - goal, axis=1),
-        starts.cell[converged],
-        np.zeros(len(converged), np.int64),
-    )
+    tips, sheet = placed(tip_map, gamma), np.zeros(len(converged), np.int64)
+    residual = np.linalg.norm(tips - goal, axis=1)
+    target, cell = starts.target[converged], starts.cell[converged]
+    roots = Roots(target, gamma, tips, search.slope[converged], residual, cell, sheet)
     within = roots.residual <= request.residual
     over = ~within & (gamma != trial).any(axis=1)
     on_bounds = _moved_to_bounds(tip_map, request, rows(roots, over), goal[over])
@@ -181,11 +171,8 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
 
 
 def _moved_to_bounds(tip_map: TipMap, request: Request, roots: Roots, goal: Array) -> Roots:
-    """Step 8: those of roots beyond bounds that miss little enough on the bounds.
-
-    What moves a tip by the reach_tol moves a root by that over the smallest singular value, and to
-    move it back to the bounds moves the tip by no more than the condition number as much.
-    """
+    """Step 8: those of roots beyond bounds that miss little enough on the bounds."""
+    # Back to the bounds the tip moves by no more than the condition number times the reach_tol.
     near = roots.residual <= request.reach_tol * conditions(roots.slope)
     roots, goal = rows(roots, near), goal[near]
     if not len(goal):
@@ -197,10 +184,7 @@ def _moved_to_bounds(tip_map: TipMap, request: Request, roots: Roots, goal: Arra
 
 
 def _improved(tip_map: TipMap, goal: Array, starts: Starts) -> Array:
-    """The starts after steps with the inverse known there: tips cost a fraction of Jacobians.
-
-    A step that does not bring the tip much nearer to its target is not taken.
-    """
+    """The starts after steps with the inverse known there that bring the tip much nearer."""
     gamma = starts.gamma.copy()
     if tip_map.supports_unstable:
         return gamma
@@ -222,17 +206,6 @@ def _improved(tip_map: TipMap, goal: Array, starts: Starts) -> Array:
     return gamma
 
 
-def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
-    fresh = roots
-    for _ in range(2):  # a partner may have a partner of its own where two folds meet
-        fresh = _newton(prepared, request, _partner_starts(prepared, fresh))
-        before = len(roots.target)
-        roots = distinct(prepared, request, roots.joined(fresh))
-        if len(roots.target) == before:
-            break
-    return roots
-
-
 def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
     """Near the second preimage of every root that has a fold near, once for each overshoot."""
     roots = rows(roots, roots.cell >= 0)
@@ -240,7 +213,7 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
     margin = _OUTSIDE * box.widths  # a start moved to the bounds may be short of the other root
     for overshoot in _OVERSHOOTS:
         start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
-        known = roots.cell, roots.gamma, roots.slope, smallest_singular_values(roots.slope)
+        known = roots.cell, roots.gamma, roots.slope, closed_form(roots.slope)[0]
         bounds = box.low - margin, box.high + margin
         newton.second_preimages(
             prepared.mesh, *known, _PARTNER_RANGE, overshoot, *bounds, start, near
@@ -256,7 +229,7 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     several = np.flatnonzero(counts[roots.target] > 1)
     offsets = np.concatenate([[0], np.cumsum(counts[counts > 1])])
     compared = roots.gamma[several], roots.residual[several]
-    smallest = smallest_singular_values(roots.slope[several])
+    smallest, _ = closed_form(roots.slope[several])
     single, rounding = np.ones(len(several), bool), _ROUNDING * prepared.tip_map.length
     newton.merge_equal(offsets, *compared, smallest, rounding, single)
     kept = np.ones(len(roots.target), bool)
@@ -267,14 +240,10 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
 class Starts(NamedTuple):
     """Activations at which searches begin."""
 
-    target: Index
-    """Number of the target, shape (n,)."""
-    cell: Index
-    """Cell of the mesh, shape (n,)."""
-    gamma: Array
-    """Activation [-], shape (n, 3)."""
-    inverse: Array
-    """Inverse of the Jacobian there [1/m], roughly; 0 if not known, shape (n, 3, 3)."""
+    target: Index  # number of the target, (n,)
+    cell: Index  # cell of the mesh, (n,)
+    gamma: Array  # activation [-], (n, 3)
+    inverse: Array  # inverse of the Jacobian there [1/m], roughly; 0 if not known, (n, 3, 3)
 
     @staticmethod
     def empty(room: int) -> Starts:
@@ -286,10 +255,7 @@ class Starts(NamedTuple):
 def starts_from_cells(
     prepared: PreparedMap, request: Request, chosen: Index, with_root: bool = True
 ) -> Starts:
-    """Starts for targets `chosen`, ascending numbers, sorted by target.
-
-    `with_root` leaves out tetrahedra whose quadratic does not reach the target.
-    """
+    """Starts for targets `chosen`, sorted by target, of tetrahedra whose quadratics reach them."""
     parts = [Starts.empty(0)]
     if not len(prepared.mesh.corner) or not len(chosen):
         return parts[0]
@@ -310,13 +276,3 @@ def starts_from_cells(
             parts.append(part._replace(target=chosen[part.target + first]))
             first += done
     return joined(parts)
-
-
-def spatial_order(points: Array) -> Index:
-    """An order in which points (n, 3) that follow each other share most of their candidates."""
-    if len(points) < 2:
-        return np.arange(len(points))
-    low, high = points.min(axis=0), points.max(axis=0)
-    place = ((points - low) * (_PLACES / np.maximum(high - low, 1e-300))).astype(np.int64)
-    place = np.minimum(place, _PLACES - 1)
-    return np.argsort(place @ np.array([_PLACES**2, _PLACES, 1]), kind="stable")

@@ -115,20 +115,15 @@ class ImageLeaves:
 
 
 class TornCells(NamedTuple):
-    """Vertices of cells without an image, those that have a tip.
+    """Vertices with tips of cells without an image: a corner has no tip or is on another branch.
 
-    A cell of which some corner has no tip, or is on another branch than the rest, cannot be mapped.
-    Its corners begin searches for the targets that their linearization sees within about a cell.
+    They begin searches for the targets that their linearization sees within about a cell.
     """
 
-    gamma: Array
-    """Activations [-], shape (n, 3)."""
-    tip: Array
-    """Their tips [m], shape (n, 3)."""
-    inverse: Array
-    """Inverses of ∂r/∂γ there, in widths of a cell [1/m], shape (n, 3, 3)."""
-    most: int = _MOST
-    """Searches for one target."""
+    gamma: Array  # activations [-], (n, 3)
+    tip: Array  # their tips [m], (n, 3)
+    inverse: Array  # inverses of ∂r/∂γ there, in widths of a cell [1/m], (n, 3, 3)
+    most: int = _MOST  # searches for one target
 
     @classmethod
     def at(cls, vertices: _Vertices, widths: Array) -> TornCells:

@@ -28,25 +28,22 @@ _PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
 
 
 def compromises(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
-    """Minimize |tip - target|²/L² + w² |d3 - direction|² from each start, one for each target.
-
-    Returns:
-        Activations [-], shape (n, m), and half of what is minimized, shape (n,).
-    """
+    """Least |tip - target|²/L² + w² |d3 - direction|² from starts (n, m): where, and half of it."""
     return minimize(partial(objective, tip_map, request, 1.0, None), start, tip_map.box)
 
 
 def constrained_minima(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
-    """Minimize ½|γ - near|² + ½ w²|d3 - direction|² subject to tip = target, from each start.
+    """Minimize ½|γ - near|² + ½ w²|d3 - direction|² subject to tip = target, from starts (n, m).
 
-    Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], whose inner searches respect the
-    bounds, then descent to the target.
-
-    Returns:
-        Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
+    Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], with inner searches in the box,
+    then descent to the target; activations and what they miss [m].
     """
-    gamma, multiplier = start.copy(), _multipliers(tip_map, request, start)
-    residual = np.full(len(start), np.inf)
+    gamma, residual = start.copy(), np.full(len(start), np.inf)
+    slopes = tip_map.tips_and_slopes(gamma)[1] / tip_map.length
+    slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
+    # λ for which γ - near + Jᵀλ is least: that of a solution if the start is one.
+    inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
+    multiplier = -np.einsum("nij,nj->ni", inverse, gamma - request.near)
     for penalty in _PENALTIES:
         rows = np.flatnonzero(residual > 0.1 * request.residual)
         if not len(rows):
@@ -61,21 +58,10 @@ def constrained_minima(tip_map: TipMap, request: Request, start: Array) -> tuple
     return ends.gamma, ends.distance
 
 
-def _multipliers(tip_map: TipMap, request: Request, gamma: Array) -> Array:
-    """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
-    slopes = tip_map.tips_and_slopes(gamma)[1] / tip_map.length
-    slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
-    inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
-    return -np.einsum("nij,nj->ni", inverse, gamma - request.near)
-
-
 def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Array, Array]:
     """Minimize function i from start i, shape (n, m), by damped Newton within the bounds.
 
-    Second derivatives are differences of the exact gradients.
-
-    Returns:
-        Activations (n, m) of local minima, and the functions there, (n,).
+    Activations of local minima, and the functions there (n,); Hessians are of gradients.
     """
     low, high, scales = box.low.copy(), box.high.copy(), box.scales
     gamma, damping = start.copy(), np.zeros(len(start))
@@ -109,12 +95,8 @@ def objective(
 ) -> tuple[Array, Array]:
     """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
 
-    Theory (40). With the right λ its minimum is the least change that reaches the target (an
-    augmented Lagrangian); without λ, and then without the change, a compromise of distance and
-    direction. μ is the penalty and λ the multiplier of each search, shape (n, 3).
-
-    Returns:
-        Values (k,) and gradients (k, m) at activations (k, m) of some searches, numbers (k,).
+    Theory (40), with the penalty μ and multipliers λ (n, 3); without these and the change it is a
+    compromise. Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,).
     """
     assert request.direction is not None
     motions, wanted = tip_map.tip_motions(gamma), request.direction[which]
@@ -139,18 +121,13 @@ def objective(
 def _expanded(
     evaluate: Evaluate, which: Index, gamma: Array, scales: Array, curved: Mask
 ) -> tuple[Array, Array, Array]:
-    """Values, gradients and, where `curved`, Hessians: gradients a step away along each axis.
-
-    One call evaluates all: rods are computed in blocks that cost the same full or not.
-    """
+    """Values, gradients and, where `curved`, Hessians by differences of these, in one call."""
     n, m = gamma.shape
     k = int(curved.sum())
     displaced = np.repeat(gamma[curved, None], m, axis=1)
     displaced[:, np.arange(m), np.arange(m)] += _DIFFERENCE * scales
-    value, gradient = evaluate(
-        np.concatenate([which, np.repeat(which[curved], m)]),
-        np.concatenate([gamma, displaced.reshape(k * m, m)]),
-    )
+    every = np.concatenate([which, np.repeat(which[curved], m)])
+    value, gradient = evaluate(every, np.concatenate([gamma, displaced.reshape(k * m, m)]))
     change = gradient[n:].reshape(k, m, m) - gradient[:n][curved, None]
     hessian = np.full((n, m, m), np.nan)
     hessian[curved] = change / (_DIFFERENCE * scales)[:, None]

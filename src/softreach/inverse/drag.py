@@ -22,14 +22,10 @@ _ASIDE = 0.02  # from a fold, where the search on its either side begins, in ran
 class Dragged(NamedTuple):
     """Result of one step of a drag."""
 
-    activation: tuple[float, ...]
-    """Of each bundle in its unit."""
-    tip: Array
-    """Place of the tip then [m], shape (3,)."""
-    gap: float
-    """Distance from there to the target [m]; 0 where the tip follows."""
-    tip_map: TipMap
-    """The tip map of the arm in the posture in which this leaves it."""
+    activation: tuple[float, ...]  # of each bundle in its unit
+    tip: Array  # place of the tip then [m], (3,)
+    gap: float  # distance from there to the target [m]; 0 where the tip follows
+    tip_map: TipMap  # the tip map of the arm in the posture in which this leaves it
 
 
 class Drag:
@@ -40,11 +36,7 @@ class Drag:
     """
 
     def __init__(self, arm: Manipulator | TipMap) -> None:
-        """Prepare an arm; with fewer than three free bundles the tip keeps to what they reach.
-
-        Args:
-            arm: The design, or the tip map of the posture that it is in, as of `Solution.posture`.
-        """
+        """Prepare a design, or the tip map of the posture that it is in (`Solution.posture`)."""
         self._prepared = prepared_map(arm)
         self.arm = self._prepared.whole.arm
         self._rod = self._prepared.tip_map
@@ -53,13 +45,10 @@ class Drag:
         self._last: tuple[tuple[float, ...], BranchPoint] | None = None  # where it was left
 
     def to(self, activation: tuple[float, ...], target: Array) -> Dragged | None:
-        """Drag the tip of the arm in an activation straight to a target [m].
+        """Drag the tip straight to a target [m]; None without a stable equilibrium to begin with.
 
         An arm under loads begins in the posture in which the last step left it, if that ended in
         this activation, else in that to which it comes from rest.
-
-        Returns:
-            None where the arm has no stable equilibrium to begin with.
         """
         box, measures = self._prepared.whole.box, self._prepared.whole.measures
         if self._last is not None and self._last[0] == activation:

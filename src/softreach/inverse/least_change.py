@@ -1,8 +1,7 @@
 """More bundles than the target needs: of all activations that reach it, those that change least.
 
-Local minima of |γ - near| among the activations that reach a target are found from many starts:
-`near` itself, seeds near the target that change little and lie apart, and whatever reached the
-target otherwise. The least of them is the answer.
+The least of local minima of |γ - near| from many starts: `near`, seeds near the target that change
+little and lie apart, and what reached the target otherwise.
 """
 
 from __future__ import annotations
@@ -18,15 +17,8 @@ from softreach.inverse.direction import constrained_minima
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Reached, descend, first_of_each, reach
+from softreach.kernels.box import sequential_projection as kernels
 from softreach.kernels.box.box_projection import project
-from softreach.kernels.box.sequential_projection import (
-    FIRST_PROXIMITY,
-    LONGEST_STEP,
-    NOWHERE,
-    Running,
-    judge,
-    next_trials,
-)
 from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs
 from softreach.support import parallel
@@ -56,12 +48,8 @@ _BLOCK = 4096  # targets at once: bounds the memory of their candidates
 def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array, Reached]:
     """The activation of least change for each target, then others of the solution family.
 
-    The others are those nearest to random activations, whatever their direction, and apart from
-    each other: fewer than `family` where further searches end at what is known.
-
-    Returns:
-        Number of the target and activation, sorted by target, those of least change first; and the
-        best place found for every target, reached or not.
+    The others are nearest to random activations, and apart: fewer than `family` where searches end
+    at what is known. Numbers of targets, activations, and the best place for every target.
     """
     known = _in_blocks(prepared, replace(request, direction=None))
     reached = np.flatnonzero(known.residual <= request.residual)
@@ -97,10 +85,7 @@ class _Families:
         return np.arange(self.members.shape[1]) < self.counts[:, None]
 
     def add(self, rows: Index, other: Array, near: Array | None) -> None:
-        """Add one activation each to some targets if it is new; the least change comes first.
-
-        Changes count from `near`; without it the first stays first.
-        """
+        """Add one activation each to some targets if it is new; least change from `near` first."""
         apart = np.abs(self.members[rows] - other[:, None]) / self._scales
         distance = np.where(self.is_member[rows], apart.max(axis=2), np.inf)
         alike = (distance <= _APART_IN_FAMILY).sum(axis=1)
@@ -121,20 +106,15 @@ class _Families:
 
 
 def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = None) -> Reached:
-    count = len(request.targets)
-    gamma, residual = np.empty((count, prepared.tip_map.box.bundles)), np.empty(count)
-    for first in range(0, count, _BLOCK):
-        rows = slice(first, min(first + _BLOCK, count))
-        part = None if known is None else known[rows]
-        gamma[rows], residual[rows] = _least_change(prepared, request.of(rows), part)
-    return Reached(gamma, residual)
+    parts = [Reached(np.empty((0, prepared.tip_map.box.bundles)), np.empty(0))]
+    for block in parallel.blocks(len(request.targets), _BLOCK):
+        part = None if known is None else known[block]
+        parts.append(_least_change(prepared, request.of(block), part))
+    return joined(parts)
 
 
 def _least_change(prepared: PreparedMap, request: Request, known: Array | None) -> Reached:
-    """The least of the local minima found; where none reaches its target, the nearest place.
-
-    Searches run on a coarse map until they are compared, those worth it then on the exact one.
-    """
+    """The least of local minima, by the coarse map, then by the exact one; or the nearest place."""
     count, tip_map = len(request.targets), prepared.tip_map
     every = _starts(prepared, request)
     # The best searches of each target after a few steps, those that are apart.
@@ -208,14 +188,11 @@ def _searched_again(
     at = descend(tip_map, request.targets[owner], start, request.residual)
     hit = np.flatnonzero(at.distance <= request.residual)
     kept = search(tip_map, request, owner[hit], at.gamma[hit], penalty=_HIGH_PENALTY)
-    ends_of_all = [
-        ends,
-        _on_target(tip_map, request, owner, plain),
-        Reached(at.gamma[hit], at.distance[hit]),
-        _on_target(tip_map, request, owner[hit], kept),
-    ]
+    on_target = partial(_on_target, tip_map, request)
+    reached = Reached(at.gamma[hit], at.distance[hit])
+    every = joined([ends, on_target(owner, plain), reached, on_target(owner[hit], kept)])
     owners = [np.arange(len(request.targets)), owner, owner[hit], owner[hit]]
-    return _best(np.concatenate(owners), joined(ends_of_all), request)
+    return _best(np.concatenate(owners), every, request)
 
 
 def _best(owner: Index, ends: Reached, request: Request) -> Reached:
@@ -227,14 +204,12 @@ def _best(owner: Index, ends: Reached, request: Request) -> Reached:
 
 def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     """The activation to stay near to, and seeds near the target that change little."""
-    owners = [np.arange(len(request.targets))]
-    starts = [prepared.tip_map.box.clip(request.near)]
+    starts = [(np.arange(len(request.targets)), prepared.tip_map.box.clip(request.near))]
     # Moved ones lie in the right basin where the seeds are dense, the others where they are few.
     for seeds in (prepared.seeds, prepared.face_seeds):
-        owner, start = seeds.near(request.targets, request.near, _CANDIDATES, _STARTS, _APART)
-        owners.append(owner)
-        starts.append(start)
-    return np.concatenate(owners), np.concatenate(starts)
+        starts.append(seeds.near(request.targets, request.near, _CANDIDATES, _STARTS, _APART))
+    owner, start = map(np.concatenate, zip(*starts, strict=True))
+    return owner, start
 
 
 def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:
@@ -262,16 +237,11 @@ def _cost(tip_map: TipMap, request: Request, gamma: Array) -> Array:
 class Minima(NamedTuple):
     """Ends of searches for the least change."""
 
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
-    merit: Array
-    """½|γ - near|² and the penalty of the miss, shape (n,)."""
-    proximity: Array
-    """σ of the last step, shape (n,)."""
-    penalty: Array
-    """Penalty of the miss, in 1/L: half as much again as its multiplier, shape (n,)."""
+    gamma: Array  # activations [-], (n, m)
+    residual: Array  # |tip - target| [m], (n,)
+    merit: Array  # ½|γ - near|² and the penalty of the miss, (n,)
+    proximity: Array  # σ of the last step, (n,)
+    penalty: Array  # penalty of the miss, in 1/L: half as much again as its multiplier, (n,)
 
 
 def sqp(
@@ -281,33 +251,22 @@ def sqp(
     start: Array,
     *,
     penalty: float = 0.0,
-    proximity: Array | float = FIRST_PROXIMITY,
+    proximity: Array | float = kernels.FIRST_PROXIMITY,
     settled: float = 1e-6,
     most: int = 60,
 ) -> Minima:
-    """Minimize ½|γ - near|² subject to tip = target and bounds, from each start.
+    """Minimize ½|γ - near|² subject to tip = target `owner` and bounds, from starts (n, m).
 
     Each step minimizes ½|x - near|² + ½σ|x - γ|² where the linearized map meets the target, inside
     the bounds, exactly: sequential quadratic programming with a multiple of the identity for
-    the Hessian, of which σ is a secant estimate. It is taken if ½|x - near|² + penalty·|miss| falls
-    as it should; else σ grows.
-
-    Args:
-        tip_map: The tip map.
-        request: Targets, and what to stay near to.
-        owner: Number of the target of each start, shape (n,).
-        start: Inside the bounds [-], shape (n, m).
-        penalty: Least penalty. A high one keeps a search near the target once it is there, as it
-            must where the target lies next to a fold or to the boundary of the reachable set.
-        proximity: σ of the first step, shape (n,) or one for all.
-        settled: Step at which a search ends, in ranges.
-        most: Steps.
+    the Hessian, of which the proximity σ is a secant estimate. It is taken if ½|x - near|² +
+    penalty·|miss| falls as it should; else σ grows. A high least penalty keeps a search near its
+    target next to a fold or a boundary. It ends at steps below `settled`, in ranges.
     """
     # Copies: kernels are compiled once more for arrays that are read-only or not contiguous.
     n, owner = len(start), owner.copy()
     request = replace(request, targets=request.targets.copy(), near=request.near.copy())
-    begin = np.empty(n)
-    begin[:] = proximity
+    begin = np.full(n, proximity)
     minima = Minima(start.copy(), np.empty(n), np.empty(n), begin, np.empty(n))
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-n // parallel.thread_count()))
@@ -330,29 +289,28 @@ def _searched(
     bounds = (box.low.copy(), box.high.copy(), box.scales.copy())
     running = _room(min(total, _TOGETHER), box.bundles)
     tips, ahead = np.empty_like(running.miss), np.empty_like(running.slope)
-    wanted_of_all, length, begun, n = (request.targets, request.near), tip_map.length, 0, 0
+    wanted, length, begun, n = (owner, request.targets, request.near), tip_map.length, 0, 0
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
-        new, rows = slice(n, n + more), slice(begun, begun + more)
+        new, old = slice(n, n + more), slice(begun, begun + more)
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
-        running.trial[new], running.proximity[new] = ends.gamma[rows], ends.proximity[rows]
+        running.trial[new], running.proximity[new] = ends.gamma[old], ends.proximity[old]
         running.penalty[new], running.multiplier[new] = penalty, 0.0
-        running.reach[new] = LONGEST_STEP
+        running.reach[new] = kernels.LONGEST_STEP
         n, begun = n + more, begun + more
         tip_map.fill(running.trial[:n], TipOutputs(tips[:n], ahead[:n]))
         if tip_map.supports_unstable:
             lost = np.isnan(tips[:n, 0])
-            tips[:n][lost], ahead[:n][lost] = NOWHERE, 0.0
-        n = judge(running, n, tips, ahead, owner, *wanted_of_all, bounds, length, limits, ends)
-        center, slope, wanted = running.center[:n], running.slope[:n], running.wanted[:n]
-        softness, low, high = running.softness[:n], running.low[:n], running.high[:n]
-        multiplier = running.multiplier[:n]
-        project(center, slope, wanted, softness, low, high, running.trial[:n], multiplier)
-        next_trials(running, n, owner, request.near)
+            tips[:n][lost], ahead[:n][lost] = kernels.NOWHERE, 0.0
+        n = kernels.judge(running, n, tips, ahead, *wanted, bounds, length, limits, ends)
+        at = rows(running, slice(n))
+        step = at.trial, at.multiplier
+        project(at.center, at.slope, at.wanted, at.softness, at.low, at.high, *step)
+        kernels.next_trials(running, n, owner, request.near)
 
 
-def _room(n: int, m: int) -> Running:
-    return Running(
+def _room(n: int, m: int) -> kernels.Running:
+    return kernels.Running(
         row=np.empty(n, np.int64),
         steps=np.empty(n, np.int64),
         slope=np.empty((n, 3, m)),

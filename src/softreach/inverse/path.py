@@ -76,14 +76,13 @@ def track_path(
     """
     points = as_points("path", path)
     tip_map = measured_bundles(as_tip_map(arm, tol, point=point))
-    if tip_map.box.dimension < 3:
-        raise InvalidInput(
-            "free bundles", tip_map.box.dimension, "3 or more to follow a path in space"
-        )
+    if (free := tip_map.box.dimension) < 3:
+        raise InvalidInput("free bundles", free, "3 or more to follow a path in space")
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
     residual = as_number("residual_over_length", residual_over_length, RESIDUALS)
     tracker = Continuation(free_bundles(tip_map), residual * tip_map.length)
+    first = None
     if start is not None:
         gamma = as_activations("start", start, tip_map.box, 1)[0]
         gamma = gamma / tip_map.measures[tip_map.box.free]
@@ -91,11 +90,15 @@ def track_path(
     else:
         options = {"residual_over_length": residual, "from_rest": True}
         (solution,) = solve_inverse(tip_map, points[:1], **options)
-        first = None
         if len(solution):
             best = solution.activations[solution.conditions.argmin()] / tip_map.measures
             first = tracker.at(best[tip_map.box.free])
-    followed, end = ([], None) if first is None else _followed(tracker, first, points)
+    end = None if first is None else BranchEnd(PathStatus.FOLLOWED, first.kept())
+    followed = [] if end is None else [end.point]
+    while end is not None and end.status == PathStatus.FOLLOWED and len(followed) < len(points):
+        end = tracker.follow(end.point, *points[len(followed) - 1 : len(followed) + 1])
+        if end.status == PathStatus.FOLLOWED:
+            followed.append(end.point)
     tolerances = {"tol": tip_map.tol, "residual_over_length": residual}
     return _dataset(tip_map, points, followed, end).assign_attrs(tolerances)
 
@@ -174,13 +177,12 @@ class Continuation:
             torn = torn or self._torn
             if isinstance(ahead, BranchEnd):
                 # Where a bound is met, the tip may be as near as tips can tell.
-                beside = self._beside(point, target)
-                if beside is None:
+                if (beside := self._beside(point, target)) is None:
                     return ahead._replace(done=done, error=shortest * distance)
                 ahead = beside
             if isinstance(ahead, BranchPoint):
-                point, done, part = ahead.kept(), 1.0 if last else done + part, 2 * part
-                torn = False
+                point, torn = ahead.kept(), False
+                done, part = 1.0 if last else done + part, 2 * part
             elif part * ahead < (shortest_torn if torn else shortest):
                 if (beside := self._beside(point, end)) is not None:
                     return BranchEnd(PathStatus.FOLLOWED, beside, done=1.0)
@@ -191,10 +193,7 @@ class Continuation:
         return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
 
     def _predicted(self, point: BranchPoint, target: Array) -> BranchPoint | BranchEnd | float:
-        """Predict and correct; bundles that would leave their bounds are held there.
-
-        A number says by how much to shorten the substep.
-        """
+        """Predict and correct, bundles held at bounds; a number says how to shorten the substep."""
         gamma, bundle, upper, self._torn = point.gamma, -1, False, False
         moving = self.box.is_free
         while moving.sum() >= 3:
@@ -285,14 +284,10 @@ class Continuation:
 class BranchPoint(NamedTuple):
     """An activation with the tip map linearized there."""
 
-    gamma: Array
-    """Activation of the free bundles [-], shape (m,)."""
-    tip: Array
-    """Tip [m], shape (3,)."""
-    slope: Array
-    """∂r/∂γ [m], shape (3, m)."""
-    tip_map: TipMap
-    """The tip map, whose posture it is."""
+    gamma: Array  # activation of the free bundles [-], (m,)
+    tip: Array  # tip [m], (3,)
+    slope: Array  # ∂r/∂γ [m], (3, m)
+    tip_map: TipMap  # the tip map, whose posture it is
 
     def kept(self) -> BranchPoint:
         """The same, to go on from this posture."""
@@ -303,34 +298,16 @@ class BranchEnd(NamedTuple):
     """End of a branch as far as it was followed."""
 
     status: PathStatus
-    point: BranchPoint
-    """The last point on it."""
-    bundle: int = -1
-    """The bundle at its bound."""
-    upper: bool = False
-    """True for its upper bound."""
-    done: float = 0.0
-    """The part of the way to the next point that was followed [-]."""
-    error: float = 0.0
-    """Largest distance that the branch may go farther [m]."""
+    point: BranchPoint  # the last point on it
+    bundle: int = -1  # the bundle at its bound
+    upper: bool = False  # True for its upper bound
+    done: float = 0.0  # the part of the way to the next point that was followed [-]
+    error: float = 0.0  # largest distance that the branch may go farther [m]
 
 
 def _least_norm(slope: Array, moving: Mask) -> Array:
     """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3): theory (39)."""
     return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)
-
-
-def _followed(
-    tracker: Continuation, first: BranchPoint, points: Array
-) -> tuple[list[BranchPoint], BranchEnd]:
-    end = BranchEnd(PathStatus.FOLLOWED, first.kept())
-    followed = [end.point]
-    for k in range(1, len(points)):
-        end = tracker.follow(end.point, points[k - 1], points[k])
-        if end.status != PathStatus.FOLLOWED:
-            break
-        followed.append(end.point)
-    return followed, end
 
 
 def _dataset(
@@ -341,8 +318,7 @@ def _dataset(
     box, n = tip_map.box, len(followed)
     units = activation_attributes(tip_map.arm, box.names)
     outcome = PathStatus.NO_START if end is None else end.status
-    status = np.full(len(points), int(outcome), np.int8)
-    status[:n] = PathStatus.FOLLOWED
+    status = np.where(np.arange(len(points)) < n, PathStatus.FOLLOWED, outcome).astype(np.int8)
     activation, measures = np.full((len(points), box.bundles), np.nan), tip_map.measures
     lengths, error = np.linalg.norm(np.diff(points, axis=0), axis=1), np.full(len(points), np.nan)
     length = length_error = np.nan

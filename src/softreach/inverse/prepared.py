@@ -30,12 +30,9 @@ _NODES = 16  # cells along each axis of the grid on which sheets of postures are
 class Sheet(NamedTuple):
     """Postures to which activations do not lead straight from rest."""
 
-    whole: TipMap
-    """The tip map of all bundles that goes on from the nearest of them."""
-    tip_map: TipMap
-    """That of the free bundles."""
-    starts: TornCells
-    """Of searches."""
+    whole: TipMap  # the tip map of all bundles that goes on from the nearest of them
+    tip_map: TipMap  # that of the free bundles
+    starts: TornCells  # of searches
 
 
 @dataclass(frozen=True)
@@ -57,10 +54,7 @@ class PreparedMap:
 
     @lazy
     def coarse_map(self) -> TipMap:
-        """The same in fewer steps, to move seeds and see which searches are worth the exact map.
-
-        Of an arm under loads it is the exact map.
-        """
+        """The same in fewer steps, to move and compare searches; under loads the exact map."""
         return self.tip_map if self.tip_map.supports_unstable else coarsened(self.tip_map, _COARSE)
 
     @lazy
@@ -84,10 +78,10 @@ class PreparedMap:
         They are known at the nodes of a grid: one that is narrower than its cells may be missing.
         """
         every = all_postures(self.whole, _NODES) if self.dimension == 3 else None
-        sheets, box = list[Sheet](), self.tip_map.box
+        sheets, widths = list[Sheet](), self.tip_map.box.widths / _NODES
         for whole, gamma in [] if every is None else every.sheets:
-            tip_map, known = free_bundles(whole), gamma[:, self.whole.box.free]
-            starts = TornCells.of_sheet(tip_map, known, box.widths / _NODES)
+            tip_map = free_bundles(whole)
+            starts = TornCells.of_sheet(tip_map, gamma[:, self.whole.box.free], widths)
             sheets.append(Sheet(whole, tip_map, starts))
         return sheets
 

@@ -1,9 +1,4 @@
-"""Proofs by branch and bound that no activation comes nearer to a target.
-
-Cells of the activation box are halved until a bound on each says enough. On a cell with center c
-and half widths h the tip lies within an error of its linearization at c,
-`TipMap.linearization_errors`.
-"""
+"""Proofs by branch and bound, over halved cells of the box, that no tip is nearer to a target."""
 
 from __future__ import annotations
 
@@ -30,15 +25,12 @@ _SOFTNESS = 1e-6  # of the linear problem that says in which direction the targe
 def gap_bounds(
     tip_map: TipMap, coarse: CoarseCells, targets: Array, gap: Array, reach_tol: float
 ) -> Array:
-    """A lower bound of the distance of each target from everything that the box reaches.
+    """Lower bounds (t,) of the distance of targets (t, 3) from all that the box reaches [m].
 
     The distance of a target p from the linear image of a cell with center c and half widths h is
     n·(p - r(c)) - Σ hj |n·Jj| at least, for any unit vector n, and its distance from the image no
-    smaller than that by more than the error of the linearization.
-
-    Bounds [m], shape (t,), are 0 where nothing is proved, and no larger than the gap, the distance
-    of the best place known from each target (t, 3) [m]. To prove anything of the arm itself, a
-    bound must exceed `reach_tol` [m]; every gap does.
+    smaller by more than `TipMap.linearization_errors`. Bounds are 0 where nothing is proved, and
+    no larger than the gap of the best place known; below `reach_tol` they prove nothing of the arm.
     """
     if tip_map.box.dimension == 0:
         return gap.copy()  # one place is reached
@@ -90,7 +82,7 @@ def _exclusion_of_block(
     least = np.where(few, enough, 0.0)
     spent = np.zeros(len(enough), np.int64)
     while len(owner):
-        blocks = [slice(first, first + _BLOCK) for first in range(0, len(owner), _BLOCK)]
+        blocks = parallel.blocks(len(owner), _BLOCK)
         each = [_distances(tip_map, half, center[b], targets[owner[b]]) for b in blocks]
         bounds = np.concatenate(each)
         spent += np.bincount(owner, minlength=len(enough))
@@ -116,9 +108,8 @@ def _distances(tip_map: TipMap, half: Array, center: Array, targets: Array) -> A
     tip_map.fill(center, TipOutputs(tips, slopes))
     away, slopes = targets - tips, slopes * half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
-    inside, force = np.empty((n, m)), np.zeros((n, 3))
-    side = np.ones((n, m))
-    project(np.zeros((n, m)), slopes, away, softness, -side, side, inside, force)
+    force, side = np.zeros((n, 3)), np.ones((n, m))
+    project(np.zeros_like(side), slopes, away, softness, -side, side, np.empty_like(side), force)
     size = np.linalg.norm(force, axis=1)
     normal = -force / np.where(size > 0, size, 1.0)[:, None]
     linear = np.einsum("ni,ni->n", normal, away)

@@ -25,25 +25,15 @@ RESIDUALS = Range(1e-13, 1e-2)
 class Request:
     """Targets, and which activations to prefer where there is a choice."""
 
-    targets: Array
-    """Wanted positions of the tip [m], shape (t, 3)."""
-    residual: float
-    """|tip - target| at which a search has found its target [m]."""
-    reach_tol: float
-    """|tip - target| that the error of tips leaves open, or that is asked for [m]; `residual` at
-    least. No target so near to a tip of the arm is out of reach."""
-    near: Array
-    """Activations of the free bundles to stay near to [-], shape (t, dimension)."""
-    direction: Array | None = None
-    """Wanted tip tangents, unit vectors, shape (t, 3)."""
-    direction_weight: float = 0.0
-    """Weight of |d3 - direction| against |γ - near| or a distance in L [-]."""
-    family: int = 1
-    """Activations wanted for each target where there are infinitely many."""
-    seed: int = 0
-    """Seed of the random activations that the others stay near to."""
-    from_rest: bool = False
-    """True for postures of loaded arms to which activations lead from rest, and no others."""
+    targets: Array  # wanted positions of the tip [m], (t, 3)
+    residual: float  # |tip - target| at which a search has found its target [m]
+    reach_tol: float  # |tip - target| at which a target counts as reached [m], `residual` at least
+    near: Array  # activations of the free bundles to stay near to [-], (t, dimension)
+    direction: Array | None = None  # wanted tip tangents, unit vectors, (t, 3)
+    direction_weight: float = 0.0  # of |d3 - direction| against |γ - near| or a distance in L
+    family: int = 1  # activations wanted for each target where there are infinitely many
+    seed: int = 0  # seed of the random activations that the others stay near to
+    from_rest: bool = False  # True for postures that activations lead to from rest, and no others
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""
@@ -52,13 +42,8 @@ class Request:
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
-    """Activations (bundles,) or (t, bundles) of all bundles as those of the free ones, (t, free).
-
-    Raises:
-        InvalidInput: Another shape, or values that are not finite.
-    """
-    m = box.bundles
-    rows = as_floats(name, activations)
+    """Activations (bundles,) or (t, bundles) of all bundles as those of free ones, (t, free)."""
+    m, rows = box.bundles, as_floats(name, activations)
     if rows.shape not in ((m,), (count, m)):
         raise InvalidInput(f"{name}.shape", rows.shape, f"of shape ({m},), or ({count}, {m})")
     check_finite(name, rows)
@@ -69,27 +54,19 @@ def positions_in(text: str, source: str, length: float | None = None) -> list[li
     """Positions [m] from lines x,y,z; a header is skipped, but for units such as x_mm,y_mm,z_mm.
 
     Errors name the file by `source`; places in L need a `length` L [m].
-
-    Raises:
-        InvalidInput: A line that is not three lengths, an unknown unit in the header, or no line.
     """
-    lines = [line for line in text.splitlines() if line.strip()]
-    words = [word.strip() for word in lines[0].split(",")] if lines else []
-    rows = lines
+    rows = [line for line in text.splitlines() if line.strip()]
+    words = [word.strip() for word in rows[0].split(",")] if rows else []
     if words and not any(word.startswith(tuple("+-.0123456789")) for word in words):
-        units = [_header_unit(word, lines[0], source) for word in words]
-        rows = [_with_units(line, units) for line in lines[1:]]
+        units = [_header_unit(word, rows[0], source) for word in words]
+        rows = [_with_units(row, units) for row in rows[1:]]
     if not rows:
         raise InvalidInput("targets", source, "a CSV file with a row x,y,z for each position")
-    return [position_in(f"{source}, point {k + 1}", row, length) for k, row in enumerate(rows)]
+    return [position_in(f"{source}, point {k}", row, length) for k, row in enumerate(rows, 1)]
 
 
 def position_in(name: str, text: str, length: float | None = None) -> list[float]:
-    """One position [m] from x,y,z, each with its unit or all of them in m; in L with a length.
-
-    Raises:
-        InvalidInput: The text is not three lengths.
-    """
+    """One position [m] from x,y,z, each with its unit or all of them in m; in L with a length."""
     values = lengths_in(text, 3, length)
     if values is None:
         units = TYPED if length is None else f"{TYPED}, L"
@@ -99,11 +76,7 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
 
 
 def length_in(name: str, text: str, length: float) -> float:
-    """One length [m] from what was typed, 0 or more, with its unit, in m or in a length L.
-
-    Raises:
-        InvalidInput: The text is not such a length.
-    """
+    """One length [m] from what was typed, 0 or more, with its unit, in m or in a length L."""
     values = lengths_in(text, 1, length)
     if values is None or not 0.0 <= values[0] < np.inf:
         raise InvalidInput(name, text or "''", f"a length in m, or with {TYPED}, L")
@@ -121,7 +94,5 @@ def _header_unit(word: str, line: str, source: str) -> str:
 
 
 def _with_units(line: str, units: list[str]) -> str:
-    parts = line.split(",")
-    if len(parts) != len(units):
-        return line
-    return ",".join(f"{part.strip()}{unit}" for part, unit in zip(parts, units, strict=True))
+    parts = [part.strip() for part in line.split(",")]
+    return ",".join(map(str.__add__, parts, units)) if len(parts) == len(units) else line

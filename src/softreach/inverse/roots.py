@@ -22,7 +22,6 @@ searches from anywhere."""
 _SEED = 1
 _BEYOND = 1e-3  # of the residual, to which a descent goes on
 _MOST_STEPS = 60
-
 _BLOCK = 500  # targets at once
 _MOST_ITERATIONS = 60
 _LONGEST_STEP = 0.3  # in ranges
@@ -35,20 +34,13 @@ _FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
 class Roots(NamedTuple):
     """Activations of the free bundles, each a root for one of the targets or the nearest tip."""
 
-    target: Index
-    """Number of the target, shape (n,)."""
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    tip: Array
-    """Tips there [m], shape (n, 3)."""
-    slope: Array
-    """∂r/∂γ there [m], shape (n, 3, m)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
-    cell: Index
-    """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
-    sheet: Index
-    """Number of its sheet in `PreparedMap.sheets`, shape (n,)."""
+    target: Index  # number of the target, (n,)
+    gamma: Array  # activations [-], (n, m)
+    tip: Array  # tips there [m], (n, 3)
+    slope: Array  # ∂r/∂γ there [m], (n, 3, m)
+    residual: Array  # |tip - target| [m], (n,)
+    cell: Index  # cell of the mesh where the search began; -1 if in none, (n,)
+    sheet: Index  # number of its sheet in `PreparedMap.sheets`, (n,)
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
@@ -78,23 +70,14 @@ def roots_at(tip_map: TipMap, targets: Array, target: Index, gamma: Array) -> Ro
 
 
 def placed(tip_map: TipMap, gamma: Array) -> Array:
-    """Tips to rounding [m], shape (n, 3).
-
-    `TipMap.tips` of loaded arms ends the search for an equilibrium within a part of `tol` that is
-    larger than the residual of a root.
-    """
-    if not tip_map.supports_unstable:
-        return tip_map.tips(gamma)
-    return tip_map.tips_and_slopes(gamma)[0]
+    """Tips to rounding [m], shape (n, 3): `TipMap.tips` of loaded arms are only as exact as tol."""
+    return tip_map.tips_and_slopes(gamma)[0] if tip_map.supports_unstable else tip_map.tips(gamma)
 
 
 def descend(
     tip_map: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_STEPS
 ) -> Nearest:
-    """The local minimum of distance to a target from each start, to well within the residual [m].
-
-    Starts are inside the bounds, shape (n, m), and there is a target for each, shape (n, 3) [m].
-    """
+    """Local minima of distance to targets (n, 3) from starts (n, m), well within a residual [m]."""
     return nearest_tips(tip_map, start, targets, _BEYOND * residual, CLOSELY._replace(most=most))
 
 
@@ -104,9 +87,11 @@ def first_of_each(owner: Index, value: Array, count: int) -> Index:
     return order[np.searchsorted(owner[order], np.arange(count))]
 
 
-def smallest_singular_values(slope: Array) -> Array:
-    """Smallest singular values of 3x3 Jacobians [m], shape (n,)."""
-    return _closed_form(slope)[0]
+def closed_form(slope: Array) -> tuple[Array, Array]:
+    """Smallest singular values [m] and condition numbers of 3x3 Jacobians, shape (n,)."""
+    smallest, condition = np.empty((2, len(slope)))
+    newton.conditions(slope, smallest, condition)
+    return smallest, condition
 
 
 def conditions(slope: Array) -> Array:
@@ -115,7 +100,7 @@ def conditions(slope: Array) -> Array:
     if m == 0:
         return np.full(len(slope), np.nan)
     if m == 3:
-        return _closed_form(slope)[1]
+        return closed_form(slope)[1]
     sigma = np.linalg.svd(slope, compute_uv=False)
     with np.errstate(divide="ignore"):
         return sigma[:, 0] / sigma[:, -1]
@@ -140,18 +125,13 @@ def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index
 def affine_invariant_newton(
     tip_map: TipMap, targets: Array, start: Array, residual: float
 ) -> Array:
-    """Ends of searches by affine-invariant Newton, inside the bounds; a root or not.
+    """Ends of searches by affine-invariant Newton, inside the bounds; a root or not, (n, 3).
 
-    Near a full circle two singular values of J vanish together. The residual then says little about
-    the distance from a root: on the way it has to rise, and a search that never lets it does not
-    arrive. Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is
-    invariant under any linear change of the residual.
-
-    The roots lie in a curved valley: along one direction the tip moves millions of times as far as
-    along the others, and a straight step leaves the valley's floor. So each step ends with a few of
+    Near a full circle two singular values of J vanish together, and on the way to a root the
+    residual has to rise. So steps are judged by the natural test, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|,
+    which is invariant under any linear change of the residual. The roots lie in a curved valley,
+    along which the tip moves millions of times as far as across: each step ends with a few of
     Newton's method along that direction alone.
-
-    There is a target for each start, shape (n, 3) both; a search may end within the residual [m].
     """
     box, scales = tip_map.box, tip_map.box.scales
     bounds = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
@@ -183,19 +163,10 @@ def affine_invariant_newton(
     return box.clip(gamma)
 
 
-def _closed_form(slope: Array) -> tuple[Array, Array]:
-    smallest, condition = np.empty(len(slope)), np.empty(len(slope))
-    newton.conditions(slope, smallest, condition)
-    return smallest, condition
-
-
 def _valley_floor(
     tip_map: TipMap, bounds: tuple[Array, Array], targets: Array, gamma: Array, steps: int
 ) -> tuple[Array, Array, Array]:
-    """Activations after steps along the direction in which the tip moves most, until it is right.
-
-    And target - tip and ∂r/∂γ [m] there. Those without a tip stay.
-    """
+    """Activations after steps along the way in which tips move most, what they miss, and ∂r/∂γ."""
     scales, lost = tip_map.box.scales, np.zeros(len(gamma), bool)
     tip, slope = tip_map.tips_and_slopes(gamma)
     for _ in range(steps):
@@ -213,19 +184,16 @@ def _valley_floor(
 class Reached(NamedTuple):
     """The best place found for each target."""
 
-    gamma: Array
-    """Activations [-], shape (t, m)."""
-    residual: Array
-    """|tip - target| [m], shape (t,)."""
+    gamma: Array  # activations [-], (t, m)
+    residual: Array  # |tip - target| [m], (t,)
 
 
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
     """The activation found whose tip is nearest to each target, with growing effort.
 
-    Most targets are reached from `start`, shape (t, m), or the seed whose tip is nearest. The rest
-    lie where the map is singular or on the boundary of the reachable set, which is the image of
-    faces of the box on which few bundles are free: these are searched from many seeds, on such
-    faces too, that lie apart.
+    Most targets are reached from `start` (t, m) or the nearest seed. The rest lie where the map is
+    singular or on the boundary, the image of faces with few free bundles: these are searched from
+    many seeds, on such faces too, that lie apart.
     """
     box, targets = prepared.tip_map.box, request.targets
     first = descend(prepared.tip_map, targets, box.clip(start), request.residual)
@@ -240,10 +208,10 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
         for some in np.array_split(left, 1 + len(left) * neighbors // 100_000):
             goal = targets[some]
             starts = [(np.repeat(np.arange(len(some)), random), np.tile(anywhere, (len(some), 1)))]
-            every = [prepared.seeds]
-            if neighbors > 1:  # the nearest seed is enough for nearly all
-                every.append(prepared.face_seeds)
-            for seeds in every:
+            # The nearest seed is enough for nearly all.
+            for seeds in (
+                [prepared.seeds, prepared.face_seeds] if neighbors > 1 else [prepared.seeds]
+            ):
                 starts.append(seeds.starts(seeds.nearest(goal, neighbors), most, apart))
             owner, start = map(np.concatenate, zip(*starts, strict=True))
             ends = descend(prepared.tip_map, goal[owner], start, request.residual)

@@ -73,14 +73,10 @@ class Seeds:
     def near(
         self, targets: Array, near: Array, count: int, most: int, least_distance: float
     ) -> tuple[Index, Array]:
-        """Seeds with tips near each target (t, 3) [m], those nearest to an activation (t, m).
+        """Numbers of targets (t, 3) [m], and seeds with tips nearby, closest to activations (t, m).
 
         Chosen twice: after each is moved to where its linearized tip meets the target, and as they
-        are. At least `count` are looked at; of either kind a target gets `most`, that lie apart, in
-        ranges.
-
-        Returns:
-            Number of the target and activation of each start, sorted by target.
+        are. At least `count` are looked at; of either kind a target gets `most` that lie apart.
         """
         seeds, first, (corner, width, shape) = self._bins
         places, m = (targets - corner) / width, near.shape[1]
@@ -114,11 +110,7 @@ class Seeds:
     def starts(
         self, candidates: Array, most: int = _STARTS, least_distance: float = _APART
     ) -> tuple[Index, Array]:
-        """A few candidates (t, k, m) for each target, best first, that lie apart, in ranges.
-
-        Returns:
-            Number of the target and activation of each start, sorted by target.
-        """
+        """Numbers of targets and a few candidates (t, k, m) of each, best first, that lie apart."""
         chosen = np.zeros(candidates.shape[:2], bool)
         choose_apart(candidates, self.scales, most, least_distance, chosen)
         return np.nonzero(chosen)[0], candidates[chosen]
@@ -126,9 +118,8 @@ class Seeds:
 
 def _bins_of(places: Array, shape: tuple[int, int, int]) -> Index:
     """Number of the bin of each place (n, 3) in widths, or of the bin nearest to it."""
-    _, ny, nz = shape
     bins = np.clip(places, 0.0, np.array(shape) - 1.0).astype(np.int64)
-    return bins @ np.array([ny * nz, nz, 1])
+    return bins @ np.array([shape[1] * shape[2], shape[2], 1])
 
 
 def seeds(tip_map: TipMap, coarse: TipMap) -> Seeds:

@@ -26,7 +26,7 @@ from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
-from softreach.support.arrays import Array, Index, Mask, as_directions, as_points, joined, rows
+from softreach.support.arrays import Array, Index, as_directions, as_points, joined, rows
 from softreach.support.errors import Range
 from softreach.workspace.search import CLOSELY, nearest_tips
 
@@ -105,15 +105,14 @@ def solve_inverse(
     prepared = prepared_map(arm, tol, frame=frame, point=point)
     points, box = as_points("targets", targets), prepared.whole.box
     preferred = np.zeros(box.bundles) if near is None else near
-    measures = prepared.whole.measures
+    measures, length = prepared.whole.measures, prepared.whole.length
     unit = None if direction is None else as_directions("direction", direction, len(points))
-    least = as_number("residual_over_length", residual_over_length, RESIDUALS)
-    residual = least * prepared.whole.length
+    residual = as_number("residual_over_length", residual_over_length, RESIDUALS) * length
     within = as_number("within", within, Range(0.0, unit="m"))
     request = Request(
         targets=points,
         residual=residual,
-        reach_tol=max(residual, prepared.whole.tol * prepared.whole.length, within),
+        reach_tol=max(residual, prepared.whole.tol * length, within),
         near=as_activations("near", preferred, box, len(points)) / measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
@@ -137,7 +136,8 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
         roots = with_other_sheets(prepared, request, roots)
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
-    closest = joined([_closest(prepared, request, missing[block]) for block in blocks])
+    none = no_roots(prepared.tip_map)
+    closest = joined([_closest(prepared, request, missing[block], none) for block in blocks])
     bounds = _gap_bounds(prepared, request, closest)
     # A target not proved to be out of reach may have roots that are nearly singular.
     left = (closest.residual > request.residual) & (bounds == 0.0)
@@ -152,9 +152,10 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
-    roots = every_branch(prepared, request) if prepared.dimension == 3 else None
+    none = no_roots(prepared.tip_map)
+    roots = every_branch(prepared, request) if prepared.dimension == 3 else none
     closest = _closest(prepared, request, np.arange(len(request.targets)), roots)
-    return _solutions(prepared, request, no_roots(prepared.tip_map), closest)
+    return _solutions(prepared, request, none, closest)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
@@ -167,17 +168,14 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     return _solutions(prepared, request, roots, closest)
 
 
-def _closest(
-    prepared: PreparedMap, request: Request, chosen: Index, known: Roots | None = None
-) -> Roots:
+def _closest(prepared: PreparedMap, request: Request, chosen: Index, known: Roots) -> Roots:
     """The nearest tip, or the best compromise with a direction, from seeds and known roots."""
     tip_map, targets = prepared.tip_map, request.targets[chosen]
     if not len(chosen):
         return no_roots(tip_map)
     target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
-    if known is not None:
-        target = np.concatenate([target, known.target])
-        start = np.concatenate([start, known.gamma])
+    target = np.concatenate([target, known.target])
+    start = np.concatenate([start, known.gamma])
     if request.direction is None:
         gamma, _, left = nearest_tips(tip_map, start, targets[target], request.residual, CLOSELY)
     else:
@@ -220,7 +218,10 @@ def _solutions(
     statuses, proved_gaps = np.full(count, Status.REACHED, np.int8), np.zeros(count)
     out_of_reach = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
     statuses[closest.target[~hit]], proved_gaps[closest.target] = out_of_reach, bounds
-    activations = whole.box.with_fixed(roots.gamma)
+    activations, known = whole.box.with_fixed(roots.gamma), as_tip_map(whole)
+    leans = np.zeros(len(activations), bool)
+    if isinstance(known.rod, LoadedRod):
+        leans = known.rod.leans(known.inputs.activations(activations))
     maps = [prepared, *prepared.sheets] if roots.sheet.any() else [prepared]
     return Solutions(
         arm=whole.arm,
@@ -233,7 +234,7 @@ def _solutions(
         residuals=roots.residual,
         conditions=conditions(roots.slope),
         margins=tip_map.box.margin(roots.gamma),
-        leans=_leans(whole, activations),
+        leans=leans,
         sheets=roots.sheet,
         statuses=statuses,
         nearest=np.where((best.residual > request.residual)[:, None], best.tip, request.targets),
@@ -241,10 +242,3 @@ def _solutions(
         gaps=best.residual,
         gap_bounds=proved_gaps,
     )
-
-
-def _leans(tip_map: TipMap, activations: Array) -> Mask:
-    known = as_tip_map(tip_map)
-    if isinstance(known.rod, LoadedRod):
-        return known.rod.leans(known.inputs.activations(activations))
-    return np.zeros(len(activations), bool)

@@ -107,11 +107,9 @@ def _cached(function: Any) -> Any:
 class _Cache(FunctionCache):
     """A cache whose faults cost a compilation, never the result.
 
-    Numba reads an index whole before it asks whether the index is fresh. One that an older version
-    of the package wrote may name classes that have moved since, and a process that is killed or
-    runs out of space may leave anything: what cannot be read is discarded. Two processes that
-    compile a function for different types at once may both call their code number one, so that the
-    index of one names the code of the other: what was compiled for other types is discarded too.
+    An index of an older version may name classes that have moved, and a process that is killed may
+    leave anything: what cannot be read is discarded. Two processes that compile a function for
+    different types at once may both call their code number one: what is for other types is, too.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -137,10 +135,7 @@ class _Cache(FunctionCache):
 
 
 class _Log(event.Listener):
-    """Logs what is being compiled; a library prints nothing, the command line listens.
-
-    A process that is asked to end begins no further compilation.
-    """
+    """Logs what is being compiled; a process that is asked to end begins no further compilation."""
 
     def on_start(self, event: event.Event) -> None:
         check_stopped()

@@ -1,11 +1,9 @@
 """Reach of the tip with four free bundles or more, by search instead of by simplices.
 
-The box of m activations has m! simplices to a cell of its grid, its image has one boundary. So the
-image is found in space: a lattice tells how far its centers are from the nearest tip. A level set
-of these distances goes around both sides of a sheet and its rim, of whatever thinness; each of its
-vertices is drawn to the nearest tip. Where this leaves a larger error, lines of sight through the
-centers that are reached add up to the volume. Each place that counts as reached has an activation
-that proves it; what searches miss is missing from the volume.
+A lattice tells how far its centers are from the nearest tip. A level set of these distances goes
+around both sides of a sheet and its rim, and each of its vertices is drawn to the nearest tip.
+Where this leaves a larger error, lines of sight through the centers that are reached add up to the
+volume. What counts as reached has an activation that proves it; what searches miss is missing.
 """
 
 from __future__ import annotations
@@ -52,7 +50,6 @@ _ON = 1e-2  # cells from a tip, where a place counts as reached
 _THICK = 3.0  # cells, on average
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
-
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
 _RULE = 2.5  # cells along the mean side of the bounding box, times the root of the accuracy
 _FEWEST = 16.0
@@ -68,9 +65,7 @@ _WIDEST = 0.99  # of all thicknesses are below the one that the next pushes go b
 _STRETCH = 30.0  # times as much as one to the side, a miss along the normal counts
 _PUSHES, _PASSES = 12, 4
 _DAMPING = 1e-8  # of the mean square of the slopes
-CLIMBERS = 1024
-"""Tips of a cloud from which the convex hull is climbed, beside those on the boundary: more make
-countless facets."""
+CLIMBERS = 1024  # tips from which the convex hull is climbed beside the boundary: more make facets
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -78,20 +73,16 @@ class Wrap(Surface):
     """The surface, closed and outwards, a ten-thousandth of a cell outside of its tips."""
 
     tip_map: TipMap
-    gamma: Array
-    """Activations that lead to the vertices, shape (v, bundles)."""
-    cell: float
-    """Edge of the cells that it was found with [m]."""
-    tight_volume: float
-    """Volume inside of the tips themselves [m³]."""
+    gamma: Array  # activations that lead to the vertices, (v, bundles)
+    cell: float  # edge of the cells that it was found with [m]
+    tight_volume: float  # volume inside of the tips themselves [m³]
 
     @lazy
     def volume_of_tips(self) -> Estimate:
-        """The same; of a sheet that is far thinner than cells, its thickness over its area [m³].
+        """Volume inside of the tips; of a thin sheet, its thickness over its area [m³].
 
-        No search for the nearest tip sees so small a change; so from each vertex the tip is pushed
-        along its normal, to which all columns of ∂r/∂γ are nearly square, to both sides. It errs by
-        where tips count as found and by their own errors.
+        There from each vertex the tip is pushed along its normal, to which all columns of ∂r/∂γ are
+        nearly square, to both sides: no search for the nearest tip sees so small a change.
         """
         half = 0.5 * self.area
         thickness = self.tight_volume / half if half > 0.0 else np.inf
@@ -144,7 +135,7 @@ def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
     places = grid.lattice.places(at)
     first, second = (
         nearest_tips(grid.tip_map, grid.gamma[cells], places, ENOUGH * grid.lattice.cell)
-        for cells in (end.astype(np.int64) @ grid.steps for end in (np.floor(at), np.ceil(at)))
+        for cells in (end(at).astype(np.int64) @ grid.steps for end in (np.floor, np.ceil))
     )
     closer = second.distance < first.distance
     for kept, new in zip(first, second, strict=True):
@@ -153,11 +144,7 @@ def drawn_tight(grid: ReachedGrid, at: Array) -> Nearest:
 
 
 def wrapped(grid: ReachedGrid) -> Wrap:
-    """The surface around what was found.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
-    """
+    """The surface around what was found."""
     at, faces = level_set(grid.distances, DISTANCE)
     gamma, tips, _ = drawn_tight(grid, at)
     cell, away = grid.lattice.cell, grid.lattice.places(at) - tips
@@ -177,11 +164,9 @@ class ReachedCells:
     """Counterpart of `Image` for more than three free bundles: asked by search."""
 
     grid: ReachedGrid
-    cloud: tuple[Array, Array]
-    """Activations on faces of the box, and their tips [m]."""
+    cloud: tuple[Array, Array]  # activations on faces of the box, and their tips [m]
     wrap: Wrap
-    coarse: Wrap
-    """The same on cells one and a half times as large."""
+    coarse: Wrap  # the same on cells one and a half times as large
     hull: ConvexHull | None = None
 
     @property
@@ -265,9 +250,7 @@ class ReachedCells:
         for corner in (np.rint(at), *(np.floor(at) + corner for corner in _CORNERS)):
             index = corner.astype(np.int64)
             within = ((index >= 0) & (index < self.lattice.shape)).all(axis=1)
-            cells = np.ravel_multi_index(
-                tuple(np.where(within, i, 0) for i in index.T), self.lattice.shape
-            )
+            cells = self.grid.steps @ (index.T * within)
             yield within & (self.grid.gap[cells] == 0.0), self.grid.gamma[cells]
 
     @lazy
@@ -277,8 +260,7 @@ class ReachedCells:
         return KDTree(np.concatenate([self.wrap.vertices, self.cloud[1]]))
 
 
-Covering = Image | ReachedCells
-"""What a solid covers of space."""
+Covering = Image | ReachedCells  # what a solid covers of space
 
 
 def smallest_memory(tip_map: TipMap) -> float:
@@ -290,14 +272,7 @@ def smallest_memory(tip_map: TipMap) -> float:
 def searched_set(
     tip_map: TipMap, accuracy: float, cell: float | None, memory: float | None, progress: Progress
 ) -> ReachedCells:
-    """The image of a box of four free bundles or more, whose arguments are those of the set.
-
-    Cells become smaller until the volume is as accurate as asked, or the memory is used.
-
-    Raises:
-        InvalidInput: No activation has a stable equilibrium, too little memory, or cells too small
-            for it.
-    """
+    """The image of a box of more bundles, on cells as small as accuracy asks or memory allows."""
     least = smallest_memory(tip_map)
     memory = max(free_memory() / 4.0, least) if memory is None else memory
     if memory < least:
@@ -315,10 +290,8 @@ def searched_set(
         return all_reached(ReachedGrid(tip_map, shifted_lattice(tips, edge), progress), *cloud)
 
     coarse = wrapped(of_cells(_FINER * edge))
-    begin = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))[
-        :, tip_map.box.free
-    ]
-    hull = climbed_hull(tip_map, begin.clip(0.0, 1.0), accuracy)
+    begin = tip_map.box.to_cube(np.concatenate([gamma[:CLIMBERS], coarse.gamma]))
+    hull = climbed_hull(tip_map, begin[:, tip_map.box.free].clip(0.0, 1.0), accuracy)
     while True:
         grid = of_cells(edge)
         cells = ReachedCells(grid, cloud, wrapped(grid), coarse, hull)
@@ -328,17 +301,14 @@ def searched_set(
 
 
 def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: float) -> bool:
-    """True if an accuracy is not met but may be, by cells that are no smaller than allowed.
-
-    Where nothing is seen between both sides of a sheet, its error falls as the square of the edge,
-    until the sheet is thin enough for its thickness to be found.
-    """
+    """True if an accuracy is not met but may be, by cells that are no smaller than allowed."""
     edge = cells.lattice.cell
     value, error = cells.volume
     if error <= accuracy * value or edge / _FINER < smallest:
         return False
     if cells.is_thick:
         return True
+    # The error of a sheet falls as the square of the edge, until its thickness can be found.
     is_sheet = cells.wrap.volume_of_tips.value != cells.wrap.tight_volume
     needed = edge / _FINER if is_sheet else edge * np.sqrt(accuracy * max(value, 0.0) / error)
     return needed >= of_sheets
@@ -347,11 +317,9 @@ def _may_meet(cells: ReachedCells, accuracy: float, smallest: float, of_sheets: 
 def cells_of(
     tip_map: TipMap, cell: float, inside: Callable[[Array], Mask] | None = None
 ) -> ReachedCells:
-    """What any number of free bundles reach, without its hull.
+    """What any number of free bundles reach, on 96 cells along the longest side, without hull.
 
-    The edge of a cell [m] is larger where it takes more than 96 along the longest side. A mask of
-    places (n, 3) [m] that are known to be reached spares searches; then nothing but the surface is
-    right.
+    With places `inside` that are known to be reached, nothing but the surface is right.
     """
     cloud = cloud_on_faces(tip_map, 0)
     edge = max(cell, float(np.ptp(cloud[1], axis=0).max()) / _MOST_ALONG)

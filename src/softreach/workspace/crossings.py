@@ -31,21 +31,14 @@ class Crossings:
 
     tip_map: TipMap
     lattice: Lattice
-    cell: Index
-    """The center that is reached, as a flat index, shape (n,)."""
-    axis: Index
-    """Along which axis the center that is not lies, shape (n,)."""
-    sense: Index
-    """On which side, 1 or -1, shape (n,)."""
-    low: Array
-    """In cells from the reached center, shape (n,)."""
+    cell: Index  # the center that is reached, as a flat index, (n,)
+    axis: Index  # along which axis the center that is not lies, (n,)
+    sense: Index  # on which side, 1 or -1, (n,)
+    low: Array  # in cells from the reached center, (n,)
     high: Array
-    gamma: Array
-    """Activations that reach `low`, shape (n, bundles)."""
-    beyond: Array
-    """Activations whose tips are nearest to `high`, shape (n, bundles)."""
-    place: Array
-    """Place where the plane of that tip cuts the edge, between `low` and `high`, shape (n,)."""
+    gamma: Array  # activations that reach `low`, (n, bundles)
+    beyond: Array  # activations whose tips are nearest to `high`, (n, bundles)
+    place: Array  # place where the plane of that tip cuts the edge, between `low` and `high`, (n,)
 
     @classmethod
     def of(cls, grid: ReachedGrid) -> Crossings:
@@ -59,21 +52,12 @@ class Crossings:
             for side, places in ((1, leaving), (-1, entering)):
                 parts.append((places, np.full(len(places), k), np.full(len(places), side)))
         cell, axis, sense = (np.concatenate(column) for column in zip(*parts, strict=True))
-        n, outside = len(cell), cell + sense * grid.steps[axis]
-        crossings = cls(
-            tip_map=grid.tip_map,
-            lattice=grid.lattice,
-            cell=cell,
-            axis=axis,
-            sense=sense,
-            low=np.zeros(n),
-            high=np.ones(n),
-            gamma=grid.gamma[cell],
-            beyond=grid.gamma[outside],
-            place=np.zeros(n),
-        )
-        crossings._cut(np.arange(n))
-        crossings.enclose(np.arange(n))
+        every, low, high = np.arange(len(cell)), np.zeros(len(cell)), np.ones(len(cell))
+        gamma, beyond = grid.gamma[cell], grid.gamma[cell + sense * grid.steps[axis]]
+        edges = cell, axis, sense, low, high, gamma, beyond
+        crossings = cls(grid.tip_map, grid.lattice, *edges, place=low.copy())
+        crossings._cut(every, grid.tip_map.tips(beyond))
+        crossings._enclose(every)
         return crossings
 
     def coordinates(self, which: Index, t: Array) -> Array:
@@ -86,7 +70,7 @@ class Crossings:
         """The same [m]."""
         return self.lattice.places(self.coordinates(which, t))
 
-    def enclose(self, which: Index) -> None:
+    def _enclose(self, which: Index) -> None:
         """Bring `low` and `high` together on some of the edges."""
         guess = np.ones(len(which), bool)  # whether to trust the tangent plane
         for _ in range(_ROUNDS):
@@ -97,7 +81,7 @@ class Crossings:
             low, high, place = self.low[which], self.high[which], self.place[which]
             probe = np.minimum(low + _PROBE, 0.5 * (low + high))
             tangent = np.clip(place, low + 0.5 * _PROBE, high - 0.1 * _PROBE)
-            t = np.where(guess, np.where(place > low + 0.5 * _PROBE, tangent, probe), probe)
+            t = np.where(guess & (place > low + 0.5 * _PROBE), tangent, probe)
             probed = t == probe
             start = np.where(probed[:, None], self.gamma[which], self.beyond[which])
             reached, nearest = self._search(which, t, start)
@@ -118,10 +102,8 @@ class Crossings:
         self.gamma[which[reached]] = nearest.gamma[reached]
         return reached, nearest
 
-    def _cut(self, which: Index, tips: Array | None = None) -> None:
+    def _cut(self, which: Index, tips: Array) -> None:
         """Cut the edges by the planes through the tips nearest to `high`, square to the way."""
-        if tips is None:
-            tips = self.tip_map.tips(self.beyond[which])
         away = (self.points(which, self.high[which]) - tips) / self.lattice.cell
         distance = np.linalg.norm(away, axis=1).clip(1e-12)
         along = away[np.arange(len(which)), self.axis[which]] * self.sense[which] / distance
@@ -137,7 +119,7 @@ class Crossings:
         self.high[yes] = np.maximum(self.high[yes], 1.0)
         self.beyond[yes] = self.gamma[yes]
         self.place[yes] = 0.5 * (self.low[yes] + 1.0)
-        self.enclose(yes)
+        self._enclose(yes)
         return self.place[which] - before
 
 
@@ -168,18 +150,12 @@ def swept_crossings(grid: ReachedGrid) -> tuple[Crossings, float]:
 class Runs(NamedTuple):
     """Stretches of lines of sight that are reached, line by line, upwards; in cells."""
 
-    line: Index
-    """Index of the line, (i, j) as i · width + j over the other two axes, shape (n,)."""
-    first: Index
-    """Number of the first center, shape (n,)."""
-    last: Index
-    """Number of the last center, shape (n,)."""
-    start: Array
-    """Beginning of the run, before its first center, shape (n,)."""
-    end: Array
-    """End of the run, behind its last center, shape (n,)."""
-    width: int
-    """Number of lines along the last of the other two axes."""
+    line: Index  # index of the line, (i, j) as i · width + j over the other two axes, (n,)
+    first: Index  # number of the first center, (n,)
+    last: Index  # number of the last center, (n,)
+    start: Array  # beginning of the run, before its first center, (n,)
+    end: Array  # end of the run, behind its last center, (n,)
+    width: int  # number of lines along the last of the other two axes
 
 
 def runs_along(crossings: Crossings, axis: int) -> Runs:
@@ -201,9 +177,8 @@ def runs_along(crossings: Crossings, axis: int) -> Runs:
 def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
     """What each run adds to the length that is reached on its line, in cells, shape (runs,).
 
-    Every so many centers are looked at, from the one of number `parity` on. A stretch shorter than
-    the spacing s holds a center with a chance of length / s only: counted as s where it does, it is
-    right on average over where the centers lie. So are gaps.
+    Every so many centers are looked at, from number `parity` on. A stretch or a gap shorter than
+    the spacing s holds one with a chance of length / s only: counted as s, it is right on average.
     """
     length = np.maximum(runs.end - runs.start, 0.0)
     seen = (runs.last - parity) // spacing * spacing + parity >= runs.first
@@ -219,10 +194,8 @@ def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
 def line_volume(crossings: Crossings) -> Estimate:
     """Volume from the lines along all three axes [m³]; each counts by the square of its lines.
 
-    On average over where the lattice lies the sum of lengths is the volume, so that what it errs by
-    is noise. Every other line along each axis, looked at on every other center, tells how much: the
-    noise of twice the spacing, which at the spacing itself is no more than half of it; so
-    does how far the axes are apart. Two standard deviations of both together are stated.
+    Its error is noise by where the lattice lies: half of what every other line on every other
+    center tells of each axis, and how far the axes are apart; two standard deviations of both.
     """
     lattice = crossings.lattice
     axes = [runs_along(crossings, axis) for axis in range(3)]
@@ -242,7 +215,5 @@ def line_volume(crossings: Crossings) -> Estimate:
 def _sparse(runs: Runs) -> Array:
     """Sums of lengths from every other line along both directions and every other center, (8,)."""
     i, j = np.divmod(runs.line, runs.width)
-    sums = (length_sum(runs, 2, parity) for parity in range(2))
-    return (
-        4.0 * np.array([np.bincount(2 * (i % 2) + j % 2, each, 4) for each in sums], float).ravel()
-    )
+    group, sums = 2 * (i % 2) + j % 2, (length_sum(runs, 2, parity) for parity in range(2))
+    return 4.0 * np.array([np.bincount(group, each, 4) for each in sums], float).ravel()

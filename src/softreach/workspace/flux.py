@@ -24,16 +24,12 @@ _CELLS = 96  # along each edge of the box: an arm that bends by half a turn move
 
 
 def signed_volume(tip_map: TipMap, nodes: int | None = None, *, enough: float = 0.0) -> Flux:
-    """The signed volume of the image of three free bundles.
+    """The signed volume of the image of three free bundles; NaN without a stable equilibrium.
 
-    By Gauss and Legendre's rule on the faces, where the map is smooth: its error falls faster than
-    any power of the number of nodes. They are added until tips are no more exact than the rule. Of
-    maps with kinks it is the volume in mapped triangles, which needs no slopes.
-
-    With a number of nodes along each side, the rule is taken for this and two thirds of it alone;
-    tips are then less exact. `enough` is the relative change of the volume that ends the adding of
-    nodes; tips of free arms are then as exact as those of the map. Value and error are NaN if a
-    node has no stable equilibrium.
+    By Gauss and Legendre's rule on the faces, with nodes added until tips are no more exact than
+    the rule; of maps with kinks by mapped triangles. With a number of nodes along each side the
+    rule is taken for this and two thirds of it alone, on less exact tips. `enough` is the relative
+    change of the volume that ends the adding of nodes, with tips of free arms as those of the map.
     """
     if tip_map.supports_unstable:
         tip_map = refined(tip_map, _LOADED_TOL)
@@ -54,21 +50,14 @@ def signed_volume(tip_map: TipMap, nodes: int | None = None, *, enough: float = 
 class Flux(NamedTuple):
     """∫ det J dγ by the divergence theorem, theory (81), and what it was computed from."""
 
-    value: float
-    """Signed volume [m³]: below zero if the map turns the orientation over."""
-    error: float
-    """Estimated error: from half as many nodes or so, and the error of the tips [m³]."""
-    cube: Array
-    """Nodes on the faces of the unit cube of the free bundles, shape (n, 3)."""
-    area: Array
-    """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
+    value: float  # signed volume [m³]: below zero if the map turns the orientation over
+    error: float  # estimated error: from half as many nodes or so, and the error of the tips [m³]
+    cube: Array  # nodes on the faces of the unit cube of the free bundles, (n, 3)
+    area: Array  # area vectors of the nodes, with their weights [m²], (n, 3)
 
 
 def _of_triangles(tip_map: TipMap, enough: float) -> Flux:
-    """By the mapped triangles of two grids on the faces, whose error O(1/n²) is removed.
-
-    A triangle's volume is linear in each corner, so that both grids together are nodes of one flux.
-    """
+    """By mapped triangles of two grids on the faces, together nodes of a flux without O(1/n²)."""
     enough = max(enough, _ROUGH_ENOUGH * tip_map.supports_unstable)
     coarse = fine = _triangle_nodes(tip_map, _KINKED[0])
     removed = np.inf
@@ -88,9 +77,8 @@ def _of_triangles(tip_map: TipMap, enough: float) -> Flux:
 def _triangle_nodes(tip_map: TipMap, cells: int) -> Flux:
     """Vertices of a grid on the faces, with kinks along its lines, and the areas of each."""
     grid, ticks = grid_faces(cells), grid_ticks(tip_map, cells)
-    cube = np.stack(
-        [t[np.rint(cells * x).astype(int)] for t, x in zip(ticks, grid.T, strict=True)], axis=1
-    )
+    columns = zip(ticks, np.rint(cells * grid).astype(int).T, strict=True)
+    cube = np.stack([each[numbers] for each, numbers in columns], axis=1)
     tips = tip_map.tips(tip_map.box.from_free_cube(cube))
     return _flux_of(tip_map, cube, tips, corner_areas(tips, face_triangles(grid, cells)))
 
@@ -101,19 +89,15 @@ def flux_tol(tip_map: TipMap) -> float:
 
 
 def face_image(tip_map: TipMap, cells: int = _CELLS) -> Surface:
-    """The closed image of the surface of the box of three free bundles, oriented outwards.
+    """The closed image of the faces of a box of three bundles, of so many cells along each edge.
 
-    The map is one to one inside the box, and the grid has so many cells along each of its edges.
-    Vertices lie on the boundary to the tolerance of the tips, and so do edges where the box has
-    edges: sharp rims stay sharp, and parts of any thinness stay whole. Vertices are NaN where an
-    activation on the faces has no stable equilibrium.
+    The map is one to one inside. Vertices lie on the boundary to the tolerance of the tips, NaN
+    where there is no stable equilibrium, and so do edges of the box: sharp rims stay sharp.
     """
     cube = grid_faces(cells)
-    tips = tip_map.tips(tip_map.box.from_free_cube(cube))
-    surface = Surface(vertices=tips, faces=face_triangles(cube, cells))
-    if surface.volume < 0:  # the map turns the box over
-        surface = Surface(vertices=tips, faces=surface.faces[:, ::-1].copy())
-    return surface
+    tips, faces = tip_map.tips(tip_map.box.from_free_cube(cube)), face_triangles(cube, cells)
+    surface = Surface(vertices=tips, faces=faces)  # which the map may turn over
+    return Surface(vertices=tips, faces=faces[:, ::-1].copy()) if surface.volume < 0 else surface
 
 
 def grid_faces(cells: int) -> Array:

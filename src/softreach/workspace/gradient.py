@@ -12,7 +12,6 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.rod.rods import as_tip_map, effective, refined
-from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_names, as_number
@@ -47,7 +46,6 @@ _MEANINGS = {
     "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
     "unreachability": ("1 per unit", "derivative of the unreachability"),
 }
-
 _CELLS = 40  # along each edge of the box, where its faces are the boundary
 _BLOCK = 1 << 21  # numbers at once
 _SLIVER = 1e-2  # of the mean area: the normal of what is smaller tells nothing
@@ -103,10 +101,7 @@ def volume_gradient(
 def gradient_of(
     solid: ReachableSet, names: tuple[str, ...], accuracy: float, progress: Progress = silent
 ) -> VolumeGradient:
-    """As `volume_gradient`, of a reachable set that is known to an accuracy.
-
-    The progress is called with the number of parameters done since its last call, often with 0.
-    """
+    """As `volume_gradient`, of a reachable set that is known to an accuracy."""
     if solid.dimension < 3:
         raise InvalidInput("arm", "a set without a volume", "one of three free bundles or more")
     parameter_of = find_parameters(solid.arm, names)
@@ -114,7 +109,12 @@ def gradient_of(
     if solid.is_torn or solid.lost_share > 0.0:
         volume, convex = _by_differences(solid, wanted, accuracy, progress)
     else:
-        volume, convex = _swept(solid, wanted, accuracy, progress)
+        tip_map, searched = solid.tip_map, solid.route == "search"
+        if solid.route == "flux" or tip_map.supports_unstable:
+            tip_map = refined(tip_map, flux_tol(tip_map))
+        tips = TipDerivatives(tip_map, wanted, _TOL, progress)
+        volume = _searched(solid, tips) if searched else _flowing(solid, tips, accuracy)
+        convex = _dragged(solid, tips)
         progress(len(names))
     return VolumeGradient(
         solid=solid,
@@ -189,17 +189,6 @@ _Swept = tuple[Array, Array]
 """Derivatives by all parameters, and their errors, shape (parameters,) each."""
 
 
-def _swept(
-    solid: ReachableSet, parameters: Sequence[Parameter], accuracy: float, progress: Progress
-) -> tuple[_Swept, _Swept]:
-    tip_map = solid.tip_map
-    if solid.route == "flux" or tip_map.supports_unstable:
-        tip_map = refined(tip_map, flux_tol(tip_map))
-    tips = TipDerivatives(tip_map, parameters, _TOL, progress)
-    volume = _searched(solid, tips) if solid.route == "search" else _flowing(solid, tips, accuracy)
-    return volume, _dragged(solid, tips)
-
-
 def _searched(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
     assert isinstance(solid.image, ReachedCells)
     if not solid.image.is_thick:
@@ -230,11 +219,10 @@ def _flowing(solid: ReachableSet, tips: TipDerivatives, accuracy: float) -> _Swe
 def _dragged(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
     """Derivatives of the convex volume, by what the corners drag along, for infinitely fine grids.
 
-    Errors fall as 1/n² or a little slower, and corners jump from vertex to vertex: the largest part
-    that is removed of the derivative by any parameter, of all that corners sweep, may be wrong of
-    each, and so may the part that hulls of corners lack of the convex volume.
+    Corners jump from vertex to vertex: the largest part removed of the derivative by any parameter
+    may be wrong of each, and so may the part that hulls of corners lack of the convex volume.
     """
-    corners = hull_corners(solid)
+    corners = _hull_corners(solid)
     fine, coarse = (_sum(each, tips) for each in corners)
     removed = (fine.value - coarse.value) / 3.0
     hull, rough = (each.volume for each in corners)
@@ -248,10 +236,8 @@ class _Sum(NamedTuple):
     """Sums over nodes, by all parameters, shape (parameters,) each."""
 
     value: Array
-    size: Array
-    """Of the terms without their signs."""
-    error: Array
-    """By ∂r/∂p, and by where lines of sight lie."""
+    size: Array  # of the terms without their signs
+    error: Array  # by ∂r/∂p, and by where lines of sight lie
 
 
 def _sum(nodes: BoundarySamples | HullCorners | Flux | Wrap, tips: TipDerivatives) -> _Sum:
@@ -295,7 +281,7 @@ def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
     return Estimate(value, float(error))
 
 
-def hull_corners(solid: ReachableSet) -> tuple[HullCorners, HullCorners]:
+def _hull_corners(solid: ReachableSet) -> tuple[HullCorners, HullCorners]:
     """Corners of the hull of a solid, and of that of half as fine a grid, or before a climb."""
     tip_map = solid.tip_map
     if solid.route == "flux":
@@ -304,23 +290,18 @@ def hull_corners(solid: ReachableSet) -> tuple[HullCorners, HullCorners]:
         tips = tip_map.tips(tip_map.box.from_free_cube(cube))
         even = (np.rint(cells * cube) % 2 == 0).all(axis=1)
         return HullCorners.of(tips, cube), HullCorners.of(tips[even], cube[even])
-    if isinstance(solid.image, Image):
-        corners = _corners_of(solid.image)
-        if solid.cells >= _HULL_CELLS:
-            return corners, _corners_of(solid.image.coarse)
-        return _finer(corners, tip_map, solid.cells), corners
-    hull = solid.image.hull
-    assert hull is not None
-    return hull.corners, hull.before
-
-
-def _finer(corners: HullCorners, tip_map: TipMap, cells: int) -> HullCorners:
-    """Corners of the hull of a grid twice as fine, of which only what is beside them is mapped."""
-    shape = (2 * cells + 1,) * 3
-    places = np.rint(2 * cells * corners.cube).astype(np.int64)[:, None] + _AROUND
-    keys = np.unique(np.ravel_multi_index(np.moveaxis(places, 2, 0), shape, mode="clip"))
-    cube = np.stack(np.unravel_index(keys, shape), axis=1) / (2 * cells)
-    return HullCorners.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube)
+    if isinstance(solid.image, ReachedCells):
+        hull = solid.image.hull
+        assert hull is not None
+        return hull.corners, hull.before
+    corners = _corners_of(solid.image)
+    if solid.cells >= _HULL_CELLS:
+        return corners, _corners_of(solid.image.coarse)
+    # Of a grid twice as fine only what is beside the corners is mapped.
+    cells = 2 * solid.cells
+    places = np.rint(cells * corners.cube).astype(np.int64)[:, None] + _AROUND
+    cube = np.unique(places.clip(0, cells).reshape(-1, 3), axis=0) / cells
+    return HullCorners.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube), corners
 
 
 def _corners_of(image: Image) -> HullCorners:
@@ -330,27 +311,22 @@ def _corners_of(image: Image) -> HullCorners:
 
 @dataclass(frozen=True, eq=False)
 class MovingBoundary:
-    """Triangles of the boundary, and what each sweeps when a parameter changes.
+    """Triangles of the boundary, and what each adds or loses when a parameter changes.
 
-    With the velocity v = ∂r/∂p of the places of the activation box that lead to the boundary, a
-    triangle of outward area vector A sweeps the volume v · A per unit of p: what is added or lost
-    there, to first order, by itself.
+    With the velocity v = ∂r/∂p of the places of the box that lead there, a triangle of outward area
+    vector A sweeps the volume v · A per unit of p, to first order.
     """
 
-    places: Array
-    """Centers of the triangles [m], shape (n, 3)."""
-    area: Array
-    """Their areas [m²], shape (n,)."""
-    swept: Array
-    """v · A [m³ per unit], shape (n, parameters)."""
+    places: Array  # centers of the triangles [m], (n, 3)
+    area: Array  # their areas [m²], (n,)
+    swept: Array  # v · A [m³ per unit], (n, parameters)
 
     @classmethod
     def of(cls, solid: ReachableSet, parameters: Sequence[Parameter]) -> MovingBoundary:
         """The boundary of a set, and its velocity by some parameters.
 
-        Where the map is one to one, its triangles are images of triangles on the faces of the box;
-        elsewhere they are found in the raster and move as the nearest place does at which a line
-        of sight cuts the boundary. Raises as `TipDerivatives` and `ReachableSet.surface`.
+        Triangles that are found in a raster move as the nearest place does at which a line of sight
+        cuts the boundary.
         """
         tips = TipDerivatives(solid.tip_map, parameters)
         by_faces = solid.route == "flux"
@@ -414,36 +390,26 @@ class MovingBoundary:
 
 @dataclass(frozen=True, eq=False)
 class BoundarySamples:
-    """Nodes on the boundary, with the activations that lead there.
+    """Nodes on the boundary, with the activations that lead there: theory (98), without normals.
 
-    Lines of sight through cell centers along an axis cut the boundary at places that each stand for
-    a square of a cell, seen along the axis. Together those along all three axes are nodes for what
-    flows through the boundary, theory (98), and need no normals.
+    Lines of sight along an axis cut the boundary at places that each stand for a square of a cell.
     """
 
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, dimension)."""
-    places: Array
-    """Places [m], shape (n, 3)."""
-    area: Array
-    """Outward area vectors [m²], shape (n, 3)."""
-    group: Index
-    """Number of the set of lines that each is on: an axis, and every other line, shape (n,)."""
+    cube: Array  # in the unit cube of the free bundles, (n, dimension)
+    places: Array  # places [m], (n, 3)
+    area: Array  # outward area vectors [m²], (n, 3)
+    group: Index  # number of the set of lines that each is on: an axis, and every other line, (n,)
 
     def derivative(self, slopes: Array, weights: Array | None = None) -> Array:
-        """Derivatives of the volume, swept by the boundary, theory (98), shape (parameters,).
+        """Derivatives of the volume by ∂r/∂p at the nodes (n, 3, parameters), shape (parameters,).
 
-        By ∂r/∂p at the nodes, shape (n, 3, parameters). Weights (n,) that are 1 in a region and 0
-        elsewhere give the derivative of the volume of the part of the set in that region.
+        Weights (n,) that are 1 in a region and 0 elsewhere give that of the part of the set there.
         """
         area = self.area if weights is None else self.area * weights[:, None]
         return np.einsum("ni,nip->p", area, slopes)
 
     def noise(self, slopes: Array) -> Array:
-        """Two standard deviations of `derivative` from where the lines lie, shape (parameters,).
-
-        Every other line along both directions tells how much.
-        """
+        """Two standard deviations of `derivative`, from every other line, shape (parameters,)."""
         groups = np.zeros((3 * _CLASSES, slopes.shape[2]))
         np.add.at(groups, self.group, np.einsum("ni,nip->np", self.area, slopes))
         of_axes = groups.reshape(3, _CLASSES, -1)
@@ -454,12 +420,18 @@ class BoundarySamples:
 def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySamples:
     """Nodes on all of the boundary of an image; the vertices of what is wrapped.
 
-    With the orientation that the larger part of a map of three bundles keeps, 1 or -1, nodes are
-    those where the image is not one to one, the boundary less what of it the degree tells, for the
+    With a sense, the orientation that most of a map of three bundles keeps, 1 or -1, those for the
     derivative of ∫ ([x is reached] - sense · d) dx, theory (34).
     """
     if isinstance(image, ReachedCells):
-        return _of_cells(image)
+        wrap, box = image.wrap, image.grid.tip_map.box
+        if not image.is_thick:
+            group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
+            return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
+        crossings, _ = image.swept
+        cube = box.to_cube(crossings.beyond)[:, box.free].clip(0.0, 1.0)
+        at = crossings.coordinates(np.arange(len(cube)), crossings.place)
+        return _on_lines(image.lattice, cube, crossings.axis, at, crossings.sense)
     lattice, cuts = image.lattice, list[tuple[Array, Index, Array, Index]]()
     for axis, spans in enumerate(image.spans):
         jumps = np.diff((spans.cover > 0).astype(np.int64), prepend=0)
@@ -470,17 +442,6 @@ def boundary_samples(image: Image | ReachedCells, sense: int = 0) -> BoundarySam
         cube = image.cube_places(spans, axis, which)
         cuts.append((cube, np.full(len(which), axis), at, -jumps[which]))
     return _on_lines(lattice, *(np.concatenate(parts) for parts in zip(*cuts, strict=True)))
-
-
-def _of_cells(cells: ReachedCells) -> BoundarySamples:
-    tip_map, wrap = cells.grid.tip_map, cells.wrap
-    if not cells.is_thick:
-        group = np.arange(len(wrap.vertices)) % (3 * _CLASSES)
-        return BoundarySamples(wrap.cube, wrap.vertices, wrap.corner_areas, group)
-    crossings, _ = cells.swept
-    cube = tip_map.box.to_cube(crossings.beyond)[:, tip_map.box.free].clip(0.0, 1.0)
-    at = crossings.coordinates(np.arange(len(cube)), crossings.place)
-    return _on_lines(cells.lattice, cube, crossings.axis, at, crossings.sense)
 
 
 def _on_lines(

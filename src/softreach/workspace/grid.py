@@ -1,9 +1,7 @@
 """Grids over the activation box: tips and det J at their vertices, and all postures over them.
 
-Under loads an arm may hold several postures at one activation, and a branch of them may end within
-the box. Cells with one posture at each corner, all on one branch, are mapped as those of any map.
-The others have as many images as there are branches over them. A corner that a branch does not
-reach goes to where the branch ends on the way there: a sheet is mapped up to its edge.
+Cells with one posture at each corner, all on one branch, are mapped as those of any map. The others
+have as many images as there are branches over them, each up to where its branch ends.
 """
 
 from __future__ import annotations
@@ -30,10 +28,7 @@ _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of th
 
 
 def grid_ticks(tip_map: TipMap, cells: int) -> list[Array]:
-    """Ticks of a grid along each free bundle in the unit cube, kinks of the map among them.
-
-    The number of cells along each axis is a multiple of four; so are those between kinks.
-    """
+    """Ticks along each free bundle in the unit cube, a multiple of four cells between kinks."""
     box, ticks = tip_map.box, list[Array]()
     for k in box.free:
         places = np.unique((tip_map.kinks[k] - box.low[k]) / box.widths[k])
@@ -49,11 +44,7 @@ def grid_tips(
 ) -> Array:
     """Tips [m] of the grid of cells^m boxes over the free bundles, in C order, (nodes, 3).
 
-    NaN where there is no stable equilibrium. The progress is called with 0 now and then, so that it
-    can raise; ticks along each axis are even if none are given.
-
-    Raises:
-        InvalidInput: There is no stable equilibrium anywhere.
+    NaN where there is no stable equilibrium. Ticks along each axis are even if none are given.
     """
     even = [np.linspace(0.0, 1.0, cells + 1)] * tip_map.box.dimension
     places = product_of(ticks or even)
@@ -72,10 +63,7 @@ def cube_grid(cells: int, m: int = 3) -> Array:
 
 
 def box_slopes(tip_map: TipMap, cube: Array) -> tuple[Array, Array]:
-    """Tips [m] (n, 3) and their derivatives (n, 3, dimension) by places in the unit cube.
-
-    The cube is that of the free bundles; NaN where there is no stable equilibrium.
-    """
+    """Tips [m] (n, 3) and derivatives (n, 3, dimension) by places in the cube of free bundles."""
     tips, slopes = tip_map.tips_and_slopes(tip_map.box.from_free_cube(cube))
     free = tip_map.box.free
     return tips, slopes[:, :, free] * tip_map.box.widths[free]
@@ -93,18 +81,12 @@ class LiftedGrid:
     """The mapped vertices of a grid, and the cells over it."""
 
     tip_map: TipMap
-    tips: Array
-    """[m]: of its nodes in C order, NaN where no posture is held, then others, shape (v, 3)."""
-    is_lifted: Mask
-    """Cells in whose place those of `lifted` are, shape (n,) * m."""
-    lifted: Index
-    """Vertices at the corners of cells, in the order of their bits, shape (k, 2^m)."""
-    lost_share: float = 0.0
-    """Share of activations at which no posture is held [-]."""
-    hysteresis_share: float = 0.0
-    """Share of activations at which two are held on one side [-]."""
-    finer: LiftedGrid | None = None
-    """A grid without sheets of which this has every so many nodes."""
+    tips: Array  # [m]: of its nodes in C order, NaN where no posture is held, then others, (v, 3)
+    is_lifted: Mask  # cells in whose place those of `lifted` are, (n,) * m
+    lifted: Index  # vertices at the corners of cells, in the order of their bits, (k, 2^m)
+    lost_share: float = 0.0  # share of activations at which no posture is held [-]
+    hysteresis_share: float = 0.0  # share of activations at which two are held on one side [-]
+    finer: LiftedGrid | None = None  # a grid without sheets of which this has every so many nodes
 
     @classmethod
     def of(
@@ -142,8 +124,8 @@ class LiftedGrid:
     def jacobian_dets(self) -> Array:
         """det J of three free bundles at its nodes [m³ per unit of each activation], (nodes,).
 
-        From differences of the tips, and by J itself where these might have the wrong sign, and
-        everywhere if the map has kinks. 0 at nodes of no cells but lifted ones.
+        From differences of the tips, and by J itself where these might have the wrong sign or the
+        map has kinks. 0 at nodes of no cells but lifted ones.
         """
         n, tip_map, shape = self.n, self.tip_map, (self.n + 1,) * 3
         if self.finer is not None:
@@ -230,7 +212,6 @@ def _is_plain(held: Held, is_single: Mask, n: int, m: int) -> Mask:
 def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
     """Cells (k,) of each branch over some, and one posture or -1 for each corner (k, 2^m).
 
-    Around a pitchfork or a cusp corners have two postures on one branch: it is parted there again.
     States are numbers of postures at the corners of cells, -1 for none, (cells, 2^m, postures).
     """
     corners, joined = states.shape[1], _joined(held, states)
@@ -240,6 +221,7 @@ def _sheets(held: Held, states: Index) -> tuple[Index, Index]:
     sheet[label, corner] = state
     of_cell = np.empty(len(sheet), np.int64)
     of_cell[label] = cell
+    # Around a pitchfork or a cusp corners have two postures on one branch: it is parted again.
     forked = np.bincount(label * corners + corner)[label * corners + corner] > 1
     part = components(joined[forked[joined].all(axis=1)], len(cell))[forked]
     _, first, part = np.unique(part, return_index=True, return_inverse=True)
@@ -267,10 +249,9 @@ def _joined(held: Held, states: Index) -> Index:
 
 
 def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
-    """Places where branches end on the way to corners that they do not reach.
+    """Numbers (k, 2^m) of the places where branches end on the way to corners, and the places.
 
-    All cells of a branch share its place beside one node, so that its sheet has no cracks. Given
-    with the places is the number of its place for each corner without a posture, (k, 2^m).
+    All cells of a branch share its place beside one node, so that its sheet has no cracks.
     """
     total = len(held.node)
     row, corner = np.nonzero(states < 0)

@@ -16,14 +16,13 @@ from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
 from softreach.kernels.image import contour, raster
 from softreach.picture.shading import vertex_normals
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, joined, rows
 from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
 from softreach.workspace.grid import LiftedGrid
 
-DIAGONAL = math.sqrt(3.0)
-"""Of a cell, in edges."""
+DIAGONAL = math.sqrt(3.0)  # of a cell, in edges
 _DET_BITS = 50  # of the largest det J: sums of four are exact in any order
 _BYTES = 16  # of a cell: two counts, and what questions make of them
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
@@ -79,18 +78,12 @@ def covered_cubes(covered: Mask) -> Mask:
 class Spans(NamedTuple):
     """Pieces of lines of sight between crossings, line by line, upwards."""
 
-    column: Index
-    """Index of the line, (i, j) as i · width + j over the two axes that follow, cyclically."""
-    start: Array
-    """Beginning of the piece, in cells."""
-    length: Array
-    """Length of the piece, in cells; 0 after the last crossing of a line."""
-    cover: Index
-    """Number of activations that reach it."""
-    degree: Index
-    """Those of which the map keeps the orientation minus those that it turns over."""
-    triangle: Index
-    """Number of the critical triangle where it begins."""
+    column: Index  # its line (i, j) as i · width + j over the axes that follow, cyclically
+    start: Array  # beginning of the piece, in cells
+    length: Array  # length of the piece, in cells; 0 after the last crossing of a line
+    cover: Index  # number of activations that reach it
+    degree: Index  # those of which the map keeps the orientation minus those that it turns over
+    triangle: Index  # number of the critical triangle where it begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +110,9 @@ class Image:
 
     @property
     def is_one_to_one(self) -> bool:
-        """True if no place is found to be reached twice.
+        """True if det J keeps its sign at the vertices, and no line of sight meets a second layer.
 
-        det J keeps its sign at the vertices, and no line of sight meets a second layer, or one that
-        both orientations cover. Pieces that none covers may have a degree: walls thinner than the
-        triangles are flat cross each other.
+        Pieces that none covers may have a degree: walls thinner than triangles are flat cross.
         """
         dets = self.grid.jacobian_dets
         return bool(dets.min() * dets.max() > 0.0) and all(
@@ -190,9 +181,8 @@ class Image:
     def signed_field(self) -> Array:
         """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
 
-        Along each axis the boundary is located to rounding between two centers. A plane that cuts
-        the axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between
-        centers gives the crossings back, to second order in the cell on a curved boundary.
+        A plane that cuts the axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear
+        interpolation between centers gives the crossings back, to second order in the cell.
         """
         inverse_square = np.zeros(self.lattice.shape)
         for axis in range(3):
@@ -229,19 +219,12 @@ class Image:
         return counts.reshape(shape), degrees.reshape(shape)
 
     def counts_at(self, points: Array) -> Index:
-        """Cover counts at any points [m], exactly but for rounding to units, shape (n,).
-
-        As `counts`, but nowhere below zero.
-        """
+        """Cover counts of 0 or more at any points [m], but for rounding to units, shape (n,)."""
         where = np.rint(self.lattice.coordinates(points) * self.unit)
-        out = np.empty(len(where), np.int64)
-        shape = self.lattice.shape[:2]
+        out, shape = np.empty(len(where), np.int64), self.lattice.shape[:2]
+        image = self.vertices, self.triangles, self.unit, shape, *self._bins
         parallel.run(
-            partial(
-                raster.cover_at,
-                *(self.vertices, self.triangles, self.unit, shape, *self._bins),
-                *(where[block], out[block]),
-            )
+            partial(raster.cover_at, *image, where[block], out[block])
             for block in parallel.blocks(len(where), _POINTS)
         )
         return np.maximum(out, 0)
@@ -279,20 +262,18 @@ class Image:
 
     def _crossings(self, axis: int) -> raster.Crossings:
         p, q = (axis + 1) % 3, (axis + 2) % 3
-        blocks = parallel.blocks(len(self.triangles), _TRIANGLES)
+        blocks, width = parallel.blocks(len(self.triangles), _TRIANGLES), self.lattice.shape[q]
         parts: list[raster.Crossings] = [raster.empty_crossings(0)] * len(blocks)
 
         def task(number: int) -> None:
-            rows = self.triangles[blocks[number]]
-            size = raster.most_crossings(self.vertices, rows, self.unit, p, q)
-            out = raster.empty_crossings(size)
-            width = self.lattice.shape[q]
-            used = raster.crossings(self.vertices, rows, self.unit, axis, width, out)
+            part = self.vertices, self.triangles[blocks[number]], self.unit
+            out = raster.empty_crossings(raster.most_crossings(*part, p, q))
+            used = raster.crossings(*part, axis, width, out)
             out.triangle[:used] += blocks[number].start
-            parts[number] = raster.first_crossings(out, used)
+            parts[number] = rows(out, slice(used))
 
         parallel.run(partial(task, number) for number in range(len(blocks)))
-        return raster.joined_crossings(parts)
+        return joined([raster.empty_crossings(0), *parts])
 
 
 def _twice_area(a: Array, b: Array) -> Array:
@@ -301,10 +282,7 @@ def _twice_area(a: Array, b: Array) -> Array:
 
 
 def image_of(
-    grid: LiftedGrid,
-    lattice: Lattice,
-    progress: Progress = silent,
-    half: LiftedGrid | None = None,
+    grid: LiftedGrid, lattice: Lattice, progress: Progress = silent, half: LiftedGrid | None = None
 ) -> Image:
     """The image of a grid of three free bundles; `half` is that of half as many cells, if known."""
     scaled, nodes = lattice.coordinates(grid.tips), (grid.n + 1) ** 3
@@ -357,9 +335,8 @@ def _critical_triangles(
     def task(number: int) -> None:
         first, last = blocks[number].start, blocks[number].stop
         out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
-        used = contour.critical_triangles(
-            vertices, jacobian_dets, axes, gaps, first, last, star, out
-        )
+        grid = vertices, jacobian_dets, axes, gaps
+        used = contour.critical_triangles(*grid, first, last, star, out)
         parts[number] = out[:used].copy()
         progress(last - first)
 
@@ -370,11 +347,7 @@ def _critical_triangles(
 def boundary_surface(image: Image, volume: float) -> Surface:
     """The closed surface around a volume where the field is constant, by marching cubes.
 
-    The image of a grid is a little small where it is convex: a small offset, the same everywhere,
-    gives the surface the extrapolated volume.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
+    The image of a grid is a little small where it is convex: the same offset everywhere mends it.
     """
     surface = _level_set(image, 0.0)
     if surface.area == 0.0:
@@ -394,27 +367,19 @@ def _level_set(image: Image, level: float) -> Surface:
 def wrapped_surface(image: Image, volume: float) -> Surface:
     """A closed surface around a volume without teeth and holes, however thin and rough parts are.
 
-    It is the level set one cell away from the image, evened out, each of whose vertices is then
-    moved back along its normal, all as far, until the stated volume is enclosed. Gaps below two
-    cells are filled.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
+    The level set one cell away from the image is evened out, and all its vertices are moved back as
+    far along their normals as encloses the volume. Gaps below two cells are filled.
     """
-    vertices, faces = level_set(gaussian_filter(_distances(image), _EVENED), _AWAY)
+    covered, surface = image.counts[0] > 0, image.critical_surface
+    near = covered & ~np.asarray(binary_erosion(covered), bool)
+    near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
+    near = np.asarray(binary_dilation(near, np.ones((3, 3, 3)), iterations=2), bool) & ~covered
+    # From cell centers to the image, 0 inside, in cells up to three.
+    distances, centers = np.where(covered, 0.0, _FAR), image.lattice.places(np.argwhere(near))
+    distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)
+    vertices, faces = level_set(gaussian_filter(distances, _EVENED), _AWAY)
     places = image.lattice.places(vertices)
     back = _AWAY * image.lattice.cell * vertex_normals(places, faces)
     far, near = (enclosed_volume(places - part * back, faces) for part in (0.0, 1.0))
     part = float(np.clip((far - volume) / (far - near), 0.5, 1.5))
     return Surface(vertices=places - part * back, faces=faces)
-
-
-def _distances(image: Image) -> Array:
-    """From cell centers to an image, 0 inside, in cells up to three."""
-    covered, surface = image.counts[0] > 0, image.critical_surface
-    near = covered & ~np.asarray(binary_erosion(covered), bool)
-    near[tuple(np.rint(image.lattice.coordinates(surface.vertices)).astype(int).T)] = True
-    near = np.asarray(binary_dilation(near, np.ones((3, 3, 3)), iterations=2), bool) & ~covered
-    distances, centers = np.where(covered, 0.0, _FAR), image.lattice.places(np.argwhere(near))
-    distances[near] = np.minimum(surface.distance(centers) / image.lattice.cell, _FAR)
-    return distances

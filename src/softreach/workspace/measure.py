@@ -13,6 +13,7 @@ from softreach.geometry.hull import convex_faces, convex_hull
 from softreach.geometry.surface import compact_surface, corner_areas, enclosed_volume
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Faces, Index, Points
+from softreach.support.parallel import blocks
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.grid import LiftedGrid
 from softreach.workspace.image import Image, Spans, covered_cubes, image_of
@@ -21,7 +22,6 @@ _LEFT = 0.35  # of what is removed of hulls; for four bundles 0.28 to 0.34 of it
 SURE_ACCURACY = 3e-3  # down from which integrals are as exact as a raster can ever use
 FLUX_PART = 0.01  # of a larger accuracy: relative error of what flows through the faces
 _NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
-
 _ROUNDS = 8
 _LESS = 0.5  # of the error before, that another round must leave
 _CLIMBS = 25  # steps of a climb
@@ -50,8 +50,7 @@ def named(**estimates: Estimate) -> dict[str, Any]:
 def extrapolated(fine: float, coarse: float, share: float = 1.0) -> Estimate:
     """The limit of numbers that err by O(1/n²), from grids of n and n/2 cells.
 
-    A share of what both together remove is stated as the error: all of it, unless dense sets have
-    shown that less will do.
+    A share of what is removed is the error stated: all, unless dense sets show that less will do.
     """
     removed = (fine - coarse) / 3.0
     return Estimate(fine + removed, share * abs(removed))
@@ -62,12 +61,9 @@ def solid_volume(image: Image, accuracy: float = SURE_ACCURACY) -> Estimate:
 
     With the degree d(x), the sum of the orientations of the activations that reach x,
     V = ∫ [x is reached] dx = |∫ det J dγ| + ∫ ([x is reached] - |d|) dx for an image whose larger
-    part keeps (or turns) the orientation. The first integral is exact to many digits by what flows
-    through the faces; the second lives only where the image folds or overlaps and is taken from
-    the rasterized images. What is rasterized errs by O(1/n²), which both grids together remove. All
-    that they remove is the error stated: folds that a coarse grid makes up vanish faster than that.
-    Where a relative error above 0.003 is asked for, the integral may err by a hundredth of it.
-    NaN if a node of the integral has no stable equilibrium.
+    part keeps (or turns) the orientation. The first integral is what flows through the faces, exact
+    to many digits, or to a hundredth of an accuracy above 0.003; NaN if a node has no stable
+    equilibrium. The second lives only where the image folds or overlaps, and is rasterized.
     """
     rough = accuracy > SURE_ACCURACY
     nodes, enough = None if rough else _NODES, FLUX_PART * accuracy * rough
@@ -82,10 +78,9 @@ def solid_volume(image: Image, accuracy: float = SURE_ACCURACY) -> Estimate:
 def torn_volume(image: Image) -> Estimate:
     """Volume of the image of several sheets [m³], where no integral over the box is known.
 
-    As `solid_volume`, with the signed volume of the mapped tetrahedra for the integral of det J.
-    Inside of sheets these err by O(1/n²), and at their edges by O(1/n), more or less by how the
-    edges meet the grid. Half of what the finer grid changes is added, and all of it is the error.
-    What it changes against a third of the cells counts by half.
+    As `solid_volume`, with the signed volume of the mapped tetrahedra, which at edges of sheets err
+    by O(1/n). Half of what the finer grid changes is added, and all of it is the error; what it
+    changes against a third of the cells counts by half.
     """
     sense = 1 if _signed_volume(image) >= 0 else -1
     third = image_of(LiftedGrid.of(image.grid.tip_map, image.grid.n // 3), image.lattice)
@@ -96,19 +91,13 @@ def torn_volume(image: Image) -> Estimate:
 
 
 def multiply_covered(image: Image) -> tuple[dict[int, float], float]:
-    """Volume of the places that a given number of activations, 2 or more, reach [m³].
+    """Volumes reached by 2, 3, ... activations [m³], and how their sum changes on half the cells.
 
     A number whose volume is below the error, or changes by more than itself on half as fine a
     grid, is not a finding but the roughness of a fold: such places count with the next smaller.
-
-    Returns:
-        The volumes, and by how much their sum changes on half as fine a grid.
     """
-
-    def by_cover(spans: Spans) -> ArrayLike:
-        return np.bincount(spans.cover, spans.length)
-
-    covers = [_mean(each, by_cover) for each in (image, image.coarse)]
+    images = image, image.coarse
+    covers = [_mean(each, lambda spans: np.bincount(spans.cover, spans.length)) for each in images]
     size = max(*(len(cover) for cover in covers), 3)
     volumes, rough = (np.pad(v, (0, size - len(v)))[2:] for v in covers)
     error = float(abs(volumes.sum() - rough.sum()))
@@ -128,18 +117,14 @@ def fold_volume(image: Image) -> float:
 
 
 def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
-    """Volume of the convex hull [m³] from mapped vertices, and from those of half as fine a grid.
-
-    The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
-    """
+    """Volume of the image's convex hull [m³] from mapped vertices and those of half a grid."""
     return extrapolated(convex_hull(points).volume, convex_hull(fewer).volume, _LEFT)
 
 
 def outer_vertices(image: Image) -> Index:
     """Numbers of the vertices of critical triangles that may be corners of the convex hull.
 
-    A plane through such a corner leaves the image on one side, and with it at least one of the
-    eight cell centers around the corner.
+    A plane through one leaves the image, and so one of the eight cell centers around it or more.
     """
     used = np.zeros(len(image.vertices), bool)
     used[image.triangles[:, :3]] = True
@@ -151,11 +136,10 @@ def outer_vertices(image: Image) -> Index:
 
 def _correction(image: Image, sense: int) -> Estimate:
     """∫ ([x is reached] - sense · d) dx [m³], with the scatter of three directions of sight."""
-
-    def missing(spans: Spans) -> float:
-        return float((spans.length * ((spans.cover > 0) - sense * spans.degree)).sum())
-
-    values = [missing(spans) for spans in image.spans]
+    values = [
+        float((spans.length * ((spans.cover > 0) - sense * spans.degree)).sum())
+        for spans in image.spans
+    ]
     scale = image.lattice.cell**3
     return Estimate(scale * float(np.mean(values)), scale * float(np.ptp(values)))
 
@@ -167,10 +151,7 @@ def _covered(image: Image, sense: int) -> Estimate:
 
 
 def _signed_volume(image: Image) -> float:
-    """Volume of the mapped tetrahedra that keep the orientation less that of the others [m³].
-
-    By the divergence theorem: the degree changes at critical triangles only.
-    """
+    """∫ d(x) dx of the mapped tetrahedra [m³]: the degree changes at critical triangles only."""
     if not len(image.triangles):
         return 0.0
     corners = image.vertices[image.triangles[:, :3]] / image.unit
@@ -187,19 +168,15 @@ def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
     return np.squeeze(mean * image.lattice.cell**3)
 
 
-HullOf = Callable[[Points], Faces]
-"""Faces or edges of the convex hull of points."""
+HullOf = Callable[[Points], Faces]  # faces or edges of the convex hull of points
 
 
 class HullCorners(NamedTuple):
     """Activations whose tips are the corners of a convex hull."""
 
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, dimension)."""
-    tips: Array
-    """[m], shape (n, 3)."""
-    faces: Faces
-    """Outwards, shape (f, 3); edges of a hull in the plane z = 0, shape (e, 2)."""
+    cube: Array  # in the unit cube of the free bundles, (n, dimension)
+    tips: Array  # [m], (n, 3)
+    faces: Faces  # outwards, (f, 3); edges of a hull in the plane z = 0, (e, 2)
 
     @classmethod
     def of(cls, tips: Array, cube: Array, hull_of: HullOf = convex_faces) -> Self:
@@ -231,8 +208,7 @@ class HullCorners(NamedTuple):
 class ConvexHull(NamedTuple):
     """A hull of tips, the one that it was climbed from, and the volume of the image's own."""
 
-    volume: Estimate
-    """The middle between two bounds, and half of what is between them [m³]."""
+    volume: Estimate  # the middle between two bounds, and half of what is between them [m³]
     corners: HullCorners
     before: HullCorners
 
@@ -240,12 +216,9 @@ class ConvexHull(NamedTuple):
 def climbed_hull(
     tip_map: TipMap, cube: Array, accuracy: float, hull_of: HullOf = convex_faces
 ) -> ConvexHull:
-    """The convex hull of the image of a box, climbed until its volume is as accurate as asked.
-
-    It begins with places in the unit cube, shape (n, dimension).
-    """
-    corners = HullCorners.of(tip_map.tips(tip_map.box.from_free_cube(cube)), cube, hull_of)
-    before = corners
+    """The convex hull of the image of a box, climbed to an accuracy from places (n, dimension)."""
+    tips = tip_map.tips(tip_map.box.from_free_cube(cube))
+    before = corners = HullCorners.of(tips, cube, hull_of)
     if not len(corners.faces):
         return ConvexHull(Estimate(0.0, 0.0), corners, corners)
     size, error = float(np.ptp(corners.tips, axis=0).max()), np.inf
@@ -257,8 +230,7 @@ def climbed_hull(
         start = corners.cube[corners.faces[:, 0]]
         ends, tips, top = _climbed(tip_map, start, normals, _ENOUGH * accuracy * size, size)
         every = np.concatenate([corners.tips, tips])
-        for rows in range(0, len(top), _TOGETHER):
-            block = slice(rows, rows + _TOGETHER)
+        for block in blocks(len(top), _TOGETHER):
             attained = np.nanmax(every @ normals[block].T, axis=0)
             top[block] = np.fmax(top[block], attained)
         offset = np.einsum("fi,fi->f", corners.tips[corners.faces[:, 0]], normals)
@@ -275,9 +247,7 @@ def _climbed(
 ) -> tuple[Array, Array, Array]:
     """Climb along a normal each, by projected gradients [BarzilaiBorwein1988].
 
-    Returns:
-        Places (n, dimension), their tips (n, 3), and how far tips go along the normals at most
-        (n,), by the slope that is left.
+    To places (n, dimension), tips (n, 3), and how far along normals they may go, by slopes, (n,).
     """
     box, free, n = tip_map.box, tip_map.box.free, len(cube)
     best, tips, top, value = cube.copy(), np.full((n, 3), np.nan), np.empty(n), np.full(n, -np.inf)

@@ -56,7 +56,14 @@ def payload_curve(
         SoftreachWarning: The estimated error of a volume is larger than asked.
     """
     arm = a_manipulator("arm", arm).at_point(point)
-    _check(arm)
+    if arm.loads is None or not any(arm.loads.gravity):
+        allowed = "Loads with gravity, which makes a payload heavy"
+        hint = "pass arm.replace(loads=Loads(gravity=(0, 0, -9.81)))"
+        raise InvalidInput("loads", arm.loads, allowed, hint)
+    if faults := arm.loads.section_faults(arm.section, arm.length):
+        raise InvalidDesign(faults)
+    if (free := sum(low < high for low, high in arm.input_bounds)) < 3:
+        raise InvalidInput("free bundles", int(free), "3 or more, which reach a volume")
     masses = _usual_payloads(arm) if payloads is None else as_floats("payloads", payloads).ravel()
     if not (np.isfinite(masses) & (masses >= 0)).all():
         raise InvalidInput("payloads", masses, "finite masses of 0 or more [kg]")
@@ -151,30 +158,24 @@ class PayloadCurve:
         import xarray as xr
 
         numbers = {
+            "payload": (self.payloads, "kg", "payload"),
             "volume": (self.volumes, "m3", "reachable volume"),
             "volume_error": (self.volume_errors, "m3", "error of the reachable volume"),
             "share": (self.shares, "1", "share of the volume without payload"),
             "share_error": (self.share_errors, "1", "error of the share"),
             "lost_share": (self.lost_shares, "1", "share of the activation box left out"),
         }
-        return xr.Dataset(
-            {
-                name: ("payload", values, {"units": unit, "long_name": meaning})
-                for name, (values, unit, meaning) in numbers.items()
-            },
-            {"payload": ("payload", self.payloads, {"units": "kg", "long_name": "payload"})},
-            {**provenance(self.arm), "accuracy": self.accuracy},
-        )
+        variables = {
+            name: ("payload", values, {"units": unit, "long_name": meaning})
+            for name, (values, unit, meaning) in numbers.items()
+        }
+        return xr.Dataset(variables, attrs={**provenance(self.arm), "accuracy": self.accuracy})
 
     def __repr__(self) -> str:
         first = quantity(self.volumes[0], "m³", self.volume_errors[0])
-        rows = [
-            f"  {mass:g} kg: {quantity(100 * share, '%', 100 * error)}"
-            for mass, share, error in zip(
-                self.payloads[1:], self.shares[1:], self.share_errors[1:], strict=True
-            )
-        ]
-        return "\n".join([f"PayloadCurve: {first} without payload", *rows])
+        _, *rows = zip(self.payloads, 100 * self.shares, 100 * self.share_errors, strict=True)
+        lines = [f"{mass:g} kg: {quantity(share, '%', error)}" for mass, share, error in rows]
+        return "\n  ".join([f"PayloadCurve: {first} without payload", *lines])
 
     def _at(self, mass: float) -> _Volume:
         if mass not in self._known:
@@ -205,8 +206,7 @@ def _narrowed(
 ) -> tuple[float, float]:
     """A smaller bracket of a falling function's root, at most a relative accuracy wide.
 
-    Secants between the ends, moved past the root by a fraction of the accuracy so that both ends
-    come near to it, and halves where the bracket shrinks too slowly.
+    Secants that go a little past the root, so that both ends come near, and halves where too slow.
     """
     at_low, at_high, halve = function(low), function(high), False
     while high - low > accuracy * high:
@@ -231,23 +231,9 @@ def _volume(arm: Manipulator, mass: float, accuracy: float) -> _Volume:
     return _Volume(reached.volume, reached.volume_error, reached.lost_share)
 
 
-def _check(arm: Manipulator) -> None:
-    if arm.loads is None or not any(arm.loads.gravity):
-        hint = "pass arm.replace(loads=Loads(gravity=(0, 0, -9.81)))"
-        raise InvalidInput(
-            "loads", arm.loads, "Loads with gravity, which makes a payload heavy", hint
-        )
-    if faults := arm.loads.section_faults(arm.section, arm.length):
-        raise InvalidDesign(faults)
-    free = int(sum(low < high for low, high in arm.input_bounds))
-    if free < 3:
-        raise InvalidInput("free bundles", free, "3 or more, which reach a volume")
-
-
 def _usual_payloads(arm: Manipulator) -> Array:
     assert arm.loads is not None
     stiffness = arm.section.stiffness_at(arm.profile, np.array([0.5 * arm.length]))
     weight = float(stiffness.bending[0]) / arm.length**2
     mass = weight / float(np.linalg.norm(arm.loads.gravity))
-    rounded = float(f"{mass:.1g}")
-    return rounded * np.array(_USUAL)
+    return float(f"{mass:.1g}") * np.array(_USUAL)

@@ -23,10 +23,8 @@ _NODES, _MOST_ALONG = 1 << 13, 64  # of a grid by default, and cells along it
 class Sheet(NamedTuple):
     """Postures to which activations do not lead straight from rest."""
 
-    tip_map: TipMap
-    """The tip map that goes on from the nearest of them."""
-    gamma: Array
-    """Activations at which they are known, shape (n, bundles)."""
+    tip_map: TipMap  # the tip map that goes on from the nearest of them
+    gamma: Array  # activations at which they are known, (n, bundles)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,12 +35,9 @@ class AllPostures(TipMap):
     """
 
     from_rest: TipMap
-    sheets: list[Sheet]
-    """The others, numbered from 1."""
-    lost_share: float
-    """Share of activations at which no posture is held [-]."""
-    hysteresis_share: float
-    """Share of activations at which two are held on one side [-]."""
+    sheets: list[Sheet]  # the others, numbered from 1
+    lost_share: float  # share of activations at which no posture is held [-]
+    hysteresis_share: float  # share of activations at which two are held on one side [-]
     arm: Manipulator = field(init=False)
     tol: float = field(init=False)
 

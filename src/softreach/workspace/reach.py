@@ -24,8 +24,7 @@ _MOST_CELLS = 2.0**26
 _QUICK = 24  # cells, up to which sheets take no time
 _TORN = 2.0  # times the error asked for, with which they are left then
 
-ACCURACIES = Range(1e-6, 0.2)
-"""Relative errors of a volume that can be asked for."""
+ACCURACIES = Range(1e-6, 0.2)  # relative errors of a volume that can be asked for
 
 _LENGTHS, _SIZES = POSITIVE._replace(unit="m"), POSITIVE._replace(unit="bytes")
 
@@ -102,7 +101,7 @@ def reachable_set(
         return thin_set(tip_map)
     if m == 3:
         result = _of_three(tip_map, accuracy, cell, progress)
-        allowed = allowed_error(result, accuracy)
+        allowed = _allowed_error(result, accuracy)
         finer = f"a smaller accuracy, for a grid above {result.cells}"
         finer += "" if cell is None else ", and a smaller cell"
     else:
@@ -128,24 +127,13 @@ def reachable_set(
 def rasterized_set(
     tip_map: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress = silent
 ) -> ReachableSet:
-    """Reach of three free bundles by one raster, whether the map is one to one or not.
-
-    The activation grid has an even number of cells along each axis; the edge of a cell in space [m]
-    is by the accuracy if None.
-
-    Raises:
-        InvalidInput: No activation has a stable equilibrium, or memory does not hold the cells.
-    """
+    """Reach of three free bundles by one raster on an even number of cells, one to one or not."""
     grid = LiftedGrid.of(tip_map, cells, progress)
-    return _by_raster(image_of(grid, lattice_around(grid, cell, accuracy), progress), accuracy)
+    return _by_raster(image_of(grid, _lattice_around(grid, cell, accuracy), progress), accuracy)
 
 
-def allowed_error(solid: ReachableSet, accuracy: float) -> float:
-    """The relative error of the volume that is enough.
-
-    Of several sheets it falls as 1/n and no faster: for them twice as much is enough, but on grids
-    that take no time.
-    """
+def _allowed_error(solid: ReachableSet, accuracy: float) -> float:
+    """The error of several sheets falls as 1/n: twice as much is enough on grids that take time."""
     has_sheets = solid.is_torn and solid.cells > _QUICK
     return (_TORN if has_sheets else 1.0) * accuracy
 
@@ -158,19 +146,18 @@ def _of_three(
     before: LiftedGrid | None = None
     while True:
         grid = LiftedGrid.of(tip_map, cells, progress)
-        image = image_of(grid, lattice_around(grid, cell, accuracy), progress, before)
+        image = image_of(grid, _lattice_around(grid, cell, accuracy), progress, before)
         if tip_map.is_smooth and not tip_map.supports_unstable and image.is_one_to_one:
             return _by_faces(image)
         solid = _by_raster(image, accuracy)
         most = _MOST_VERTICES / (4.0 if solid.is_torn else 1.0)  # that memory holds
-        errs = solid.volume_error > allowed_error(solid, accuracy) * solid.volume
+        errs = solid.volume_error > _allowed_error(solid, accuracy) * solid.volume
         if not errs or (2 * cells + 1) ** 3 > most:
             return solid
         cells, before = 2 * cells, grid
 
 
 def _by_faces(image: Image) -> ReachableSet:
-    """The solid of an image that is one to one, by what flows through the faces of the box."""
     grid, flux = image.grid, signed_volume(image.grid.tip_map)
     faces = np.rint(grid_faces(grid.n) * grid.n).astype(int)
     tips = grid.tips[np.ravel_multi_index(tuple(faces.T), (grid.n + 1,) * 3)]
@@ -188,12 +175,10 @@ def _by_faces(image: Image) -> ReachableSet:
 
 
 def _by_raster(image: Image, accuracy: float) -> ReachableSet:
-    """The solid of any image."""
-    grid, volume = image.grid, Estimate(np.nan, np.nan)
+    grid = image.grid
     corners = (each.places[measure.outer_vertices(each)] for each in (image, image.coarse))
     convex = measure.extrapolated_hull(*corners)
-    if not grid.is_torn:
-        volume = measure.solid_volume(image, accuracy)
+    volume = Estimate(np.nan) if grid.is_torn else measure.solid_volume(image, accuracy)
     several, change = measure.multiply_covered(image)
     if np.isnan(volume.value):
         volume = measure.torn_volume(image)
@@ -214,12 +199,8 @@ def _by_raster(image: Image, accuracy: float) -> ReachableSet:
     )
 
 
-def lattice_around(grid: LiftedGrid, cell: float | None, accuracy: float) -> Lattice:
-    """Cells in space around the image of a grid, of an edge by the rule for h if `cell` is None.
-
-    Raises:
-        InvalidInput: Memory does not hold the cells in space.
-    """
+def _lattice_around(grid: LiftedGrid, cell: float | None, accuracy: float) -> Lattice:
+    """Cells in space around the image of a grid, of an edge by the rule for h if `cell` is None."""
     tips = grid.tips[np.isfinite(grid.tips[:, 0])]
     sides = np.ptp(tips, axis=0)
     if cell is None:

@@ -26,8 +26,7 @@ from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 if TYPE_CHECKING:
     import xarray as xr
 
-SIZES = "", "curve_length", "area", "volume"
-"""Names of the size of a set, by its dimension."""
+SIZES = "", "curve_length", "area", "volume"  # names of the size of a set, by its dimension
 
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MEANINGS = {
@@ -205,11 +204,8 @@ class ReachableSet:
             fields |= {"count": counts.clip(0), "degree": degrees}
         variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
         lattice = self.image.lattice
-        attrs = {
-            **provenance(self.arm, self.tip_map.frame),
-            "cell": lattice.cell,
-            "length": self.tip_map.length,
-        }
+        attrs = provenance(self.arm, self.tip_map.frame)
+        attrs |= {"cell": lattice.cell, "length": self.tip_map.length}
         return xr.Dataset(variables, lattice.centers(), attrs)
 
     @lazy
@@ -328,13 +324,12 @@ class ReachableSet:
         if self.covering is not None:
             attrs |= {"route": self.route, "cell": self.covering.lattice.cell}
         dataset = xr.Dataset(self._numbers(), attrs=attrs)
-        if not self.multiplicity:
-            return dataset
-        name = {"units": "m3", "long_name": "volume that so many activations reach"}
-        volumes = xr.Variable("activations", list(self.multiplicity.values()), name)
-        return dataset.assign_coords(activations=list(self.multiplicity)).assign(
-            multiplicity=volumes
-        )
+        if self.multiplicity:
+            name = {"units": "m3", "long_name": "volume that so many activations reach"}
+            volumes = "activations", list(self.multiplicity.values()), name
+            dataset = dataset.assign_coords(activations=list(self.multiplicity))
+            dataset["multiplicity"] = volumes
+        return dataset
 
     def _numbers(self) -> _Stored:
         if not self.dimension:
@@ -395,9 +390,8 @@ class ReachableSet:
             lines.insert(0, f"{sheet}thickness {quantity(thickness.value, 'm', thickness.error)}")
         if self.multiplicity:
             again = quantity(self._several, "m³", self.multiplicity_error)
-            lines.append(
-                f"reached more than once {again}, behind folds {self._text('fold_volume')}"
-            )
+            folds = self._text("fold_volume")
+            lines.append(f"reached more than once {again}, behind folds {folds}")
         raster = "" if self.route == "flux" else f", cells of {self.image.lattice.cell:.3g} m"
         return [*lines, _ROUTES[self.route] + raster]
 

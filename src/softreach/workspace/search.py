@@ -8,13 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.kernels.box.bounded_descent import (
-    FIRST_DAMPING,
-    NOWHERE,
-    Running,
-    judge,
-    next_trials,
-)
+from softreach.kernels.box import bounded_descent as kernels
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.raster import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs, no_equilibrium
@@ -25,66 +19,46 @@ from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.postures import AllPostures
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
-
-ENOUGH = 1e-3
-"""Distance at which a place counts as reached, in cells."""
-
+ENOUGH = 1e-3  # distance at which a place counts as reached, in cells
 _CHUNK = 1 << 16  # places searched for at a time
 CLOUD = 1 << 16  # tips in a cloud that searches start from
 _CLOUDS = 8  # at most
 _FAR = 3.0  # cells, from which on distances are not told apart
-DISTANCE = 0.75
-"""Of the level set from the tips, in cells: below 0.71 a thread, below 0.5 a sheet has holes."""
-CLEARLY = 0.02
-"""Cells by which a tip must be closer to start another search."""
+DISTANCE = 0.75  # of the level set, in cells: below 0.71 a thread has holes, below 0.5 a sheet
+CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 
 
 class Stop(NamedTuple):
     """When a search gives up that gets no nearer to its target."""
 
-    settled: float
-    """Gain that the linear map promises, of the distance [-]."""
-    most: int
-    """Steps."""
+    settled: float  # gain that the linear map promises, of the distance [-]
+    most: int  # steps
 
 
-ROUGHLY = Stop(settled=1e-3, most=30)
-"""For targets that are reached or not."""
-CLOSELY = Stop(settled=1e-13, most=1000)
-"""For the nearest tip itself."""
+ROUGHLY = Stop(settled=1e-3, most=30)  # for targets that are reached or not
+CLOSELY = Stop(settled=1e-13, most=1000)  # for the nearest tip itself
 
 
 class ReachedGrid:
     """Cell centers that are reached, grown from tips of a cloud to their neighbors.
 
-    A center is reached if a search that starts at a neighbor's activation, or at that of a tip
-    nearby, ends on it. Centers that are not have the distance to the nearest tip found, and its
-    activation: a tip that comes closer starts another search. Of a flat set, whose plane is the
-    third of five layers of the lattice, only centers in the plane are searched.
+    A center is reached if a search from the activation of a neighbor, or of a tip nearby, ends on
+    it. Others have the distance to the nearest tip found, and its activation. Of a flat set only
+    centers in its plane, the third of five layers of the lattice, are searched.
     """
 
     def __init__(
-        self,
-        tip_map: TipMap,
-        lattice: Lattice,
-        progress: Progress = silent,
-        *,
-        is_flat: bool = False,
+        self, tip_map: TipMap, lattice: Lattice, progress: Progress = silent, is_flat: bool = False
     ) -> None:
         self.tip_map, self.lattice = tip_map, lattice
         self.progress, self.is_flat = progress, is_flat
-        size = int(np.prod(lattice.shape))
-        self.gap = np.full(size, np.inf)
-        """Distance from a center to the nearest tip found, in cells; 0 where reached; -1 at the
-        sides of the lattice, where nothing is searched."""
-        self.gamma = np.zeros((size, tip_map.box.bundles))
-        """Its activation, meaningless where `gap` is infinite."""
         _, ny, nz = lattice.shape
-        sides = np.ones(lattice.shape, bool)
-        inner = slice(2, -2) if is_flat else slice(1, -1)  # of five layers in a plane one
-        sides[1:-1, 1:-1, inner] = False
-        self.gap[sides.ravel()] = -1.0
         self.steps = np.array([ny * nz, nz, 1])
+        # Of each center the distance to the nearest tip found in cells, 0 where reached, -1 at the
+        # sides of the lattice, where nothing is searched; and its activation, where that is finite.
+        gap = np.full(lattice.shape, -1.0)
+        gap[1:-1, 1:-1, slice(2, -2) if is_flat else slice(1, -1)] = np.inf
+        self.gap, self.gamma = gap.ravel(), np.zeros((gap.size, tip_map.box.bundles))
 
     @property
     def reached(self) -> Mask:
@@ -143,11 +117,10 @@ class ReachedGrid:
     def search(self, cells: Index, starts: Array) -> None:
         """Search for centers, and keep what comes closer."""
         cell = self.lattice.cell
-        for first in range(0, len(cells), _CHUNK):
-            some = cells[first : first + _CHUNK]
-            nearest = nearest_tips(
-                self.tip_map, starts[first : first + _CHUNK], self.centers(some), ENOUGH * cell
-            )
+        for block in parallel.blocks(len(cells), _CHUNK):
+            some = cells[block]
+            centers = self.centers(some)
+            nearest = nearest_tips(self.tip_map, starts[block], centers, ENOUGH * cell)
             gap = nearest.distance / cell
             gap[gap <= ENOUGH] = 0.0
             closer = gap < self.gap[some]
@@ -161,12 +134,11 @@ def nearest_tips(
 ) -> Nearest:
     """The activations whose tips come closest to targets, as far as a descent from `start` finds.
 
-    Starts are within the bounds, shape (n, bundles), and each has a target, shape (n, 3) [m], which
-    counts as reached at the distance `enough` [m]. Only stable equilibria are taken.
+    Starts (n, bundles) are within the bounds, and each has a target (n, 3) [m], which counts as
+    reached at the distance `enough` [m]. Only stable equilibria are taken.
     """
     gamma = np.ascontiguousarray(start)
     nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
-
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
     blocks = parallel.blocks(len(targets), share)
@@ -181,13 +153,9 @@ def nearest_tips(
 class Nearest(NamedTuple):
     """Ends of searches: local minima of the distance, one for each target."""
 
-    gamma: Array
-    """Activations within the bounds, shape (n, bundles)."""
-    tips: Array
-    """Their tips [m], shape (n, 3)."""
-    distance: Array
-    """From tip to target [m], shape (n,); infinite where a search began without a stable
-    equilibrium."""
+    gamma: Array  # activations within the bounds, (n, bundles)
+    tips: Array  # their tips [m], (n, 3)
+    distance: Array  # to the target [m], (n,); infinite where a start has no equilibrium
 
 
 def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest: Nearest) -> None:
@@ -197,7 +165,7 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
     size, m = min(total, _TOGETHER), box.bundles
     shapes = (), (), (3, m), (3,), (), (m,), (m,), (m,)
     numbers = (np.zeros((size, *shape)) for shape in shapes)
-    running = Running(np.zeros(size, np.int64), np.zeros(size, np.int64), *numbers)
+    running = kernels.Running(np.zeros(size, np.int64), np.zeros(size, np.int64), *numbers)
     center = np.zeros((size, m))
     tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
     step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
@@ -206,26 +174,23 @@ def _descend(tip_map: TipMap, targets: Array, enough: float, stop: Stop, nearest
         more = min(total - begun, len(tips) - n)
         new, old = slice(n, n + more), slice(begun, begun + more)
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
-        running.trial[new], running.damping[new] = nearest.gamma[old], FIRST_DAMPING
+        running.trial[new], running.damping[new] = nearest.gamma[old], kernels.FIRST_DAMPING
         n, begun = n + more, begun + more
         tip_map.fill(running.trial[:n], TipOutputs(tips[:n], ahead[:n]))
         if torn:
-            tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
-        slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
-        low, high = running.low[:n], running.high[:n]
+            tips[np.isnan(tips[:n, 0]).nonzero()[0]] = kernels.NOWHERE
+        n = kernels.judge(running, n, tips, ahead, targets, nearest, enough, stop, bounds)
+        at = rows(running, slice(n))
         multiplier[:n] = 0.0
-        project(center[:n], slope, wanted, softness, low, high, step[:n], multiplier[:n])
-        next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
-    nowhere = nearest.distance >= NOWHERE
+        ends = step[:n], multiplier[:n]
+        project(center[:n], at.slope, at.wanted, at.softness, at.low, at.high, *ends)
+        kernels.next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
+    nowhere = nearest.distance >= kernels.NOWHERE
     nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
 
 
 def all_reached(grid: ReachedGrid, gamma: Array, tips: Array) -> ReachedGrid:
-    """All centers that searches find, from one cloud after the other until one finds no more.
-
-    And the distances of those around to the nearest tips.
-    """
+    """All centers that searches find, from one cloud after the other, and distances around."""
     grid.add(gamma, tips)
     for number in range(1, _CLOUDS):
         while not grid.fits():
@@ -234,10 +199,10 @@ def all_reached(grid: ReachedGrid, gamma: Array, tips: Array) -> ReachedGrid:
         grid.add(*cloud_on_faces(grid.tip_map, number))
         if grid.fits() and np.count_nonzero(grid.gap == 0.0) == before:
             break
-    spread(grid)
+    _spread(grid)
     while not grid.fits(DISTANCE):
         grid = _wider(grid)
-        spread(grid)
+        _spread(grid)
     return grid
 
 
@@ -259,8 +224,7 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     """Activations on faces of all dimensions of the box, and their tips."""
     if isinstance(tip_map, AllPostures):
         return tip_map.with_sheets(*cloud_on_faces(tip_map.from_rest, seed))
-    box, rng = tip_map.box, np.random.default_rng(seed)
-    m = box.dimension
+    box, m, rng = tip_map.box, tip_map.box.dimension, np.random.default_rng(seed)
     cube = rng.random((CLOUD, m))
     free = np.maximum(rng.integers(0, m + 1, CLOUD), 2)
     bound = rng.random((CLOUD, m)).argsort(axis=1) >= free[:, None]
@@ -273,7 +237,7 @@ def cloud_on_faces(tip_map: TipMap, seed: int) -> tuple[Array, Array]:
     return gamma[stable], tips[stable]
 
 
-def spread(grid: ReachedGrid) -> None:
+def _spread(grid: ReachedGrid) -> None:
     """Search around centers that are near a tip, and around the rim, until gaps no longer fall."""
     offsets = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) @ grid.steps
     offsets = offsets[offsets != 0]

@@ -1,9 +1,7 @@
-"""The boundary of a folded set as smooth sheets, cut where they cross.
+"""The boundary of a folded set as smooth sheets: images of faces of the box and of det J = 0.
 
-The boundary of the image of a box lies in the images of its faces and of the places inside where
-det J = 0. Both are meshed by themselves, with corners where the map puts them: faces are parted
-where det J changes its sign, the fold is the level set of det J. What has reach on both sides is
-then cut away, along lines that bisection finds.
+Both are meshed by themselves, faces parted where det J changes its sign. What has reach on both
+sides is then cut away, along lines that bisection finds.
 """
 
 from __future__ import annotations
@@ -53,11 +51,7 @@ class Sheets(Surface):
 
 
 def outer_sheets(tip_map: TipMap, image: Image) -> Sheets:
-    """The faces and folds that bound the image of a map of three free bundles on one smooth branch.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
-    """
+    """The faces and folds that bound the image of three free bundles on one smooth branch."""
     beside = _Beside(tip_map, image)
     (on_faces, face_parts), (on_fold, fold_parts) = _parted_faces(tip_map), _fold(tip_map)
     cube = np.concatenate([on_faces, on_fold])
@@ -87,9 +81,15 @@ def box_sheets(tip_map: TipMap) -> Sheets:
 
 def _sheets(tip_map: TipMap, cube: Array, faces: Faces) -> Sheets:
     cube, faces = compact_surface(cube, faces)
-    activation, lines = tip_map.box.from_free_cube(cube), _lines(cube, faces)
+    activation = tip_map.box.from_free_cube(cube)
     if (driving := as_tip_map(tip_map).inputs.driving) is not None:
         activation = driving.with_dead_zones(activation)
+    pairs = np.sort(np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    # Those that lie on edges of the box, or that have a triangle on one side only.
+    a, b = np.moveaxis(cube[edges], 1, 0)
+    level = (a == b) & ((a == 0.0) | (a == 1.0))
+    lines = edges[(count == 1) | (level.sum(axis=1) >= 2)].astype(np.int32)
     return Sheets(vertices=_tips(tip_map, cube), faces=faces, lines=lines, activation=activation)
 
 
@@ -99,34 +99,22 @@ def clipped(
     """Triangles (f, 3) cut along the line between vertices that are kept and others.
 
     Of pairs of vertices (kept, not kept), shape (n, 2), `cut` gives the share of the way to the
-    second where the line is, shape (n,).
-
-    Returns:
-        Triangles, whose vertices beyond those that are kept are new: one for each cut pair, the
-        pairs and the shares.
+    second where the line is, shape (n,). Pairs and shares are given with the triangles, whose
+    vertices beyond those that were there are new, one for each pair.
     """
     count = kept[faces].sum(axis=1)
-    parts = [faces[count == 3]]
-    edges = []
     one, two = faces[count == 1], faces[count == 2]
-    for some, alone in ((one, kept[one]), (two, ~kept[two])):
-        first = alone.argmax(axis=1)[:, None]
-        apex, left, right = (
-            np.take_along_axis(some, (first + k) % 3, axis=1)[:, 0] for k in range(3)
-        )
-        edges.append((apex, left, right))
-    (a, b, c), (p, q, r) = edges
-    pairs = np.concatenate(
-        [np.stack(pair, axis=1) for pair in ((a, b), (a, c), (q, p), (r, p))]
-    ).reshape(-1, 2)
+    (a, b, c), (p, q, r) = (
+        np.take_along_axis(some, (alone.argmax(axis=1)[:, None] + np.arange(3)) % 3, axis=1).T
+        for some, alone in ((one, kept[one]), (two, ~kept[two]))
+    )
+    pairs = np.hstack([(a, b), (a, c), (q, p), (r, p)]).T
     unique, number = np.unique(pairs, axis=0, return_inverse=True)
     shares = cut(unique.astype(np.int32)) if len(unique) else np.empty(0)
     new = number.ravel() + len(kept)
     ab, ac, qp, rp = np.split(new, np.cumsum([len(a), len(a), len(q)]))
-    parts += [
-        np.stack([a, ab, ac], axis=1), np.stack([q, r, rp], axis=1), np.stack([q, rp, qp], axis=1)
-    ]  # fmt: skip
-    return np.concatenate(parts).astype(np.int32), unique.astype(np.int32), shares
+    parts = np.hstack([faces[count == 3].T, (a, ab, ac), (q, r, rp), (q, rp, qp)]).T
+    return np.ascontiguousarray(parts, np.int32), unique.astype(np.int32), shares
 
 
 def _between(values: Array, share: Array) -> Array:
@@ -194,24 +182,16 @@ def _fold(tip_map: TipMap) -> tuple[Array, Faces]:
     moved = numbers[:, 0] != numbers[:, 1]
     cube = places / n
     cube[moved] = _between(grid[numbers[moved]], _zeros(tip_map, grid, dets, numbers[moved]))
-    normals = _away(tip_map, cube)
-    tips = _tips(tip_map, cube)
-    corners = tips[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    turned = np.einsum("fi,fki->f", area, normals[faces]) < 0
+    left, _, right = np.linalg.svd(box_slopes(tip_map, cube)[1])
+    tips, step, normals = _tips(tip_map, cube), 0.01 * right[:, 2], left[:, :, 2]
+    # Second differences point to what is folded, also those of places a little beyond the box.
+    second = _tips(tip_map, cube + step) + _tips(tip_map, cube - step) - 2.0 * tips
+    inward = np.einsum("ni,ni->n", second, normals)[:, None] > 0
+    normals = np.where(inward, -normals, normals)
+    a, b, c = np.moveaxis(tips[faces], 1, 0)
+    turned = np.einsum("fi,fki->f", np.cross(b - a, c - a), normals[faces]) < 0
     faces = np.where(turned[:, None], faces[:, ::-1], faces)
     return cube, faces.astype(np.int32)
-
-
-def _away(tip_map: TipMap, cube: Array) -> Array:
-    """Normals of the images of folds, away from what is folded, shape (n, 3)."""
-    left, _, right = np.linalg.svd(box_slopes(tip_map, cube)[1])
-    kernel, normal = right[:, 2], left[:, :, 2]
-    step = 0.01 * kernel
-    # also of places a little beyond the box
-    second = _tips(tip_map, cube + step) + _tips(tip_map, cube - step) - 2.0 * _tips(tip_map, cube)
-    side = np.einsum("ni,ni->n", second, normal)
-    return np.where(side[:, None] > 0, -normal, normal)
 
 
 class _Beside:
@@ -219,14 +199,10 @@ class _Beside:
         self._rod, self._image = tip_map, image
         self._n = image.grid.n
         self._grid = image.places.reshape(*(self._n + 1,) * 3, 3)
-        bend = sum(
-            np.pad(
-                np.linalg.norm(np.diff(self._grid, 2, axis), axis=-1),
-                [(int(k == axis),) * 2 for k in range(3)],
-                mode="edge",
-            )
-            for axis in range(3)
-        )
+        bend = np.zeros(self._grid.shape[:3])
+        for axis in range(3):
+            second = np.linalg.norm(np.diff(self._grid, 2, axis), axis=-1)
+            bend += np.pad(second, [(int(k == axis),) * 2 for k in range(3)], mode="edge")
         self._rough = _ROUGH * maximum_filter(bend, 3)
 
     def are_outer(self, cube: Array, normals: Array, fold: Mask) -> Mask:
@@ -247,9 +223,8 @@ class _Beside:
         x + 2 t k has about the same tip as x.
         """
         slopes = box_slopes(self._rod, cube)[1]
-        _, sizes, right = np.linalg.svd(slopes)
+        dets, (_, sizes, right) = np.linalg.det(slopes), np.linalg.svd(slopes)
         kernel = right[:, 2]
-        dets = np.linalg.det(slopes)
         some = np.flatnonzero(sizes[:, 2] < 0.3 * sizes[:, 1])
         at = cube[some]
         step = np.where(((at + _STEP * kernel[some]) <= 1.0).all(axis=1), _STEP, -_STEP)
@@ -265,24 +240,12 @@ class _Beside:
 
     def _linear(self, cube: Array) -> Array:
         """Images by the map that is linear on the tetrahedra of the grid."""
-        at = cube * self._n
-        corner = np.floor(at).clip(0, self._n - 1).astype(int)
-        rest = at - corner
-        order = np.argsort(-rest, axis=1, kind="stable")
-        place = corner.copy()
-        out = self._grid[tuple(place.T)].copy()
-        rows = np.arange(len(at))
-        for k in range(3):
-            before = self._grid[tuple(place.T)]
-            place[rows, order[:, k]] += 1
-            out += rest[rows, order[:, k]][:, None] * (self._grid[tuple(place.T)] - before)
+        place = np.floor(cube * self._n).clip(0, self._n - 1).astype(int)
+        rest, rows = cube * self._n - place, np.arange(len(cube))
+        before = out = self._grid[tuple(place.T)]
+        for axis in np.argsort(-rest, axis=1, kind="stable").T:
+            place[rows, axis] += 1
+            after = self._grid[tuple(place.T)]
+            out = out + rest[rows, axis][:, None] * (after - before)
+            before = after
         return out
-
-
-def _lines(cube: Array, faces: Faces) -> NDArray[np.int32]:
-    """Edges of triangles that lie on edges of the box, or that have a triangle on one side only."""
-    pairs = np.sort(np.concatenate([faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
-    edges, count = np.unique(pairs, axis=0, return_counts=True)
-    ends = cube[edges]
-    level = (ends[:, 0] == ends[:, 1]) & ((ends[:, 0] == 0.0) | (ends[:, 0] == 1.0))
-    return edges[(count == 1) | (level.sum(axis=1) >= 2)].astype(np.int32)

@@ -17,15 +17,8 @@ from softreach.sampling import cube_blocks
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import check_installed
 from softreach.support.progress import Progress
+from softreach.workspace import grid as grids
 from softreach.workspace.cells import CLIMBERS, drawn_tight, lost_share, shifted_lattice
-from softreach.workspace.grid import (
-    LiftedGrid,
-    box_slopes,
-    cube_grid,
-    grid_ticks,
-    grid_tips,
-    product_of,
-)
 from softreach.workspace.image import Lattice
 from softreach.workspace.measure import Estimate, climbed_hull, named
 from softreach.workspace.postures import all_postures
@@ -35,7 +28,6 @@ from softreach.workspace.search import DISTANCE, ENOUGH, ReachedGrid, all_reache
 _CELLS = {1: 1024, 2: 128}  # of the grids of a curve and of a surface, for distances and pictures
 _NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
-
 _SAMPLES = 256  # of the box, that tell whether all tips lie in one plane
 _FLAT = 4.0  # tolerances of a tip: what is no thicker is flat
 _RULE = 2.5  # cells along the mean side, times the root of the accuracy
@@ -49,12 +41,12 @@ def thin_set(tip_map: TipMap) -> ReachableSet:
     """The reachable set of a tip map with fewer than three free bundles."""
     m = tip_map.box.dimension
     if m == 0:
-        point = Surface(vertices=grid_tips(tip_map, 1), faces=np.zeros((1, 3), np.int32))
+        point = Surface(vertices=grids.grid_tips(tip_map, 1), faces=np.zeros((1, 3), np.int32))
         return ReachableSet(tip_map=tip_map, cells=1, mesh=point)
     n = _CELLS[m]
     # kinks are on lines of the grid
-    ticks = None if tip_map.supports_unstable else grid_ticks(tip_map, n)
-    grid = LiftedGrid.of(tip_map, n, ticks=ticks)
+    ticks = None if tip_map.supports_unstable else grids.grid_ticks(tip_map, n)
+    grid = grids.LiftedGrid.of(tip_map, n, ticks=ticks)
     corners = grid.cells[:, chains(m, m)].reshape(-1, m + 1)
     faces = np.pad(corners, [(0, 0), (0, 2 - m)], mode="edge")
     vertices, faces = compact_surface(grid.tips, faces)
@@ -71,13 +63,12 @@ def thin_set(tip_map: TipMap) -> ReachableSet:
 def by_nodes(tip_map: TipMap) -> Estimate:
     """Length [m] or area [m²] of the image, ∫ √det(JᵀJ) dγ, and how fewer Gauss nodes change it.
 
-    As the map is smooth, the error falls faster than any power of the number of nodes. Places count
-    as often as they are reached. NaN if a node has no stable equilibrium.
+    Places count as often as they are reached; NaN if a node has no stable equilibrium.
     """
     box, tip_map, values = tip_map.box, refined(tip_map, _TOL), list[float]()
     for nodes in _NODES:
         x, w = np.polynomial.legendre.leggauss(nodes)
-        places, weights = (product_of([each / 2.0] * box.dimension) for each in (1.0 + x, w))
+        places, weights = (grids.product_of([each / 2.0] * box.dimension) for each in (1.0 + x, w))
         slopes = tip_map.tips_and_slopes(box.from_free_cube(places))[1][:, :, box.free]
         with np.errstate(invalid="ignore"):
             sizes = np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
@@ -86,11 +77,11 @@ def by_nodes(tip_map: TipMap) -> Estimate:
     return Estimate(values[0], abs(values[0] - values[1]))
 
 
-def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
-    """Length or area of the image, by Gauss nodes where it is one smooth sheet.
+def _measure(tip_map: TipMap, grid: grids.LiftedGrid) -> Estimate:
+    """Length or area of the image, by Gauss nodes where it is one smooth sheet, else by cells.
 
-    Else it is that of cells, as chords or triangles. What these err by, O(1/n²), is removed. Where
-    the map has kinks, or sheets end, it is O(1/n): the largest change by a finer grid is stated.
+    What these err by, O(1/n²), is removed. Where the map has kinks, or sheets end, it is O(1/n):
+    the largest change by a finer grid is stated.
     """
     if tip_map.is_smooth and not grid.is_torn and np.isfinite(smooth := by_nodes(tip_map)).all():
         return smooth
@@ -100,18 +91,15 @@ def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
     return Estimate(fine + removed, max(map(abs, changes)))
 
 
-def _size(grid: LiftedGrid) -> float:
+def _size(grid: grids.LiftedGrid) -> float:
     if grid.is_lifted.ndim == 2:
         return surface_area(grid.tips, grid.cells[:, chains(2, 2)].reshape(-1, 3))
     return float(np.linalg.norm(np.diff(grid.tips[grid.cells], axis=1), axis=-1).sum())
 
 
-def _convex_volume(grid: LiftedGrid) -> Estimate:
-    """Volume of the convex hull of mapped vertices [m³].
-
-    It is too small by O(1/n²): a grid with a quarter of the cells along each axis differs by 15
-    times the error. A tenth of the difference is stated.
-    """
+def _convex_volume(grid: grids.LiftedGrid) -> Estimate:
+    """Volume of the convex hull of mapped vertices [m³]."""
+    # A grid with a quarter of the cells along each axis differs by 15 times the error O(1/n²).
     tips = (each.tips[np.isfinite(each.tips[:, 0])] for each in (grid, grid.coarser(4)))
     fine, coarse = (convex_hull(points).volume for points in tips)
     return Estimate(fine, abs(fine - coarse) / 10.0)
@@ -126,13 +114,7 @@ def plane_of_tips(tip_map: TipMap) -> Plane | None:
 
 
 def planar_set(tip_map: TipMap, plane: Plane, accuracy: float, progress: Progress) -> ReachableSet:
-    """The region that two bundles or more reach in a plane, as `searched_set` finds volumes.
-
-    The area is as accurate as asked; the progress counts centers that are searched.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
-    """
+    """The region that two bundles or more reach in a plane, as `searched_set` finds volumes."""
     turned = Base(
         points=tuple(map(tuple, plane.rotation.tolist())),  # pyright: ignore[reportArgumentType]
         position=tuple((-plane.rotation @ plane.origin).tolist()),  # pyright: ignore[reportArgumentType]
@@ -170,14 +152,10 @@ def planar_set(tip_map: TipMap, plane: Plane, accuracy: float, progress: Progres
 
 
 class _Outline(NamedTuple):
-    tips: Array
-    """Shape (n, 3)."""
-    gamma: Array
-    """Activations that lead to them, shape (n, bundles)."""
-    edges: Index
-    """From each tip to the next of its curve, shape (e, 2)."""
-    centers: Array
-    """Of cells that are reached [m], shape (c, 3)."""
+    tips: Array  # (n, 3)
+    gamma: Array  # activations that lead to them, (n, bundles)
+    edges: Index  # from each tip to the next of its curve, (e, 2)
+    centers: Array  # of cells that are reached [m], (c, 3)
 
     @classmethod
     def of(cls, grid: ReachedGrid) -> _Outline:
@@ -205,7 +183,7 @@ def _smooth(tip_map: TipMap, flat: TipMap, area: Estimate) -> Estimate:
     """The area of two bundles that do not fold by Gauss nodes, as far as the outline agrees."""
     if tip_map.box.dimension != 2 or tip_map.supports_unstable or not tip_map.is_smooth:
         return area
-    sign = np.linalg.det(box_slopes(flat, cube_grid(_SIGNS, 2))[1][:, :2])
+    sign = np.linalg.det(grids.box_slopes(flat, grids.cube_grid(_SIGNS, 2))[1][:, :2])
     smooth = by_nodes(tip_map)
     folds = sign.min() * sign.max() <= 0.0 or abs(smooth.value - area.value) > area.error
     return area if folds else smooth

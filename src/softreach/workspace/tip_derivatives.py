@@ -15,7 +15,7 @@ from softreach.arm.tables import check_extension
 from softreach.rod.rods import in_steps
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, silent
@@ -25,8 +25,6 @@ _LOADED_STEP = 1e-3  # where they are as exact as an equilibrium is found
 _TRIES = 16  # numbers of steps
 _SAFETY = 10.0  # as an error of sixth order in the bending grows with the seventh power or so
 _ROUNDING = 1e-14  # of a tip, in L
-_SCALES = {"m": 0.1, "rad": 0.1}
-"""Of parameters that are 0, by their unit; lengths in L."""
 
 
 class TipDerivatives:
@@ -43,16 +41,9 @@ class TipDerivatives:
         tol: float = 0.0,
         progress: Progress = silent,
     ) -> None:
-        """Make the neighbors.
+        """Make the neighbors; for a tolerance above the map's in fewer steps, theory (27).
 
-        The tolerance of the map is also that of the derivatives, per change of a parameter by
-        itself; for a larger one a free arm has fewer steps, theory (27). The progress is called
-        with 0 before each parameter, from any thread, and may raise to stop.
-
-        Raises:
-            InvalidInput: A parameter counts something, has no value, or its change holds or frees a
-                bundle.
-            InvalidDesign: The design has no neighbors with other values of a parameter.
+        The progress is called with 0 before each parameter, from any thread.
         """
         self._progress = progress
         relative = _LOADED_STEP if tip_map.supports_unstable else _STEP
@@ -68,10 +59,7 @@ class TipDerivatives:
         """Error of a derivative by each parameter [m per unit], shape (parameters,)."""
 
     def at(self, cube: Array) -> Array:
-        """Derivatives [m per unit] at places (n, dimension) of the unit cube of the free bundles.
-
-        Shape (n, 3, parameters); NaN without a stable equilibrium. Bounds move as parameters do.
-        """
+        """Derivatives (n, 3, parameters) [m per unit] at places of the cube of the free bundles."""
         out = np.zeros((len(cube), 3, len(self._shifts)))
 
         def task(k: int) -> None:
@@ -97,37 +85,35 @@ def _neighbors(tip_map: TipMap, shifts: Shifts, fewest: int) -> list[tuple[float
 class Shifts:
     """Designs at offsets of a parameter, and the rules for its derivative."""
 
-    offsets: Array
-    """Change of the parameter in steps, whole numbers, shape (n,)."""
-    step: float
-    """Size of a step, in the unit of the parameter."""
-    arms: tuple[Manipulator, ...]
-    """The designs, in the same order; the design itself at 0."""
+    offsets: Array  # change of the parameter in steps, whole numbers, (n,)
+    step: float  # size of a step, in the unit of the parameter
+    arms: tuple[Manipulator, ...]  # the designs, in the same order; the design itself at 0
 
     @lazy
     def weights(self) -> Array:
         """The derivative is the sum of these times the values, to the highest order."""
-        return _weights(self.offsets) / self.step
+        return self._weights(slice(None))
 
     @lazy
     def rough_weights(self) -> Array:
         """The same without the two offsets that are farthest, two orders lower."""
-        kept = np.sort(np.argsort(np.abs(self.offsets), kind="stable")[:-2])
-        weights = np.zeros(len(self.offsets))
-        weights[kept] = _weights(self.offsets[kept]) / self.step
+        return self._weights(np.sort(np.argsort(np.abs(self.offsets), kind="stable")[:-2]))
+
+    def _weights(self, kept: Index | slice) -> Array:
+        """Of the derivative at 0 by polynomials through some of the offsets."""
+        powers, weights = (
+            np.vander(self.offsets[kept], increasing=True).T,
+            np.zeros_like(self.offsets),
+        )
+        weights[kept] = np.linalg.solve(powers, np.eye(len(powers))[1]) / self.step
         return weights
 
 
 def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: float) -> Shifts:
     """Neighbors of a design along a parameter: on both sides, or on one at the end of its range.
 
-    Where several parts share the parameter, each moves from its own value by the same amount.
     `reach` is the number of steps to either side, twice as many to one side, and `relative` their
-    size as a part of the parameter, of the smallest where parts differ.
-
-    Raises:
-        InvalidInput: The parameter counts something, or has no value.
-        InvalidDesign: The design has no neighbors on either side.
+    size as a part of the parameter, of the smallest where parts differ; all move by the same.
     """
     values = parameter.values(arm)
     if parameter.whole:
@@ -135,26 +121,23 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
     if not np.isfinite(values).all():
         allowed = "a parameter that the design gives as one number"
         raise InvalidInput("parameter", parameter.name, allowed)
-    sizes = [abs(value) for value in values if value]
-    step = relative * min(sizes, default=_scale(arm, parameter))
+    step = relative * min(filter(None, map(abs, values)), default=_scale(arm, parameter))
     ways = np.arange(-reach, reach + 1), np.arange(2 * reach + 1), -np.arange(2 * reach + 1)
-    fault: InvalidDesign | None = None
+    faults = list[InvalidDesign]()
     for offsets in ways:
         try:
             arms = tuple(_shifted(arm, parameter, step * k) if k else arm for k in offsets)
-        except InvalidDesign as error:
-            fault = fault or error
-        else:
             return Shifts(offsets.astype(float), step, arms)
-    assert fault is not None
-    raise fault
+        except InvalidDesign as error:
+            faults.append(error)
+    raise faults[0]
 
 
 def _scale(arm: Manipulator, parameter: Parameter) -> float:
     """Scale of a parameter that is 0: an offset or a bound of another one."""
     if parameter.field.startswith(("lower", "upper")):
         return float(np.ptp(arm.input_bounds, axis=1).max()) or 1.0
-    return _SCALES.get(parameter.unit, 1.0) * (arm.length if parameter.unit == "m" else 1.0)
+    return {"m": 0.1 * arm.length, "rad": 0.1}.get(parameter.unit, 1.0)
 
 
 def _shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
@@ -165,9 +148,3 @@ def _shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulat
         allowed = "one that neither holds a bundle nor frees one"
         raise InvalidInput("parameter", parameter.name, allowed)
     return made
-
-
-def _weights(offsets: Array) -> Array:
-    """Of the derivative at 0 by polynomials through all offsets."""
-    powers = np.vander(offsets, increasing=True).T
-    return np.linalg.solve(powers, np.eye(len(offsets))[1])

@@ -1,11 +1,8 @@
 """Descents to the tips nearest to targets, many at a time: what happens between two evaluations.
 
-The rod is evaluated in between for all that still run. Those that end make room for the next, so
-that the evaluation is never asked for a few.
-
-`box_steps` are Newton's toward the minimum of a function in the box. Variables on a bound that the
-gradient pushes outward stay there; the others take a Newton step, damped until the Hessian is
-positive definite, and stop at their bounds (Bertsekas 1982).
+Those that end make room for the next, so that the rod is never evaluated for a few. `box_steps` are
+Newton's toward the minimum of a function in the box, damped until the Hessian is positive definite;
+variables on a bound that the gradient pushes outward stay there (Bertsekas 1982).
 """
 
 from __future__ import annotations
@@ -17,8 +14,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-NOWHERE = 1e150
-"""Coordinate of tips that do not count; no distance may be infinite here."""
+NOWHERE = 1e150  # coordinate of tips that do not count; no distance may be infinite here
 FIRST_DAMPING = 1e-2
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-4, 1e4
 _BELIEVED = 0.1  # damping above which the linear map says little of what is left to gain
@@ -28,46 +24,25 @@ _PROGRESS = 0.005  # of the tolerance: a smaller gain ends a search
 class Running(NamedTuple):
     """Searches side by side, and the step each takes next."""
 
-    row: np.ndarray
-    """Number of the search, shape (n,), int64."""
-    steps: np.ndarray
-    """Steps it has taken, shape (n,), int64."""
-    damping: np.ndarray
-    """Of the next step, part of the mean square of the slopes [-], shape (n,)."""
-    left: np.ndarray
-    """Distance that the linear map leaves behind the step under trial [m], shape (n,)."""
-    slope: np.ndarray
-    """∂r/∂γ in ranges of the bounds [m] where it is now, shape (n, 3, m)."""
-    wanted: np.ndarray
-    """Target minus tip [m], shape (n, 3)."""
-    softness: np.ndarray
-    """Damping times that mean square [m²], shape (n,)."""
-    low: np.ndarray
-    """Signed distances to the lower bounds, in ranges, shape (n, m)."""
-    high: np.ndarray
-    """Distances to the upper bounds, in ranges, shape (n, m)."""
-    trial: np.ndarray
-    """Activations to evaluate next [-], shape (n, m)."""
+    row: np.ndarray  # number of the search, (n,), int64
+    steps: np.ndarray  # steps it has taken, (n,), int64
+    damping: np.ndarray  # of the next step, part of the mean square of the slopes [-], (n,)
+    left: np.ndarray  # distance that the linear map leaves behind the step under trial [m], (n,)
+    slope: np.ndarray  # ∂r/∂γ in ranges of the bounds [m] where it is now, (n, 3, m)
+    wanted: np.ndarray  # target minus tip [m], (n, 3)
+    softness: np.ndarray  # damping times that mean square [m²], (n,)
+    low: np.ndarray  # signed distances to the lower bounds, in ranges, (n, m)
+    high: np.ndarray  # distances to the upper bounds, in ranges, (n, m)
+    trial: np.ndarray  # activations to evaluate next [-], (n, m)
 
 
 @kernel
 def judge(running, n, tips, ahead, targets, ends, enough, stop, bounds):
-    """Take in the trials of the first n, and set up the next steps of those that go on.
+    """Take in the trials of the first n; set up the next steps and return how many of them go on.
 
-    Args:
-        running: The searches; those that go on become the first.
-        n: Number of those that run.
-        tips: Of their trials [m], `NOWHERE` if they do not count, shape (n, 3).
-        ahead: ∂r/∂γ of their trials [m], shape (n, 3, m).
-        targets: Of all searches [m], shape (all, 3).
-        ends: Best activations, their tips and distances of all searches.
-        enough: Distance at which a search ends [m].
-        stop: Gain still to be hoped for, of the distance, at which a search ends as well [-], and
-            the most steps.
-        bounds: Lower and upper ones and their ranges, shape (m,) each.
-
-    Returns:
-        Number of those that go on.
+    Trials have tips (n, 3), `NOWHERE` if they do not count, and ∂r/∂γ `ahead` (n, 3, m); targets
+    (all, 3) and ends, the best activations, tips and distances, are those of all searches. A search
+    ends at a distance that is enough [m], at a gain to be hoped for, or after so many steps (stop).
     """
     gamma, best, distance = ends
     settled, most = stop
@@ -129,17 +104,9 @@ def _aim(running, i, kept, better, target, tip, ahead, gamma, bounds):
 
 @kernel
 def next_trials(running, n, step, multiplier, gamma, low, high, scales):
-    """Ends of the steps of the first n, and what the linear map leaves there.
+    """Ends of the steps (n, m) of the first n, in ranges `scales`, and what the linear map leaves.
 
-    Args:
-        running: The searches.
-        n: Number of those that run.
-        step: In ranges of the bounds, shape (n, m).
-        multiplier: Of the steps, shape (n, 3): what is left by the softness.
-        gamma: Best activations of all searches, shape (all, m).
-        low: Lower bounds, shape (m,).
-        high: Upper bounds, shape (m,).
-        scales: Ranges of the bounds, shape (m,).
+    That is the multiplier (n, 3) times the softness. Best activations (all, m) are of all searches.
     """
     for i in range(n):
         for j in range(len(low)):

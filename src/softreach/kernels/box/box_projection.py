@@ -27,17 +27,9 @@ _FLAT = 0.1  # part of the slope at the start of a step at which its end is good
 
 @kernel
 def project(center, slope, wanted, softness, low, high, out, multiplier):
-    """Write x into `out` (n, m) and y into `multiplier` (n, 3).
+    """Write x into `out` (n, m) and y into `multiplier` (n, 3), 0 before where nothing is known.
 
-    Args:
-        center: c, shape (n, m).
-        slope: A, shape (n, 3, m).
-        wanted: b, shape (n, 3).
-        softness: s > 0, shape (n,).
-        low: Lower bounds, shape (n, m).
-        high: Upper bounds, shape (n, m).
-        out: x, shape (n, m).
-        multiplier: y to begin with, 0 where nothing is known, and then y, shape (n, 3).
+    Of centers c (n, m), slopes A (n, 3, m), wanted b (n, 3), softness s > 0 (n,), bounds (n, m).
     """
     problems = center, slope, wanted, softness, low, high
     side = np.zeros(center.shape[1], np.int8)
@@ -183,12 +175,10 @@ def _quadratic(wanted, softness, n, y):
 
 @inline
 def dual(problems, n, y, out, side):
-    """The dual function, its gradient and minus its Hessian at y; x is written.
+    """The dual function, its gradient and the lower half of minus its Hessian at y; x is written.
 
-    Returns:
-        Value; gradient; the lower half of minus the Hessian, row by row; and whether a variable is
-        at another side of the box than `side` says: -1 at the lower one, 1 at the upper one, 0
-        between them; it is written too.
+    And whether a variable is at another side of the box than `side` says, which is written, too: -1
+    at the lower one, 1 at the upper one, 0 between them.
     """
     center, slope, wanted, softness, low, high = problems
     value, changed, s = _quadratic(wanted, softness, n, y), False, softness[n]
@@ -245,19 +235,10 @@ def newton(gram, error):
 
 @kernel
 def near_cells(tips, slopes, radii, errors, target, distance, out):
-    """Write the numbers of the cells that may come within `distance` of a target into `out`.
+    """Number of the cells that may come within a distance of a target (3,), listed in `out` (n,).
 
-    Args:
-        tips: At the centers, shape (n, 3).
-        slopes: Jacobians times half widths, shape (n, 3, m).
-        radii: Sums of the lengths of their columns, shape (n,).
-        errors: Largest distance of a tip from its linearization, shape (n,).
-        target: Shape (3,).
-        distance: Cells farther than this are left out.
-        out: Room for all, shape (n,).
-
-    Returns:
-        Number of them.
+    Cells have tips (n, 3) at their centers, slopes (n, 3, m) times half widths, radii (n,), the
+    sums of the lengths of their columns, and errors (n,) of the linearization.
     """
     count = 0
     p = target[0], target[1], target[2]

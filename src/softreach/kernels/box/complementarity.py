@@ -23,13 +23,8 @@ _SINGULAR = 1e-11  # of a diagonal element, below which a pivot is rounding
 def complementary(matrix, wanted, out, active, solved):
     """Write x into `out` (n, m), whether each may differ from 0 into `active`, and its success.
 
-    Args:
-        matrix: A, shape (n, m, m), or (1, m, m) for one that all samples share; every x >= 0 with
-            A x = 0 is 0, else a function without a minimum is told as not solved.
-        wanted: b, shape (n, m).
-        out: x, shape (n, m).
-        active: Shape (n, m), of int8.
-        solved: Shape (n,), of int8.
+    Of matrices A (n, m, m), or (1, m, m) for all, and b (n, m). A function without a minimum, as
+    where A x = 0 has solutions x >= 0 but 0, is not solved; `active` and `solved` are of int8.
     """
     count = wanted.shape[1]
     factor, solution = np.zeros((count, count)), np.zeros(count)
@@ -92,11 +87,7 @@ def _most_violated(a, b, x, free):
 
 @inline
 def _descended(a, b, x, free, size, room):
-    """Minimize with the variables order[: size + 1] free, the last of which has just become so.
-
-    Variables that would become negative leave. Returns how many are free then; -1 without a
-    minimum.
-    """
+    """Minimize with order[: size + 1] free; the number that is left, -1 without a minimum."""
     factor, solution, order, _ = room
     kept, entering = size, order[size]
     size += 1
@@ -138,10 +129,7 @@ def _stepped(x, order, size, solution):
 
 @inline
 def _factored(a, order, kept, size, factor):
-    """Cholesky of A over the free variables, of which the first `kept` rows are known.
-
-    False where the last of them depends on the others.
-    """
+    """Cholesky of A over the free variables from row `kept`; False if the last is dependent."""
     for i in range(kept, size):
         for j in range(i + 1):
             total = a[order[i], order[j]]
@@ -172,10 +160,7 @@ def _substituted(factor, size, values):
 
 @inline
 def _toward_null(a, x, size, room):
-    """A far point along v with A v = 0, where the last free variable depends on the others.
-
-    The function falls along v until a variable becomes 0; False where none does.
-    """
+    """A far point along v with A v = 0, where the function falls; False if it falls for ever."""
     factor, solution, order, null = room
     last = order[size - 1]
     for i in range(size - 1):

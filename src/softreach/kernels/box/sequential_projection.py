@@ -15,12 +15,10 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-NOWHERE = 1e100
-"""Coordinate of tips that do not count."""
+NOWHERE = 1e100  # coordinate of tips that do not count
 FIRST_PROXIMITY = 0.3
 _LEAST_PROXIMITY, _LARGEST_PROXIMITY = -0.7, 1e7
-LONGEST_STEP = 0.5
-"""In ranges."""
+LONGEST_STEP = 0.5  # in ranges
 _MET = 1e-2  # part of a miss that may be left where the linearized target is met
 _MISS = 1e-9  # in L, that counts as none
 _CREDIBLE = 1e4  # penalty above which the multiplier says no more than that nothing meets it
@@ -35,61 +33,33 @@ _NEARBY = 1e-3  # miss in L
 class Running(NamedTuple):
     """Searches side by side, scaled with L, and the step each takes next."""
 
-    row: np.ndarray
-    """Number of the search, shape (n,), int64."""
-    steps: np.ndarray
-    """Steps it has taken, shape (n,), int64."""
-    gamma: np.ndarray
-    """Present points [-], shape (n, m)."""
-    miss: np.ndarray
-    """(tip - target)/L there, shape (n, 3)."""
-    slope: np.ndarray
-    """(∂r/∂γ)/L there, shape (n, 3, m)."""
-    penalty: np.ndarray
-    """Penalty of a miss of L, beside ½|γ - near|², shape (n,)."""
-    proximity: np.ndarray
-    """σ: ½σ|step|² is added to what a step minimizes, shape (n,)."""
-    reach: np.ndarray
-    """Longest step, in ranges, shape (n,)."""
-    weight: np.ndarray
-    """Penalty by which the step under trial is judged, shape (n,)."""
-    gain: np.ndarray
-    """Decrease promised by the step under trial, shape (n,)."""
-    center: np.ndarray
-    """Least of what the step minimizes without the target [-], shape (n, m)."""
-    wanted: np.ndarray
-    """Wanted values of the linearized map, shape (n, 3)."""
-    softness: np.ndarray
-    """Of the linearized target, shape (n,)."""
-    low: np.ndarray
-    """Lower bounds of the step's end, shape (n, m)."""
-    high: np.ndarray
-    """Upper bounds of the step's end, shape (n, m)."""
-    trial: np.ndarray
-    """Activations to evaluate next [-], shape (n, m)."""
-    multiplier: np.ndarray
-    """Of the linearized target, over 1 + σ, shape (n, 3)."""
+    row: np.ndarray  # number of the search, (n,), int64
+    steps: np.ndarray  # steps it has taken, (n,), int64
+    gamma: np.ndarray  # present points [-], (n, m)
+    miss: np.ndarray  # (tip - target)/L there, (n, 3)
+    slope: np.ndarray  # (∂r/∂γ)/L there, (n, 3, m)
+    penalty: np.ndarray  # penalty of a miss of L, beside ½|γ - near|², (n,)
+    proximity: np.ndarray  # σ: ½σ|step|² is added to what a step minimizes, (n,)
+    reach: np.ndarray  # longest step, in ranges, (n,)
+    weight: np.ndarray  # penalty by which the step under trial is judged, (n,)
+    gain: np.ndarray  # decrease promised by the step under trial, (n,)
+    center: np.ndarray  # least of what the step minimizes without the target [-], (n, m)
+    wanted: np.ndarray  # wanted values of the linearized map, (n, 3)
+    softness: np.ndarray  # of the linearized target, (n,)
+    low: np.ndarray  # lower bounds of the step's end, (n, m)
+    high: np.ndarray  # upper bounds of the step's end, (n, m)
+    trial: np.ndarray  # activations to evaluate next [-], (n, m)
+    multiplier: np.ndarray  # of the linearized target, over 1 + σ, (n, 3)
 
 
 @kernel
 def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, ends):
-    """Take in the trials of the first n, and set up the next steps of those that go on.
+    """Take in the trials of the first n; set up the next steps and return how many of them go on.
 
-    Args:
-        running: The searches; those that go on become the first.
-        n: Number of those that run.
-        tips: Of their trials [m], shape (n, 3).
-        ahead: ∂r/∂γ of their trials [m], shape (n, 3, m).
-        owner: Number of the target of all searches, shape (all,).
-        targets: Shape (t, 3) [m].
-        near: To stay near to [-], shape (t, m).
-        box: Lower and upper bounds and ranges, shape (m,) each.
-        length: L [m].
-        limits: Step at which a search has settled, in ranges, and the most steps.
-        ends: Activations, |tip - target|/L, merits, σ and penalties at the ends of all searches.
-
-    Returns:
-        Number of those that go on.
+    Trials have tips (n, 3) and ∂r/∂γ `ahead` (n, 3, m); owners (all,) are the targets (t, 3) of all
+    searches, which stay near to activations (t, m). `box` holds bounds and ranges, `limits` the
+    step in ranges at which a search has settled and the most steps, and `ends` receives
+    activations, |tip - target|/L, merits, σ and penalties.
     """
     kept = 0
     for i in range(n):
@@ -121,10 +91,7 @@ def judge(running, n, tips, ahead, owner, targets, near, box, length, limits, en
 
 @inline
 def _judged(running, i, miss, ahead, near, scales, length, settled):
-    """Whether a trial is accepted, whether its search has ended; σ, reach and ratio of the next.
-
-    The ratio is that of the multipliers.
-    """
+    """Whether a trial is accepted, or its search ended; next σ, reach and ratio of multipliers."""
     weight, sigma, reach, ratio = running.weight[i], running.proximity[i], running.reach[i], 0.0
     after, step, square, bend = weight * miss, 0.0, 0.0, 0.0
     for j in range(len(scales)):
@@ -218,14 +185,7 @@ def _merit(running, i, near, penalty):
 
 @kernel
 def next_trials(running, n, owner, near):
-    """Decrease promised by the steps of the first n, with the penalty of their multipliers.
-
-    Args:
-        running: The searches, with ends and multipliers of their steps.
-        n: Number of those that run.
-        owner: Number of the target of all searches, shape (all,).
-        near: To stay near to [-], shape (t, m).
-    """
+    """Decrease promised by the steps of the first n, with the penalty of their multipliers."""
     for i in range(n):
         target, foreseen = owner[running.row[i]], 0.0
         x, y, z = running.miss[i, 0], running.miss[i, 1], running.miss[i, 2]

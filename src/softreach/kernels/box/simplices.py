@@ -1,9 +1,8 @@
 """Simplices of a grid of boxes: the triangulation of Freudenthal and Kuhn, in any dimension.
 
 A corner of the unit cube is a bit mask: bit j is its coordinate along axis j. A k-face of the
-triangulation of all of space is a vertex v of the grid and a chain of corners
-0 = S0 < S1 < ... < Sk, each contained in the next: its vertices are v + S0, ..., v + Sk. As v is
-the least of them, every face of the whole triangulation has one v and one chain: listed once.
+triangulation is a least vertex v of the grid and a chain of corners 0 = S0 < S1 < ... < Sk, each
+contained in the next: its vertices are v + S0, ..., v + Sk.
 
 References:
     Freudenthal (1942), Simplizialzerlegungen von beschränkter Flachheit, Ann. Math. 43, 580-582.
@@ -22,13 +21,10 @@ Ints = NDArray[np.int64]
 
 @lru_cache(maxsize=32)
 def chains(m: int, k: int) -> Ints:
-    """Chains of corners of the m-cube that give the k-faces with least vertex 0.
+    """Chains of corners (count, k + 1) that give the k-faces of the m-cube with least vertex 0.
 
     A face is in a grid if v + Sk is: chains whose last corner leaves out axis j also start at the
     last vertices along j.
-
-    Returns:
-        Corners as bit masks, the first 0, shape (count, k + 1), read-only.
     """
     longer = [(0,)]
     for _ in range(k):
@@ -44,10 +40,7 @@ def chains(m: int, k: int) -> Ints:
 
 
 def kuhn_simplices(m: int) -> Ints:
-    """The m! simplices of the unit m-cube, as corners (bit masks), shape (m!, m + 1).
-
-    All go from corner 0 to the opposite one, along the axes in every order.
-    """
+    """The simplices (m!, m + 1) from corner 0 to the opposite one, along axes in every order."""
     return chains(m, m)
 
 

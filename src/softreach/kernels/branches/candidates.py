@@ -27,8 +27,7 @@ from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.image.activation_mesh import axes_of, image_faces, orientation, tetrahedron
 from softreach.kernels.vector import combination, cross, dot, matrix, minus, plus, row, times
 
-MOST_STARTS = 1024
-"""Starts kept for one target; a fold to a point has a whole curve of them."""
+MOST_STARTS = 1024  # starts kept for one target; a fold to a point has a whole curve of them
 
 _DISTINCT = 0.1  # starts nearer than this, in widths of their cells, lead to one solution
 _MARGIN = 2.0  # remainders by which a target may lie outside the image of a tetrahedron
@@ -39,23 +38,11 @@ _ASIDE = 0.1  # how far from each other vertex a search near one begins
 
 
 def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, inverse):
-    """Activations near each solution of the targets, until the arrays are full.
+    """Activations near each solution of the targets (t, 3), until the arrays are full.
 
-    Args:
-        mesh: Cells of the activation box.
-        tree: Octree of their images.
-        targets: Targets [m], shape (t, 3).
-        low: Lower bounds, shape (3,).
-        high: Upper bounds, shape (3,).
-        with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
-        target: Filled with the number of each start's target.
-        cell: Filled with its cell.
-        start: Filled with the activation, shape (room, 3).
-        inverse: Filled with the inverse of the quadratic's Jacobian near it [1/m], zero where it is
-            singular, shape (room, 3, 3).
-
-    Returns:
-        Number of targets that are done, and of starts found.
+    Filled with each start's target, cell, activation (room, 3) and the inverse (room, 3, 3) [1/m]
+    of the quadratic's Jacobian, 0 where singular. `with_root` leaves out tetrahedra whose quadratic
+    does not reach the target. Numbers of targets that are done, and of starts.
     """
     # Memory that a kernel makes takes longer to compile.
     room = quadratic(), np.empty(MOST_STARTS), np.empty(_AT_ONCE, np.int32)
@@ -90,17 +77,8 @@ def _find_starts(
                     if (reached or not with_root) and _is_new(
                         mesh, c, guess, det, start, side, first, count
                     ):
-                        _put(
-                            guess,
-                            q,
-                            axes,
-                            orientation(which) * det,
-                            low,
-                            high,
-                            count,
-                            start,
-                            inverse,
-                        )
+                        turn = orientation(which) * det
+                        _put(guess, q, axes, turn, low, high, count, start, inverse)
                         target[count], cell[count], side[count - first] = t, c, det
                         count += 1
     return targets.shape[0], count
@@ -211,12 +189,9 @@ _ROUNDING = 1e-6  # in barycentric units
 class Quadratic(NamedTuple):
     """Of one tetrahedron at a time; all arrays are written."""
 
-    value: np.ndarray
-    """gi - p [m], p being the target, shape (4, 3)."""
-    change: np.ndarray
-    """Dij [m], shape (4, 3, 3)."""
-    width: np.ndarray
-    """The lengths of the edges along their axes, with sign [-], shape (3,)."""
+    value: np.ndarray  # gi - p [m], p being the target, (4, 3)
+    change: np.ndarray  # Dij [m], (4, 3, 3)
+    width: np.ndarray  # the lengths of the edges along their axes, with sign [-], (3,)
     gradient: np.ndarray
     """Of each sj in space, times the determinant of ∂f/∂s, at the last step, shape (3, 3)."""
 
@@ -244,11 +219,9 @@ def expand(mesh, v, axes, p, q):
 
 @inline
 def refine(q, weights, remainder):
-    """Follow Newton's method from barycentric coordinates to where f is the target.
+    """Newton's method from barycentric coordinates to where f is the target, but for a cubic rest.
 
-    Returns:
-        Whether it is reached but for the cubic rest, the barycentric coordinates, and the
-        determinant of ∂f/∂s at the last step.
+    Whether it is reached, the coordinates, and the determinant of ∂f/∂s at the last step.
     """
     s = (1.0 - weights[0], weights[2] + weights[3], weights[3])
     det, size = 0.0, 0.0
@@ -307,10 +280,7 @@ def _step(q, s, miss, a):
 
 @inline
 def is_inside(q, weights, det, margin):
-    """True if a target can lie in the image of a tetrahedron that is off by so much at most.
-
-    Each barycentric coordinate then changes by no more than its gradient in space times that.
-    """
+    """True if a target can lie in the image of a tetrahedron that is off by so much at most."""
     for i in range(4):
         outside = -weights[i] - _ROUNDING
         if outside > 0.0:

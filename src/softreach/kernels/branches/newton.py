@@ -41,30 +41,19 @@ _EXPONENT = 0x7FF0000000000000  # bits of a double that are all set where it is 
 class Search(NamedTuple):
     """The state of every search."""
 
-    target: np.ndarray
-    """Targets [m], shape (n, 3)."""
-    gamma: np.ndarray
-    """Best activations so far [-], shape (n, 3)."""
-    slope: np.ndarray
-    """Position Jacobians there [m], shape (n, 3, 3)."""
-    residual: np.ndarray
-    """|tip - target| there [m], shape (n,)."""
-    step: np.ndarray
-    """Newton step from there [-], shape (n, 3)."""
-    damping: np.ndarray
-    """The damping factor of the step under trial, (0, 1], shape (n,)."""
-    trial: np.ndarray
-    """Activations to evaluate next [-], shape (n, 3)."""
-    state: np.ndarray
-    """RUNNING, CONVERGED or STAGNATED, shape (n,)."""
+    target: np.ndarray  # targets [m], (n, 3)
+    gamma: np.ndarray  # best activations so far [-], (n, 3)
+    slope: np.ndarray  # position Jacobians there [m], (n, 3, 3)
+    residual: np.ndarray  # |tip - target| there [m], (n,)
+    step: np.ndarray  # Newton step from there [-], (n, 3)
+    damping: np.ndarray  # the damping factor of the step under trial, (0, 1], (n,)
+    trial: np.ndarray  # activations to evaluate next [-], (n, 3)
+    state: np.ndarray  # RUNNING, CONVERGED or STAGNATED, (n,)
 
 
 @kernel
 def newton_step(search, active, tips, slopes, low, high, tol):
-    """Take in the tips and slopes of the active searches' trials and set their next trials.
-
-    A trial whose tip is NaN has failed, as one that comes no nearer has.
-    """
+    """Take in tips and slopes of active trials and set the next; a tip that is NaN has failed."""
     bits = tips.view(np.int64)
     for k in range(active.shape[0]):
         n = active[k]
@@ -141,10 +130,7 @@ def _length(step, n, low, high):
 
 @kernel
 def conditions(slopes, smallest, condition):
-    """Smallest singular value and condition number of 3x3 matrices.
-
-    Largest eigenvalues alone are accurate in closed form, so σ_min is 1/σ_max of the inverse.
-    """
+    """Smallest singular value, as 1/σ_max of the inverse, and condition number of 3x3 matrices."""
     for n in range(slopes.shape[0]):
         a = matrix(slopes, n)
         c = cofactors(a)
@@ -194,21 +180,11 @@ _ITERATIONS = 3  # of inverse iteration, which near a fold gains many digits eac
 
 @kernel
 def second_preimages(mesh, cell, gamma, slope, smallest, reach, overshoot, low, high, start, near):
-    """Near the second preimage of each solution, and whether that is within reach.
+    """Starts (n, 3) near the second preimage of each solution, and whether that is within reach.
 
-    Args:
-        mesh: Cells of the activation box.
-        cell: Cell of each solution, shape (n,).
-        gamma: Solutions, shape (n, 3).
-        slope: Jacobians there [m], shape (n, 3, 3).
-        smallest: Their smallest singular values [m], shape (n,).
-        reach: Largest move of a solution, in widths of its cell.
-        overshoot: Put for 2 in -2σ/κ. From beyond the other root Newton's method converges
-            to it, from short of it perhaps back to the one that is known.
-        low: Lower bounds, shape (3,).
-        high: Upper bounds, shape (3,).
-        start: Filled with activations, shape (n, 3).
-        near: Filled with whether they are within reach, shape (n,).
+    Solutions have a cell, an activation `gamma` (n, 3), slopes (n, 3, 3) and their smallest
+    singular value (n,); they move by `reach` widths of the cell at most. The overshoot is put for 2
+    in -2σ/κ: from short of the other root Newton's method may converge to the known one.
     """
     for n in range(gamma.shape[0]):
         c = cell[n]

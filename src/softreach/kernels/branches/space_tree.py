@@ -13,22 +13,14 @@ from softreach.kernels.vector import row
 class SpaceTree(NamedTuple):
     """Nodes are cubes; a node's eight children follow each other, x slowest."""
 
-    planes: np.ndarray
-    """Faces of the tetrahedra, n·p >= d within [m], shape (tetrahedron, 4, 4)."""
-    boxes: np.ndarray
-    """Boxes round the images of cells of six tetrahedra each [m], shape (cell, 2, 3)."""
-    low: np.ndarray
-    """Lowest corner of the root [m], shape (3,)."""
-    size: float
-    """Edge of the root [m]."""
-    child: np.ndarray
-    """First child of each node, 0 for a leaf."""
-    first: np.ndarray
-    """Beginning of a leaf's tetrahedra in `item`."""
-    length: np.ndarray
-    """Number of its tetrahedra."""
-    item: np.ndarray
-    """Tetrahedra, leaf after leaf."""
+    planes: np.ndarray  # faces of the tetrahedra, n·p >= d within [m], (tetrahedron, 4, 4)
+    boxes: np.ndarray  # boxes round the images of cells of six tetrahedra each [m], (cell, 2, 3)
+    low: np.ndarray  # lowest corner of the root [m], (3,)
+    size: float  # edge of the root [m]
+    child: np.ndarray  # first child of each node, 0 for a leaf
+    first: np.ndarray  # beginning of a leaf's tetrahedra in `item`
+    length: np.ndarray  # number of its tetrahedra
+    item: np.ndarray  # tetrahedra, leaf after leaf
 
 
 @inline
@@ -90,18 +82,10 @@ def _is_beyond(planes, k, i, p):
 def sort_into_children(planes, boxes, corner, edge, first, count, item, meets, counts, starts, out):
     """Sort the items of nodes into their eight children: first counted, then listed.
 
-    Args:
-        planes: Faces of the tetrahedra.
-        boxes: Boxes round their cells, shape (cell, 2, 3).
-        corner: Lowest corners of the nodes, shape (node, 3).
-        edge: Edge of a child.
-        first: Beginning of each node's items in `item`.
-        count: Number of each node's items.
-        item: Items of the nodes.
-        meets: A bit for each child that an item may meet, of uint8; filled when counting.
-        counts: Filled with the items of each child, shape (node, 8).
-        starts: Beginning of each child's items in `out`, shape (node, 8).
-        out: Receives the items, with room for one more; empty to count only.
+    Nodes have lowest corners (node, 3) and `count` items from `first` on; a child has an edge.
+    `meets` has a bit for each child that an item may meet, filled when counting; `counts` (node, 8)
+    is filled with the items of each child, which begin at `starts` (node, 8) in `out`: empty to
+    count only, else with room for one more.
     """
     for n in range(corner.shape[0]):
         p, begin, end = row(corner, n), first[n], first[n] + count[n]
@@ -111,9 +95,7 @@ def sort_into_children(planes, boxes, corner, edge, first, count, item, meets, c
         for o in range(8):
             size = 0
             for entry in range(begin, end):
-                if out.shape[
-                    0
-                ]:  # without a branch: the next item takes the place of one that misses
+                if out.shape[0]:  # the next item takes the place of one that misses
                     out[starts[n, o] + size] = item[entry]
                 size += meets[entry] >> o & 1
             counts[n, o] = size
@@ -121,10 +103,7 @@ def sort_into_children(planes, boxes, corner, edge, first, count, item, meets, c
 
 @inline
 def _children_met(planes, boxes, k, p, edge):
-    """A bit for each child that tetrahedron k may meet as far as its box and faces tell.
-
-    The products of its normals with the children's centers are shared.
-    """
+    """A bit for each child that tetrahedron k may meet as far as its box and faces tell."""
     half, c = 0.5 * edge, k // 6
     x, y = _sides_met(boxes, c, 0, p, edge), _sides_met(boxes, c, 1, p, edge)
     z = _sides_met(boxes, c, 2, p, edge)

@@ -6,8 +6,7 @@ import math
 
 from softreach.kernels.compiler import inline, kernel
 
-MOST_IN_BINS = 1024
-"""Seeds that are looked at for one target, a power of two."""
+MOST_IN_BINS = 1024  # seeds that are looked at for one target, a power of two
 _MET = 0.1  # part of the squared way to a target that may be left
 _LONG = 0.4  # step, in ranges, of which the linear map says little
 _FAR = 1e6
@@ -16,14 +15,9 @@ _GONE = (1 << 63) - 1  # key of what counts no more
 
 @kernel
 def choose_apart(points, scales, most, least_distance, chosen):
-    """Choose each point that lies apart from those chosen before it, until there are `most`.
+    """Choose (t, k) of points (t, k, m), best first, those that lie apart, up to `most` of a set.
 
-    Args:
-        points: Candidates of each set, best first, shape (t, k, m).
-        scales: By which distances along each axis are measured, shape (m,).
-        most: Largest number of one set.
-        least_distance: The largest component of the distance between two is to exceed it.
-        chosen: Whether each is chosen, shape (t, k).
+    The largest component of the distance, over `scales` (m,), is to exceed the least one.
     """
     for t in range(points.shape[0]):
         count = 0
@@ -50,21 +44,12 @@ def choose_in_bins(seeds, first, shape, targets, near, box, wanted, least_distan
     the bounds allow, where those that come there without a long way are before those that do not;
     and from seeds as they are.
 
-    Args:
-        seeds: Bin by bin, in columns: activation, tip, slopes in ranges by axis, and the lower half
-            of the inverse of their Gram matrix, shape (n, 4 m + 9). Lengths are in widths of a bin,
-            from the corner of the first.
-        first: The first row of each bin, and n, shape (bins + 1,).
-        shape: Numbers of bins along x, y and z.
-        targets: In widths, shape (t, 3).
-        near: Activations to which the chosen are nearest, shape (t, m).
-        box: Lower and upper bounds and ranges, shape (m,) each.
-        wanted: Seeds to look at, at least.
-        least_distance: The largest component of the distance between two chosen is to exceed it.
-        room: Scratch for rows, shape (most,), of which some are left out if there are more; for
-            activations, those moved first, shape (2, m, most); for their keys, shape (2, most), as
-            numbers and as the integers that are ordered as these; for distances, shape (most,).
-        starts: Chosen activations, those moved first, NaN for none, shape (t, 2, chosen, m).
+    Seeds (n, 4 m + 9) come bin by bin: activation, tip, slopes in ranges by axis, and the lower
+    half of the inverse of their Gram matrix; lengths are in widths of a bin, from the corner of the
+    first, and so are targets (t, 3). `first` (bins + 1,) holds the first row of each bin, `near`
+    (t, m) the activations to be near to, `box` bounds and ranges; `wanted` seeds are looked at.
+    `room` is scratch for rows, moved and other ends, their keys as numbers and as integers in the
+    same order, and distances; `starts` (t, 2, chosen, m) is NaN for none.
     """
     rows, ends, (keys, ordered), away = room
     for t in range(targets.shape[0]):

@@ -33,20 +33,15 @@ _QUARTIC_SHARE = 0.005  # of the linear error, where cubic differences vanish by
 class ActivationMesh(NamedTuple):
     """Cells of the activation box and their images."""
 
-    gamma: np.ndarray
-    """Vertices [-], shape (vertex, 3)."""
-    tip: np.ndarray
-    """Their tips [m], shape (vertex, 3)."""
-    slope: np.ndarray
-    """Their position Jacobians [m], shape (vertex, 3, 3)."""
-    corner: np.ndarray
-    """Vertices of each cell, bit j of a corner along axis j, shape (cell, 8)."""
+    gamma: np.ndarray  # vertices [-], (vertex, 3)
+    tip: np.ndarray  # their tips [m], (vertex, 3)
+    slope: np.ndarray  # their position Jacobians [m], (vertex, 3, 3)
+    corner: np.ndarray  # vertices of each cell, bit j of a corner along axis j, (cell, 8)
     interpolation_error: np.ndarray
     """Largest distance of the true image from the linear one [m], shape (cell,)."""
     remainder: np.ndarray
     """Its largest distance from the quadratic through tips and Jacobians [m], shape (cell,)."""
-    slope_change: np.ndarray
-    """Largest change of the Jacobian across the cell [m], shape (cell,)."""
+    slope_change: np.ndarray  # largest change of the Jacobian across the cell [m], (cell,)
 
 
 @kernel
@@ -55,10 +50,8 @@ def interpolation_errors(gamma, tip, slope, corner, error, remainder):
 
     On a simplex a quadratic differs from its linear interpolant by ½ Σ λi λj f''[eij, eij], i < j,
     with Σ λi λj <= 3/8, hence by at most 3/16 of the largest |f''[e, e]| = |ΔJ e| of its edges.
-    For quadratics the result is therefore a bound, 1.25 times the sharp one. For other maps ΔJ e is
-    the mean of f''[e, e] along the edge and the result is an estimate, not a bound: it fails where
-    f'' changes across one cell by more than its own size, as at an inflection of x³, where ΔJ = 0.
-    `design/inverse.md` has what was measured on arms.
+    For quadratics the result is a bound, 1.25 times the sharp one; for other maps an estimate that
+    fails where f'' changes across one cell by more than its own size (`design/inverse.md`).
 
     Of cubics the quadratic Σ λi (fi + ½ Ji (x - xi)) is off by Σ λi f'''[di, di, di]/12 with
     di = xi - x; what the trapezoidal rule leaves of an edge, |Δf - ½ (Ja + Jb) e|, is

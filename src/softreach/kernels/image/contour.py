@@ -41,8 +41,7 @@ class Star(NamedTuple):
     apexes: Ints
     """For each tetrahedron on it: axes along which it needs room above and below (bits), step to
     its fourth vertex, orientation in the box; (k, 4)."""
-    ranges: Ints
-    """The apexes of triangle i are those from ranges[i] to ranges[i + 1]; (t + 1,)."""
+    ranges: Ints  # the apexes of triangle i are those from ranges[i] to ranges[i + 1]; (t + 1,)
 
 
 @lru_cache(maxsize=16)
@@ -79,15 +78,7 @@ def _inside(small: int, large: int) -> bool:
 
 @strict
 def stretches(points, cells):
-    """Eight times det J at the vertices, per cell, from the differences of their neighbors.
-
-    Args:
-        points: Mapped vertices, shape (n, 3), in the C order of the grid.
-        cells: Number of cells along each axis, shape (3,).
-
-    Returns:
-        Shape (n,).
-    """
+    """Eight times det J at mapped vertices (n, 3), per cell, from differences of neighbors."""
     rows, layer = cells[2] + 1, (cells[1] + 1) * (cells[2] + 1)
     out = np.empty(len(points))
     for v in range(len(points)):
@@ -113,23 +104,13 @@ def slope(points, v, at, cells, step):
 
 @strict
 def critical_triangles(points, stretches, cells, left_out, first, last, star, out):
-    """Triangles with least vertex in first..last around which the mapped tetrahedra do not balance.
+    """Number of triangles with least vertex in first..last around which the images do not balance.
 
-    Args:
-        points: Mapped vertices, whole numbers, shape (n, 3), in the C order of the grid.
-        stretches: det J at the vertices in whole numbers, whose sum says which orientation a
-            tetrahedron should have, shape (n,).
-        cells: Number of cells along each axis, shape (3,).
-        left_out: Whether the cell with least vertex v has no image, shape (n,).
-        first: First vertex of this task.
-        last: One past its last.
-        star: Star of one vertex, as of `stars`.
-        out: Result, one row a triangle: its three vertices; tetrahedra on the side of its normal
-            (b - a) × (c - a) minus those on the other, each 1 if oriented as it should be, else
-            -1; the same with 1 if it keeps the orientation, else -1.
-
-    Returns:
-        Number of rows written.
+    Points are mapped vertices (n, 3) in whole numbers and the C order of the grid; the sum of their
+    stretches, det J in whole numbers, says which orientation a tetrahedron should have; cells with
+    least vertex in `left_out` (n,) have no image. Rows of `out` hold the three vertices; tetrahedra
+    on the side of its normal (b - a) × (c - a) minus those on the other, each 1 if oriented as it
+    should be, else -1; the same with 1 if it keeps the orientation, else -1.
     """
     triangles, apexes, ranges = star
     count = 0

@@ -9,7 +9,6 @@ counts as behind it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,35 +22,18 @@ Ints = NDArray[np.int64]
 class Crossings(NamedTuple):
     """Crossings of lines of sight and critical triangles, one row each."""
 
-    column: Ints
-    """Number of the line, (i, j) as i · width + j."""
-    center: Ints
-    """Number of the first cell center behind it, or on it."""
-    height: NDArray[np.float64]
-    """Position along the line, in cells."""
-    cover: Ints
-    """By how much the number of covering tetrahedra grows there."""
-    degree: Ints
-    """By how much the sum of their orientations grows there."""
-    triangle: Ints
-    """Number of the triangle."""
+    column: Ints  # number of the line, (i, j) as i · width + j
+    center: Ints  # number of the first cell center behind it, or on it
+    height: NDArray[np.float64]  # position along the line, in cells
+    cover: Ints  # by how much the number of covering tetrahedra grows there
+    degree: Ints  # by how much the sum of their orientations grows there
+    triangle: Ints  # number of the triangle
 
 
 def empty_crossings(size: int) -> Crossings:
     """Room for as many crossings."""
     column, center, cover, degree, triangle = np.empty((5, size), np.int64)
     return Crossings(column, center, np.empty(size), cover, degree, triangle)
-
-
-def first_crossings(crossing: Crossings, size: int) -> Crossings:
-    """The rows that were written."""
-    return Crossings(*(field[:size] for field in crossing))  # pyright: ignore[reportArgumentType]
-
-
-def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
-    """The rows of all parts."""
-    fields = zip(empty_crossings(0), *parts, strict=True)
-    return Crossings(*(np.concatenate(rows) for rows in fields))
 
 
 @strict
@@ -67,18 +49,10 @@ def most_crossings(points, triangles, unit, p, q):
 
 @strict
 def crossings(points, triangles, unit, axis, width, out):
-    """Cross all triangles with the lines of sight through the cell centers, parallel to an axis.
+    """Cross all triangles with lines of sight through cell centers along an axis; return how many.
 
-    Args:
-        points: Mapped vertices, whole numbers, shape (n, 3); cell centers are multiples of `unit`.
-        triangles: Rows of `critical_triangles`.
-        unit: Size of a cell, a power of two.
-        axis: Direction of the lines; the other two follow it cyclically.
-        width: Number of cells along the last of the other two.
-        out: Result, of type `Crossings`.
-
-    Returns:
-        Number of crossings written.
+    Points (n, 3) are whole numbers, of which cell centers are multiples of `unit`, a power of two;
+    triangles are rows of `critical_triangles`; `width` cells lie along the axis before, cyclically.
     """
     p, q = (axis + 1) % 3, (axis + 2) % 3
     count = 0
@@ -129,10 +103,7 @@ def extent(points, triangles, t, axis):
 
 @strict
 def upward(points, triangles, t, p, q):
-    """A triangle's vertices, counterclockwise as seen along the line, and which way its normal was.
-
-    1 along the line, -1 against it, 0 if the line grazes it.
-    """
+    """Vertices, counterclockwise along the line; 1, -1 if turned over, 0 if the line grazes it."""
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     area = twice_area(points, a, b, points[c, p], points[c, q], p, q)
     if area < 0:
@@ -169,13 +140,7 @@ def center_behind(base, rise, area, unit):
 
 @strict
 def add_counts(crossing, counts, degrees):
-    """Cover counts at the cell centers: what was crossed on the way there.
-
-    Args:
-        crossing: Crossings with lines along the last axis of the grid.
-        counts: Result, zeros before, shape (columns, centers).
-        degrees: The same for orientations.
-    """
+    """Count cover and degrees (columns, centers), 0 before, of crossings along the last axis."""
     for e in range(len(crossing.column)):
         counts[crossing.column[e], crossing.center[e]] += crossing.cover[e]
         degrees[crossing.column[e], crossing.center[e]] += crossing.degree[e]
@@ -187,16 +152,9 @@ def add_counts(crossing, counts, degrees):
 
 @strict
 def bin_triangles(points, triangles, unit, shape):
-    """Triangles over each square of a grid in x and y.
+    """Triangles over each of shape[0] x shape[1] squares in x and y, of an edge `unit`.
 
-    Args:
-        points: Mapped vertices, whole numbers, shape (n, 3).
-        triangles: Rows of `contour.critical_triangles`.
-        unit: Edge of a square.
-        shape: Number of squares along x and y.
-
-    Returns:
-        Triangles of square 0, of square 1, ..., and where each square's begin.
+    Returned are those of square 0, of square 1, ..., and where each square's begin.
     """
     starts = np.zeros(shape[0] * shape[1] + 1, np.int64)
     for t in range(len(triangles)):
@@ -227,18 +185,7 @@ def squares(points, triangles, t, unit, axis):
 
 @strict
 def cover_at(points, triangles, unit, shape, members, starts, where, out):
-    """Number of tetrahedra that cover each point.
-
-    Args:
-        points: Mapped vertices, whole numbers, shape (n, 3).
-        triangles: Rows of `contour.critical_triangles`.
-        unit: Edge of a square.
-        shape: Number of squares along x and y.
-        members: From `bin_triangles`.
-        starts: From `bin_triangles`.
-        where: Points, whole numbers, shape (k, 3).
-        out: Result, shape (k,).
-    """
+    """Number (k,) of tetrahedra that cover points `where` (k, 3), by what `bin_triangles` made."""
     for n in range(len(where)):
         x, y, z = where[n, 0], where[n, 1], where[n, 2]
         i, j = int(np.floor(x / unit)), int(np.floor(y / unit))
@@ -271,12 +218,8 @@ def side_below(points, triangles, t, x, y, z):
 def claim_corners(points, number, steps, closest, owner):
     """Let each point claim the corners of its cube that none before it is as close to.
 
-    Args:
-        points: In cells from the first center, within the lattice, shape (n, 3).
-        number: Number to write where a point is closest, shape (n,).
-        steps: From a center to the next along each axis in the flat arrays, shape (3,).
-        closest: Distance in cells below which a claim counts, lowered to the closest, flat.
-        owner: Filled with the number of the closest, flat.
+    Points (n, 3) are in cells within the lattice. Where one is closer than `closest`, it is lowered
+    and its number goes to `owner`: flat arrays, in which the next centers are `steps` (3,) away.
     """
     for n in range(len(points)):
         x, y, z = points[n, 0], points[n, 1], points[n, 2]

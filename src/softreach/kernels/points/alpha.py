@@ -37,18 +37,10 @@ def measure_cells(points, cells, names, box, w, radii, least, volumes, flat):
 
     With edges a, b, c from the last vertex, 6V = a · (b × c), and the center of the sphere is at
     (a² b × c + b² c × a + c² a × b) / 12V from there. Vertices are taken in the order of their
-    names, so that rounding is the same whoever made the cell.
-
-    Args:
-        points: Coordinates in [-1, 1], shape (n, 3).
-        cells: Vertices, shape (m, 4); no cell where one is negative.
-        names: Numbers of the points, shape (n,).
-        box: Lower and upper corner; a cell counts if its center is inside or on a lower face.
-        w: Work array of the predicates.
-        radii: Result, shape (m,); inf where a cell has no volume or does not count.
-        least: Result, the least radius that rounding leaves possible, shape (m,).
-        volumes: Result, shape (m,).
-        flat: Result, whether a cell is no thicker than rounding, shape (m,).
+    names (n,), so that rounding is the same whoever made the cell. Points (n, 3) are in [-1, 1];
+    cells (m, 4) with a negative vertex are none. Radii (m,), and the least that rounding leaves
+    possible, are inf without a volume or a center inside the box or on its lower faces; a flat cell
+    is no thicker than rounding.
     """
     for t in range(len(cells)):
         radii[t], least[t], volumes[t], flat[t] = np.inf, np.inf, 0.0, False
@@ -143,14 +135,9 @@ def sphere_exact(points, i, j, k, m, w):
 
 @strict
 def boundary_faces(cells, neighbors, kept, faces, owners):
-    """Write the faces between kept cells and the rest, normals outwards; return how many.
+    """Number of faces (f, 3) between kept cells (m, 4) and the rest, outwards, and their owners.
 
-    Args:
-        cells: Vertices, shape (m, 4).
-        neighbors: Neighbors, -1 for none, shape (m, 4).
-        kept: Mask of the cells that belong to the shape, shape (m,).
-        faces: Result, with room for as many as there can be, 4 m; shape (f, 3).
-        owners: Result, the kept cell at each face, shape (f,).
+    Neighbors (m, 4) are -1 for none; there is room for 4 m faces.
     """
     count = 0
     for t in range(len(cells)):
@@ -198,15 +185,10 @@ def join_regions(neighbors, kept, solid, parent):
 
 @strict
 def join_pieces(faces, regions, solid, parent, table, inner):
-    """Mark faces that are listed twice, and join the sets on both sides.
+    """Mark faces (f, 3) that are listed twice as inner, and join the sets on both sides.
 
-    Args:
-        faces: Sorted vertices of the outer faces of all pieces, shape (f, 3).
-        regions: Set at each face, shape (f,).
-        solid: Whether each set is a region, shape (r,); changed (see `added_regions`).
-        parent: Each set itself, shape (r,); changed.
-        table: Work array of -1, its size a power of two above f.
-        inner: Result, a mask of False, shape (f,).
+    Faces are sorted vertices, `regions` their sets, `solid` and `parent` as of `added_regions`, and
+    the table holds -1 at a power of two of places above f.
     """
     for f in range(len(faces)):
         a, b, c = np.int64(faces[f, 0]), np.int64(faces[f, 1]), np.int64(faces[f, 2])
@@ -248,16 +230,9 @@ def least_radii(cells, radii, least):
 
 @strict
 def radius_of_one_region(neighbors, radii, least, solid, parent, regions, order):
-    """The first radius at which one region is left, adding further cells one after the other.
+    """The first radius at which one region is left, adding cells in an order of least radii.
 
-    Args:
-        neighbors: Neighbors, -1 for none, shape (m, 4).
-        radii: Circumscribed radii, shape (m,).
-        least: The least that rounding leaves possible, shape (m,).
-        solid: Whether each set is a region, from `join_regions`; changed.
-        parent: Sets so far, from there; changed.
-        regions: Number of regions.
-        order: The cells still to come, by increasing least radius.
+    `solid`, `parent` and the number of regions are those of `join_regions`, which change.
     """
     for k in range(len(order)):
         t = order[k]

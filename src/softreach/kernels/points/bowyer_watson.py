@@ -53,22 +53,13 @@ INSIDE, UNSURE = np.intp(-1), np.intp(-2)
 
 
 def triangulate(points, lies_on_curve, early=0, look=None):
-    """Insert points in the given order.
+    """Insert points (n, 3) in [-1, 1], multiples of 2^-200 (see `predicates`), in the given order.
 
     Points in space and on surfaces have four to eight cells each, of some thirty that are made;
-    those on a curve have as many as there are points, and near one as many are made. Such crowding
-    shows after some hundred points.
-
-    Args:
-        points: Coordinates in [-1, 1], multiples of 2^-200 (see `predicates`), shape (n, 3).
-        lies_on_curve: Called without arguments when cells crowd; True gives up.
-        early: Number of points whose own triangulation is to be seen on the way.
-        look: Called with its cells, among which are such with negative vertices, that are none.
-
-    Returns:
-        Cells (m, 4), neighbors (m, 4) with -1 outside the hull, and for every point itself or the
-        equal point inserted before it, shape (n,). No cells if the points lie in one plane, or
-        where it was given up.
+    those on a curve have as many as there are points: when cells crowd, `lies_on_curve()` gives up.
+    `look` is called with the cells of the first `early` points; those with negative vertices are
+    none. Cells (m, 4), neighbors (m, 4) with -1 outside the hull, and for every point itself or the
+    equal point inserted before it. No cells if the points lie in one plane, or it was given up.
     """
     crowded = CROWDED
     w, start, same = scratch(), np.zeros(4, np.int64), np.arange(len(points))
@@ -98,13 +89,10 @@ def triangulate(points, lies_on_curve, early=0, look=None):
 def _insert(points, mesh, start, same, edges, w, at, used, free, last, crowded, stop):
     """Insert points from number `at` up to `stop` while there is room; no cells yet if `at` is 0.
 
-    Memory is left to the caller: a kernel that asks for it takes longer to compile.
-
-    Returns:
-        The first point that was not inserted, and the walls of its cavity, or 0 if there are more
-        than `crowded` cells beside 16 for each point, or three times as many were made; slots used,
-        the head of the freed slots and the last cell, to go on with. Once all are: slots used by
-        finite cells.
+    Memory is left to the caller: a kernel that asks for it takes longer to compile. Returned are
+    the first point that was not inserted, and the walls of its cavity, or 0 if there are more than
+    `crowded` cells beside 16 for each point, or three times as many were made; slots used (by
+    finite cells in the end), the head of the freed slots and the last cell, to go on with.
     """
     if at == 0:
         used = first_cell(points, mesh, start, w)

@@ -32,14 +32,7 @@ def _place(x, low, scale):
 
 @strict
 def sort_keys(points, low, scale, keys):
-    """Keys of points.
-
-    Args:
-        points: Positions, shape (3, n).
-        low: Lower corner of all points, shape (3,).
-        scale: Cells per unit of length along each axis, shape (3,); places run along the last.
-        keys: Filled with the keys, shape (n,), int64.
-    """
+    """Keys (n,) of points (3, n) above a lower corner, in cells of a scale [1/m]; int64."""
     for i in range(len(keys)):
         y = _place(points[0, i], low[0], scale[0])
         z = _place(points[1, i], low[1], scale[1])
@@ -48,13 +41,9 @@ def sort_keys(points, low, scale, keys):
 
 @strict
 def stable_order(keys, order):
-    """Increasing keys, equal ones in the order in which they come, digit by digit from the last.
+    """Order (n,) of increasing keys >= 0, equal ones as they come, digit by digit from the last.
 
     Digits in which no two keys differ are left out: most of the 63 bits, as columns are few.
-
-    Args:
-        keys: Not below zero, shape (n,), int64.
-        order: Filled with indices, shape (n,), int64.
     """
     n, differ = len(keys), np.int64(0)
     for i in range(n):
@@ -89,16 +78,9 @@ def stable_order(keys, order):
 
 @strict
 def window_keys(along, keys, reach, low, scale, first, last):
-    """Keys between which the neighbors of each query lie in its own column.
+    """First and last key (n,) between which neighbors within reach lie in the query's own column.
 
-    Args:
-        along: The queries' coordinates along the columns, shape (n,).
-        keys: The queries' keys, shape (n,).
-        reach: Largest distance of a neighbor.
-        low: Least coordinate of all points along the columns.
-        scale: Places per unit of length along the columns.
-        first: Filled with the least key, shape (n,).
-        last: Filled with the largest key, shape (n,).
+    Of queries with coordinates `along` the columns above the least one, and places of a scale.
     """
     places = np.int64(_COLUMN - 1)
     for i in range(len(keys)):
@@ -127,15 +109,7 @@ def _first_at_least(keys, start, wanted):
 
 @strict
 def find_windows(keys, first, last, start, stop):
-    """Ranges of points in the windows of queries.
-
-    Args:
-        keys: Keys of all points in increasing order, shape (n,).
-        first: Least key of each window, in increasing order, shape (q,).
-        last: Largest key of each, in increasing order, shape (q,).
-        start: Filled with the index of the first point of each, shape (q,).
-        stop: Filled with the index behind its last one, shape (q,).
-    """
+    """Points from `start` to `stop` (q,) whose keys lie between first and last; all increase."""
     begin = end = 0
     for i in range(len(first)):
         begin = _first_at_least(keys, begin, first[i])
@@ -153,18 +127,10 @@ def neighbor_sums(m):
 
     @kernel
     def sums(points, values, places, amounts, start, stop, square, total, count):
-        """Add up |value difference| over the points of each query's window within the ball.
+        """Add |value difference| and 1 to total and count (q,) for each point in window and ball.
 
-        Args:
-            points: Positions of all points in the order of their keys, shape (3, n).
-            values: Their values, shape (m, n).
-            places: Positions of the queries, shape (q, 3).
-            amounts: Their values, shape (q, m).
-            start: Index of the first point of each window, shape (q,).
-            stop: Index behind its last one, shape (q,).
-            square: Squared radius of the closed ball.
-            total: Added to, shape (q,).
-            count: Number of points in the ball, added to, shape (q,).
+        Points (3, n) with values (m, n) are in the order of their keys, windows from `start` to
+        `stop`; queries have places (q, 3) and amounts (q, m), the closed ball a squared radius.
         """
         for i in range(len(start)):
             x, y, z = places[i, 0], places[i, 1], places[i, 2]

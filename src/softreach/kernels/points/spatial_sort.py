@@ -21,12 +21,9 @@ QUANTILES = 1024
 
 
 def insertion_order(points, members=None, early=None):
-    """Indices of points in the order in which to insert them; a part keeps the order of the whole.
+    """Order in which to insert points (n, 3), or increasing members; those of a mask `early` first.
 
-    Args:
-        points: All of them, shape (n, 3).
-        members: Increasing indices of those to be inserted; all if left out.
-        early: Mask of those that come before the others, shape (n,); none if left out.
+    A part keeps the order of the whole.
     """
     members = np.arange(len(points)) if members is None else members
     early = np.ones(len(points), np.bool_) if early is None else early
@@ -41,11 +38,7 @@ def insertion_order(points, members=None, early=None):
 
 
 def _crowding_scale(x, members):
-    """Coordinates mapped to [0, 2^BITS) so that crowded places get more room.
-
-    Half by length and half by rank among a sample: one far outlier must not squeeze all the other
-    points into one cell of the curve.
-    """
+    """Coordinates mapped to [0, 2^BITS), half by length, half by rank for the sake of outliers."""
     sample = np.sort(x[:: max(1, len(x) // QUANTILES)])
     spread = sample[-1] - sample[0]
     level = np.linspace(0.0, 1.0, len(sample))

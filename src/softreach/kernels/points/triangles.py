@@ -12,18 +12,10 @@ from softreach.kernels.strict_vector import dot, minus, row, times
 
 @strict
 def distances_to_faces(points, vertices, faces, incident, starts, near, out):
-    """Distance of each point to the nearest triangle around some vertices near it.
+    """Distance of each point (n, 3) to the nearest triangle (f, 3) around vertices near it (n, k).
 
-    Triangles without area count as segments or points.
-
-    Args:
-        points: Points, shape (n, 3).
-        vertices: Corners, shape (v, 3).
-        faces: Indices of the corners, shape (f, 3).
-        incident: Triangles around vertex 0, then around vertex 1, ..., shape (3 f,).
-        starts: Beginning of each vertex's, shape (v + 1,).
-        near: Vertices near each point, shape (n, k).
-        out: Result, shape (n,).
+    `incident` lists the triangles around vertex 0, then around vertex 1, ..., each from its start
+    (v + 1,) on. Triangles without area count as segments or points.
     """
     for i in range(len(points)):
         best, p = np.inf, row(points, i)
@@ -62,16 +54,9 @@ def segment(p, a, b):
 
 @strict
 def nearest_faces(points, vertices, faces, centers, radii, face, out):
-    """Nearest triangle of each point and the distance to it; spheres around triangles cull.
+    """Nearest triangle of each point (n, 3) and the distance to it; spheres around triangles cull.
 
-    Args:
-        points: Points, shape (n, 3).
-        vertices: Corners, shape (v, 3).
-        faces: Indices of the corners, shape (f, 3).
-        centers: Centers of spheres around the triangles, shape (f, 3).
-        radii: Radii of these, shape (f,).
-        face: Result, index of the triangle, shape (n,).
-        out: Result, distance, shape (n,).
+    These have centers (f, 3) and radii (f,).
     """
     for i in range(len(points)):
         best, near, p = np.inf, np.inf, row(points, i)
@@ -90,13 +75,10 @@ def nearest_faces(points, vertices, faces, centers, radii, face, out):
 
 @strict
 def fill_triangles(triangles, work, keys):
-    """Keep the larger key at every pixel whose center lies in a triangle.
+    """Keep the larger key, of depth above color, at every pixel whose center lies in a triangle.
 
-    Args:
-        triangles: Column, row, depth, red, green and blue at each corner, shape (n, 3, 6); pixel
-            (i, j) covers rows i to i + 1 and columns j to j + 1.
-        work: Room for twelve numbers, shape (2, 6).
-        keys: Depth above color (see `pixel_key`), shape (rows, columns); changed.
+    Triangles (n, 3, 6) have column, row, depth, red, green and blue at each corner; pixel (i, j)
+    covers rows i to i + 1 and columns j to j + 1. There is room `work` for (2, 6) numbers.
     """
     left, slope = work
     for t in range(len(triangles)):
@@ -181,15 +163,11 @@ def _side(px, py, qx, qy):
 
 @kernel
 def judge_images(images, parents, children, caution, flatness, out):
-    """Judge the quarters of triangles by the images of their corners.
+    """Judge the quarters (4 n, 3) of triangles (n, 3) by the images of all points (point, 3).
 
-    Args:
-        images: Of all points, the last coordinate along the value, shape (point, 3).
-        parents: Triangles that were cut, shape (n, 3).
-        children: Their quarters in four rounds, the last of the middles of sides, shape (4 n, 3).
-        caution: How near an image must come to the value to be cut further, in its sags.
-        flatness: Least altitude of a flat image, in sags.
-        out: Filled with verdicts, shape (4 n,).
+    These have their last coordinate along the value, quarters come in four rounds, the last of the
+    middles of sides. An image within `caution` sags of the value is cut further, until its altitude
+    is `flatness` sags.
     """
     n = parents.shape[0]
     for p in range(n):

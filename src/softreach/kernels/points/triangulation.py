@@ -182,11 +182,7 @@ def bury(mesh, t, free):
 
 @strict
 def note(mesh, t, p, edges, known):
-    """Enter new cell t of point p under the three edges of its wall.
-
-    Returns:
-        The cell and the numbers of its vertices in one, and how many have a number.
-    """
+    """Enter new cell t of point p under the edges of its wall; it and its vertices in a number."""
     a, known = numbered(edges.number, mesh.cells[t, 0], p, known)
     b, known = numbered(edges.number, mesh.cells[t, 1], p, known)
     c, known = numbered(edges.number, mesh.cells[t, 2], p, known)
@@ -215,10 +211,7 @@ def tie(mesh, noted, cells):
 
 @strict
 def link(mesh, t, i, table, size):
-    """Tie face i of new cell t to the new cell on the same edge of the cavity, once both exist.
-
-    The two walls that meet in an edge find each other in a hash table keyed by that edge.
-    """
+    """Tie face i of new cell t to the new cell on the same edge of the cavity, by a hash table."""
     a = np.int64(mesh.cells[t, (i + 1) % 3]) + 1
     b = np.int64(mesh.cells[t, (i + 2) % 3]) + 1
     key = (min(a, b) << 32) | max(a, b)

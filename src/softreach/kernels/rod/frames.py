@@ -45,14 +45,10 @@ def _turned(omega, p, s, c):
 
 @kernel
 def frames(table, ends, gamma, position, directors):
-    """Centerline and directors of n rods at stations.
+    """Centerline r (n, station, 3) and directors as rows (n, station, 3, 3) of rods at stations.
 
-    Args:
-        table: Packed node tables, (step, row, bundle + 1).
-        ends: Number of steps from the base to each station, ascending, (station,).
-        gamma: Activations, (n, bundle).
-        position: Filled with r, (n, station, 3).
-        directors: Filled with d1, d2, d3 as rows, (n, station, 3, 3).
+    Of packed node tables (step, row, bundle + 1) and activations (n, bundle); `ends` (station,) are
+    the numbers of steps from the base, ascending.
     """
     for sample in range(gamma.shape[0]):
         r = (0.0, 0.0, 0.0)
@@ -60,10 +56,8 @@ def frames(table, ends, gamma, position, directors):
         k, activation = _BASE, gamma[sample]
         for station in range(ends.shape[0]):
             while k < ends[station]:
-                base, middle = (
-                    _node(table, k, _BASE, activation),
-                    _node(table, k, _MIDDLE, activation),
-                )
+                base = _node(table, k, _BASE, activation)
+                middle = _node(table, k, _MIDDLE, activation)
                 omega = exponent(base, middle, _node(table, k, _TIP, activation))
                 step = act(omega, (0.0, 0.0, 0.0))
                 r = _moved(r, d1, d2, d3, step)
@@ -98,13 +92,7 @@ def _store(position, directors, sample, station, r, d1, d2, d3):
 
 @strict
 def move(points, rotation, position):
-    """Turn and move points (n, 3) in place; strict, as those without equilibrium are NaN.
-
-    Args:
-        points: To be overwritten, shape (n, 3).
-        rotation: Matrix (3, 3).
-        position: New place of the origin, shape (3,).
-    """
+    """Turn and move points (n, 3) in place; strict, as those without equilibrium are NaN."""
     a, b, c = rotation[0, 0], rotation[0, 1], rotation[0, 2]
     d, e, f = rotation[1, 0], rotation[1, 1], rotation[1, 2]
     g, h, k = rotation[2, 0], rotation[2, 1], rotation[2, 2]
@@ -118,12 +106,7 @@ def move(points, rotation, position):
 
 @strict
 def turn(vectors, rotation):
-    """Turn vectors in place.
-
-    Args:
-        vectors: (n, 3 k, m), one above another in k threes, to be overwritten.
-        rotation: Matrix (3, 3).
-    """
+    """Turn vectors (n, 3 k, m), one above another in k threes, in place."""
     for i in range(vectors.shape[0]):
         for row in range(0, vectors.shape[1], 3):
             for j in range(vectors.shape[2]):
@@ -138,15 +121,9 @@ _TOGETHER = 64  # cells, so that the loop over them is innermost and short
 
 @kernel
 def relative_strains(centers, offset, stretch, curvature, longest, bending):
-    """Write the largest relative extension and squared bending along the arm for each cell.
+    """Largest offset + Σ stretch γ and |Σ curvature γ|² along the arm for each cell (n,).
 
-    Args:
-        centers: Activations, shape (n, m).
-        offset: Extension of a cell around zero, at every station, shape (station,).
-        stretch: Its change with each activation, shape (station, m).
-        curvature: Of each activation, shape (station, 3, m).
-        longest: Result, largest offset + Σ stretch γ, shape (n,).
-        bending: Result, largest |Σ curvature γ|², shape (n,).
+    Of activations (n, m), offsets (station,), stretch (station, m) and curvature (station, 3, m).
     """
     count, bundles = centers.shape
     gamma = np.zeros((bundles, _TOGETHER))

@@ -248,27 +248,14 @@ def respond(
     turns,
     works,
 ):
-    """Movements of one rod at boundaries of its steps, and works along it, for all columns.
+    """Moves ρ [m] and turns θ (mark, 3, column) of one rod behind steps `marks`, and works.
 
-    Args:
-        rest_length: η dZ of the nodes [m], shape (step, 3).
-        stretch: ζ dZ [m], likewise.
-        resistance: 1/K1, 1/K1, 1/K3 [1/(N m²)], shape (step, 3, 3); zero without loads.
-        thrust: 1/K0 [1/N], shape (step, 3).
-        directors: d1, d2, d3 as rows, shape (step, 3, 3, 3).
-        moment: m [N m] in the frame of the base, shape (step, 3, 3).
-        force: n [N], likewise.
-        turning: δω| dZ in the directors, shape (step, 3, 3, column).
-        pushing: δζ| dZ, shape (step, 3, column).
-        yielding: ν [N], shape (step, 3, 3, column).
-        unit_loads: M and N, whose work on δω and δζ is summed, shape (step, 3, 4, work).
-        lever: Of the payload in the frame of the base [m], shape (3,).
-        weight: Force of the payload [N], shape (3,).
-        tipping: Change of its moment on the tip at the same directors [N m], shape (3, column).
-        marks: Steps before each place that is asked for.
-        moves: Result, ρ [m], shape (mark, 3, column).
-        turns: Result, θ, likewise.
-        works: Result, shape (work, column).
+    Of each node (step, 3): η dZ and ζ dZ [m]; resistance 1/K1, 1/K1, 1/K3 [1/(N m²)] (3 more), 0
+    without loads; thrust 1/K0 [1/N]; d1, d2, d3 as rows (3, 3 more); moment m [N m] and force n [N]
+    in the frame of the base (3 more). Columns are what changes there: turning δω| dZ in the
+    directors, pushing δζ| dZ, yielding ν [N]. Works (work, column) are those of unit loads M and N
+    (4, work more) on δω and δζ. The payload has a lever [m], a weight [N] and `tipping`, the change
+    of its moment on the tip at the same directors [N m] (3, column).
     """
     steps, columns = rest_length.shape[0], turning.shape[3]
     every = columns + 3

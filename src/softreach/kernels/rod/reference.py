@@ -24,14 +24,10 @@ def hat(omega: Array, v: Array) -> Array:
 def twists(
     measure: Array, stretch: Array, rest_length_factor: Array, curvature: Array, gamma: Array
 ) -> Array:
-    """A = (ηu, ζe3) dZ at every node of every step, shape (step, node, 4, 4).
+    """A = (ηu, ζe3) dZ at every node of every step, shape (step, node, 4, 4), of one γ (bundle,).
 
-    Args:
-        measure: Length of the step as each node sees it [m], shape (step, node).
-        stretch: z [-], shape (step, node, bundle).
-        rest_length_factor: Its part in η [-], shape (step, node, bundle).
-        curvature: U [1/m], shape (step, node, 3, bundle).
-        gamma: One activation [-], shape (bundle,).
+    Of the length [m] of a step as each node sees it (step, node), z and its part in η [-]
+    (step, node, bundle), and U [1/m] (step, node, 3, bundle).
     """
     rest_length = measure * (1.0 + rest_length_factor @ gamma)
     length = measure * (1.0 + stretch @ gamma)
