@@ -92,13 +92,9 @@ class _Program(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """The growth of the force at one place from one start.
+    """The growth of the force at one place [m] from a start near its activations without force.
 
-    Args:
-        pushing: The tip that pushes.
-        place: Its fixed position [m], shape (3,).
-        start: Activations near those that put it there without force, shape (bundles,).
-        allowed: Largest error of the tip [m], of which its distance from the place takes a part.
+    `allowed` is the largest error of the tip [m], of which its distance from the place is a part.
     """
 
     pushing: PushingTip
@@ -134,11 +130,7 @@ class Growth:
         return _UNIT * self.pushing.rod.length / float(np.linalg.norm(self._begun.retreat))
 
     def grown(self, begun: list[FixedTip] | None = None) -> Grown | None:
-        """The end of the growth; None without a start.
-
-        Args:
-            begun: The tip on the way there in other steps along the arm, to begin with the last.
-        """
+        """The end of the growth, from the last of those `begun` in other steps; None if none is."""
         if begun:  # in these steps, under the same force
             last = begun[-1]
             fixed = self._corrected(last.gamma, last.force, 0.0, last.response)

@@ -31,18 +31,7 @@ class Sampler(NamedTuple):
 
 
 def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
-    """All n points at once [-], shape (n, dim).
-
-    Args:
-        sampler: `uniform` (the paper's), `boundary` (uniform, a fifth of the points on the faces),
-            `sobol` (scrambled, n a power of two) or `grid` (n a dim-th power, ends included).
-        n: Number of points.
-        dim: Dimension of the cube.
-        seed: Seed of random samplers.
-
-    Raises:
-        InvalidInput: An unknown sampler, or an n that the sampler cannot spread.
-    """
+    """All n points at once [-], shape (n, dim); the sampler is one of `SAMPLERS`."""
     n, seed = check_sampler(sampler, n, dim, seed)
     return next(cube_blocks(sampler, n, dim, seed, size=n))
 
@@ -55,11 +44,7 @@ def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterato
 
 
 def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
-    """The n and the seed of a sampler.
-
-    Raises:
-        InvalidInput: There is no such sampler, or it cannot spread n points.
-    """
+    """The n and the seed of a sampler, checked."""
     as_one_of("sampler", sampler, SAMPLERS)
     n = as_integer("n", n, 1)
     seed = as_integer("seed", seed, 0, _LARGEST_SEED)

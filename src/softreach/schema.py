@@ -94,8 +94,7 @@ def configuration_dataset(
 ) -> xr.Dataset:
     """Shapes of an arm at stations Z, and its markers, one for each row of `activation`.
 
-    `names` are those of the bundles with a column there; by default all. `frame` is that of the
-    arrays.
+    `names` are those of the bundles with a column there, all by default; `frame` is of the arrays.
     """
     import xarray as xr
 
@@ -134,11 +133,7 @@ def a_configuration(name: str, value: object) -> xr.Dataset:
 
 
 def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
-    """The dataset itself, if it is a cloud of this schema.
-
-    Raises:
-        InvalidInput: What is missing, or of another shape or version.
-    """
+    """The dataset itself, if it is a cloud of this schema."""
     a_cloud("cloud", cloud)
     for name, (dims, _, _) in _CLOUD.items():
         if cloud[name].dims != dims:
@@ -150,11 +145,7 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
 
 
 def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
-    """The dataset itself, if it is a cloud that agrees with its own design.
-
-    Raises:
-        InvalidInput: What is missing, of another type, or does not agree.
-    """
+    """The dataset itself, if it is a cloud that agrees with its own design."""
     check_cloud(cloud)
     for what, given, allowed in _faults(cloud):
         raise InvalidInput(f"cloud.{what}", given, allowed)
@@ -307,11 +298,7 @@ def _pose(arm: Manipulator) -> dict[str, list[float]]:
 
 
 def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
-    """The frame of the places in a dataset.
-
-    Raises:
-        InvalidInput: It says none, or there is no such frame.
-    """
+    """The frame of the places in a dataset, which it must name."""
     frame = data.attrs.get("frame")
     if frame not in ("world", "base"):
         raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
@@ -342,15 +329,7 @@ def stored_names(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
-    """The tips of a cloud sorted into cubes; those that are no stable equilibria in none.
-
-    Args:
-        cloud: tip(sample, axis) [m].
-        edge: Of the cubes [m]; None for L/20.
-
-    Raises:
-        InvalidInput: No cloud, or an edge that is not positive or gives too many cubes.
-    """
+    """The tips of a cloud sorted into cubes of an edge [m], by default L/20; unstable in none."""
     from softreach.geometry.lattice import CellGrid
 
     tip = check_cloud(cloud)["tip"]

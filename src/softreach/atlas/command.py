@@ -30,12 +30,7 @@ _LONGEST = 1e3  # ratio of the lengths of designs whose tips share one fixed-poi
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """Everything that decides the numbers of an atlas, and nothing else.
-
-    Raises:
-        InvalidInput: A metric of a name that the atlas uses itself, a space without a single valid
-            design, or lengths of designs that are too far apart to keep clouds.
-    """
+    """Everything that decides the numbers of an atlas, and nothing else."""
 
     space: DesignSpace
     n: int
@@ -95,11 +90,7 @@ class Command:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The command that `to_json` wrote; metrics that are not softreach's lack their function.
-
-        Raises:
-            InvalidInput: The store has another version.
-        """
+        """The command that `to_json` wrote; metrics that are not softreach's lack a function."""
         values = json.loads(text)  # the root of a store is sealed
         if (version := values.get("atlas_version")) != ATLAS_VERSION:
             hint = "build the atlas again in a new folder"

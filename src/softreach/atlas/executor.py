@@ -1,8 +1,4 @@
-"""Designs computed and stored by the threads of this process, or by workers elsewhere.
-
-Workers write to the store themselves, so a task that ran twice, or whose answer was lost with its
-worker, leaves the same bytes.
-"""
+"""Designs computed and stored by the threads of this process, or by workers elsewhere."""
 
 from __future__ import annotations
 
@@ -60,13 +56,7 @@ _opened: dict[tuple[str, int], AtlasStore] = {}  # Stores by the token of a call
 def run_designs(
     store: AtlasStore, indices: Sequence[int], executor: ExecutorLike, on_outcome: OnOutcome
 ) -> None:
-    """Compute and store designs, one a task; each outcome is reported as it comes.
-
-    Raises:
-        InvalidInput: A metric that worker processes cannot get.
-        StoreFailed: The store cannot be written.
-        NotPossible: A worker died, and with it the executor.
-    """
+    """Compute and store designs, one a task; each outcome is reported as it comes."""
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
         begun = (begin_design(store, index) for index in indices)

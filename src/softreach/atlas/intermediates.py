@@ -40,11 +40,8 @@ class Settings(NamedTuple):
 class Intermediates:
     """Need -> its value for one design, computed at first use.
 
-    Args:
-        arm: The design.
-        cube: Unit activations that all designs share, shape (n, bundles).
-        command: Metrics, radius, accuracy, tolerance, stations and quantiles.
-        sets: Source of the reachable set, if it is known elsewhere.
+    `cube` holds unit activations that all designs share, shape (n, bundles); `sets` is the source
+    of the reachable set, if it is known elsewhere.
     """
 
     def __init__(

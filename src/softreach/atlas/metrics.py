@@ -32,15 +32,7 @@ def known_metric(name: str) -> Metric | None:
 
 
 def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
-    """Metrics, each once: those of softreach in the order of its table, then others by name.
-
-    Args:
-        metrics: Names of groups, metrics, and names of metrics that are not softreach's: of modules
-            that the command line imports, or declared by installed packages.
-
-    Raises:
-        InvalidInput: Nothing, an unknown group, or two metrics of one name.
-    """
+    """Metrics by their names, groups or themselves, each once: those of softreach first."""
     several = isinstance(metrics, list | tuple | Mapping)
     if not several or not metrics:
         raise InvalidInput("metrics", "none" if several else as_given(metrics), _ALLOWED)

@@ -26,11 +26,7 @@ _MOST = 1_000_000  # designs, each of which is looked at and has files of its ow
 
 
 def column(name: str, values: ArrayLike) -> tuple[float, ...]:
-    """Values of a parameter; whole numbers stay whole.
-
-    Raises:
-        InvalidInput: No numbers.
-    """
+    """Finite values of a parameter; whole numbers stay whole."""
     floats = as_floats(name, values, "one finite value or more")
     if floats.ndim > 1:
         raise InvalidInput(f"{name}.shape", floats.shape, "of one dimension")

@@ -88,9 +88,6 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
     """Name and values [SI units] of a parameter as written.
 
     `taper_deg` with `0:3:16` or a list, or `taper` with `0deg:3deg:16` or a list of such texts.
-
-    Raises:
-        InvalidInput: An unknown key, or values that are no numbers.
     """
     names = Written.of(base)
     if key not in names.by_key:

@@ -71,12 +71,6 @@ class AtlasStore:
         """Create the store, or open one that the same command began, and mend what is damaged.
 
         Where it is durable, a power cut loses nothing that was written.
-
-        Raises:
-            InvalidInput: The place holds something else, or an atlas of another command, and how
-                that differs.
-            DamagedStore: Its root is damaged, and no array in it is of this command.
-            StoreFailed: It cannot be written to.
         """
         location = absolute(location)
         opened = None
@@ -103,12 +97,7 @@ class AtlasStore:
     def open(
         cls, location: StoreLike, mode: Literal["r", "r+"] = "r+", *, durable: bool = False
     ) -> Self:
-        """Open an atlas, in mode "r" at a place that cannot be written to.
-
-        Raises:
-            InvalidInput: There is none, or of another version.
-            DamagedStore: Its root, or what describes an array, is damaged or missing.
-        """
+        """Open an atlas, in mode "r" at a place that cannot be written to."""
         location = absolute(location)
         opened = opened_store(location, "atlas", mode, durable=durable)
         why = f"it does not exist, or has no {ROOT}" if opened is None else "this is no atlas"

@@ -48,11 +48,7 @@ class Deviations:
         return tuple(parameter.name for parameter in self.parameters)
 
     def made(self, change: Array) -> Manipulator:
-        """The arm with changes of its parameters; parts that share one change alike.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """The arm with changes of its parameters; parts that share one change alike."""
         made = self.arm
         for parameter, amount in zip(self.parameters, change.tolist(), strict=True):
             if amount:
@@ -63,11 +59,7 @@ class Deviations:
 
 
 def deviations_of(arm: Manipulator, sigmas: Mapping[str, Any]) -> Deviations:
-    """Deviations of a design from standard deviations [SI units] by parameter.
-
-    Raises:
-        InvalidInput: None, an unknown parameter or one without a single value, or no σ >= 0.
-    """
+    """Deviations of a design from standard deviations [SI units] by parameter."""
     arm = a_manipulator("arm", arm)
     given = as_mapping("sigmas", sigmas, lambda name, x: as_number(f"sigmas {name}", x, _SIGMA))
     if not given:

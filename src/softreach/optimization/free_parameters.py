@@ -116,11 +116,7 @@ class FreeParameters:
         return np.array([(p.low, p.high) for p in self.real], float).reshape(-1, 2)
 
     def arm(self, values: Values) -> Manipulator:
-        """The design with these values, and what is tied to them.
-
-        Raises:
-            InvalidDesign: No such arm can exist, or some activation would shorten it to nothing.
-        """
+        """The design with these values and ties, checked for inputs that shorten it to nothing."""
         arm = self.bases[str(values[DESIGN])] if DESIGN in values else self.base
         for name, make in _CHOICES.items():
             if name in values:
@@ -164,13 +160,7 @@ def free_parameters(
     free: Mapping[str, Any],
     choices: Mapping[str, Sequence[Any]] | None = None,
 ) -> FreeParameters:
-    """Free parameters from what a user gives to `search`.
-
-    Raises:
-        InvalidInput: An unknown parameter, a range that is reversed, empty or beyond what the
-            parameter may be, a choice without values, or a tie to what is not free.
-        NotPossible: Choices of bundles of an actuator without an offset.
-    """
+    """Free parameters from what a user gives to `search`."""
     bases = as_mapping("base", base, a_manipulator) if isinstance(base, Mapping) else {}
     bases = bases or {"": a_manipulator("base", base)}
     given = as_mapping("free", free, lambda _, value: value)

@@ -221,11 +221,7 @@ class Requirements:
 
 
 def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
-    """The arm with a mass at its tip [kg]; as it is for None, and for 0 without loads.
-
-    Raises:
-        InvalidDesign: A layer without Young's modulus or density.
-    """
+    """The arm with a mass at its tip [kg]; as it is for None, and for 0 without loads."""
     if payload is None or (payload == 0.0 and arm.loads is None):
         return arm
     return arm.replace(loads=(arm.loads or Loads()).replace(payload=payload))

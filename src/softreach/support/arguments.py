@@ -1,13 +1,4 @@
-"""Arguments of public functions, converted in their first lines and so refused in one way.
-
-A converter takes the argument's name and value, then what is allowed, and returns what the function
-goes on with, or raises `InvalidInput`, which names the argument::
-
-    n = as_integer("n", n, 1)
-    cell = None if cell is None else as_number("cell", cell, POSITIVE)
-
-Those of arrays are in `softreach.support.arrays`, that of callbacks is `progress.as_progress`.
-"""
+"""Arguments of public functions, converted in their first lines and refused in one way."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Arrays that users pass: converted and checked in one place, and names for them by what they hold.
-
-Numbers are what NumPy takes for whole or real numbers; masked entries are none. What cannot be
-converted raises `InvalidInput`, which names the argument.
-"""
+"""Arrays that users pass, converted and checked in one place, and names for what they hold."""
 
 from __future__ import annotations
 
@@ -75,11 +71,7 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
 
 
 def labeled(name: str, values: Any, labels: Sequence[str]) -> Any:
-    """An xarray array with the columns that have these labels, in their order; others as given.
-
-    Raises:
-        InvalidInput: Some label has no column.
-    """
+    """An xarray array with columns of these labels, all of them, in this order; else as given."""
     dims = [dim for dim in getattr(values, "dims", ()) if dim in ("axis", "bundle")]
     if len(dims) != 1:
         return values

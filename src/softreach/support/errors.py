@@ -174,11 +174,7 @@ class MissingExtra(SoftreachError, ImportError):
 
 
 def check_installed(*modules: str) -> None:
-    """Name the modules that are missing, all at once, without the time that importing them takes.
-
-    Raises:
-        MissingExtra: Some are not installed.
-    """
+    """Name the modules that are missing, all at once, without the time that importing takes."""
     if missing := [name for name in modules if importlib.util.find_spec(name) is None]:
         raise MissingExtra(*missing)
 

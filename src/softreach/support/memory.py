@@ -53,11 +53,7 @@ def return_memory() -> None:
 
 
 def check_memory(name: str, value: object, needed: float) -> None:
-    """Refuse what takes more memory than is free [bytes]: Linux would grant it, then kill.
-
-    Raises:
-        NotPossible: What has this name and value needs too much.
-    """
+    """Refuse what takes more memory than is free [bytes]: Linux would grant it, then kill."""
     if needed > _NOTICED and needed > (free := free_memory()):
         taken = f"{needed / 1e9:,.1f} GB of memory, of which {free / 1e9:,.1f} GB are free"
         raise NotPossible(f"{name} = {value} needs {taken}")

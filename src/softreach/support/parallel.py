@@ -1,8 +1,4 @@
-"""Threads over blocks of work.
-
-The kernels release the interpreter lock, so plain threads use every core, nest safely in other
-people's thread and process pools, and let Ctrl-C through between blocks, however deep they are.
-"""
+"""Threads over blocks of work, as kernels release the interpreter lock; Ctrl-C gets in between."""
 
 from __future__ import annotations
 

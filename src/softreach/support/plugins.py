@@ -28,11 +28,7 @@ _imported: list[ModuleType] = []
 
 @contextmanager
 def importing(names: Iterable[str]) -> Iterator[None]:
-    """A block for which modules of the user are imported, by their names or from .py files.
-
-    Raises:
-        InvalidInput: There is no such module, it fails, or another one has its name.
-    """
+    """A block for which modules of the user are imported, by their names or from .py files."""
     before = sys.path.copy()
     try:
         _imported.extend(map(_import, names))
@@ -68,11 +64,7 @@ def declared(group: str) -> dict[str, EntryPoint]:
 
 
 def loaded(entry: EntryPoint) -> Any:
-    """Object behind an entry point of an installed package.
-
-    Raises:
-        InvalidInput: It cannot be imported.
-    """
+    """Object behind an entry point of an installed package."""
     return _tried(f"entry point {entry.name}", entry.value, entry.load)
 
 

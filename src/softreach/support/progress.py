@@ -25,23 +25,15 @@ def silent(done: int) -> None:
 
 
 def as_progress(progress: object) -> Progress:
-    """The callback of a caller; one that reports nothing for None.
-
-    Raises:
-        InvalidInput: It cannot be called.
-    """
+    """The callback of a caller; one that reports nothing for None."""
     return silent if progress is None else as_function("progress", progress)
 
 
 @contextmanager
 def bar(label: str | Callable[[], str], total: int | None) -> Iterator[Progress]:
-    """A progress bar with rate and time left on standard error, if that is a terminal.
+    """A bar with rate and time left on standard error; elsewhere a line every half minute.
 
-    In a pipe, a file or a notebook a line every half minute says how far it is.
-
-    Args:
-        label: What is going on, or a function that says it anew each time.
-        total: Number of items; None if it is known only in the end, for a bar that moves on.
+    A label may be a function that says it anew each time; a total of None is known in the end.
     """
     if hidden:
         yield silent

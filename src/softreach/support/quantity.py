@@ -31,14 +31,7 @@ _UNITS = {
 
 
 def quantity(value: float, unit: str = "", error: float = math.nan, digits: int = 1) -> str:
-    """A value to the first digit of its error, such as "0.69164 ± 0.00002 m³".
-
-    Args:
-        value: The number.
-        unit: What it counts.
-        error: How far off it may be, same unit; without one the value has five digits.
-        digits: Number of digits of the error.
-    """
+    """A value to some digits of its error, such as "0.69164 ± 0.00002 m³", or with five digits."""
     if math.isfinite(value) and 0 < error < math.inf:
         return f"{_with_error(value, error, digits)} {unit}".rstrip()
     return f"{five_digits(value)}{unit if unit == '°' else f' {unit}'}".rstrip()
@@ -72,20 +65,12 @@ def round_above(value: float) -> float:
 
 
 def read_number(text: str) -> float:
-    """The finite number that a text is: decimal, with a point or an exponent if need be.
-
-    Raises:
-        ValueError: Anything else, also infinity, hexadecimal numbers and foreign digits.
-    """
+    """The finite decimal number that a text is, or `ValueError`."""
     return read_quantity(text, "1")
 
 
 def read_whole_number(text: str) -> int:
-    """The whole number that a text is, such as "400000", "400_000" or "4e5".
-
-    Raises:
-        ValueError: Anything else.
-    """
+    """The whole number that a text is, such as "400_000" or "4e5", or `ValueError`."""
     if _WHOLE.fullmatch(text):
         return int(text)
     read_number(text)  # refuses what is no finite decimal number
@@ -115,16 +100,9 @@ def sizes_in(unit: str) -> dict[str, float]:
 
 
 def read_quantity(text: str, unit: str) -> float:
-    """The value of a number with its unit, such as "200g" or "1.5 MPa", in an SI unit.
+    """The value in an SI unit, "1" for none, of "200g" or "1.5 MPa"; `ValueError` of anything else.
 
-    A zero needs no unit.
-
-    Args:
-        text: A number and one of `unit_names(unit)`.
-        unit: SI unit of what is read; "1" for a plain number.
-
-    Raises:
-        ValueError: No finite number, or another unit.
+    The unit is one of `unit_names(unit)`; a zero needs none.
     """
     match = _NUMBER.fullmatch(text)
     if match is None:

@@ -88,11 +88,7 @@ METER = LengthUnit("m", 1.0)
 
 
 def in_lengths(length: float | None) -> LengthUnit:
-    """L for a given length [m], the meter for None.
-
-    Raises:
-        InvalidInput: A length that is not positive.
-    """
+    """L for a given length [m], the meter for None."""
     if length is None:
         return METER
     if not length > 0:
@@ -101,11 +97,7 @@ def in_lengths(length: float | None) -> LengthUnit:
 
 
 def as_unit(unit: object, length: float | None = None) -> LengthUnit:
-    """The unit of that name, of which L is one where the length [m] of the arm is known.
-
-    Raises:
-        InvalidInput: No such unit, or L where it is not known.
-    """
+    """The unit of that name, of which L is one where the length [m] of the arm is known."""
     if isinstance(unit, LengthUnit):
         return unit
     name = unit if isinstance(unit, str) else ""
@@ -124,10 +116,9 @@ def handy_unit(length: float) -> str:
 
 
 def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, float]:
-    """The unit that people read a number in, and its size.
+    """The unit that people read a number of an SI unit in, and its size.
 
-    Of an SI unit, "1" for none: that of length for lengths, areas and volumes; of pressures one of
-    the size of the number.
+    Lengths, areas and volumes are in that of length, pressures in one of the size of the number.
     """
     if power := POWERS.get(unit):
         return length.symbol(power), length.scale(power)
@@ -141,20 +132,13 @@ def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, flo
 def readable(
     value: float, unit: str, length: LengthUnit, error: float = math.nan, *, digits: int = 1
 ) -> str:
-    """A number in an SI unit as people read it, to some digits of its error: "12.5 mm", "20.3°".
-
-    Lengths, areas and volumes are in the unit of length.
-    """
+    """A number in an SI unit as people read it, to some digits of its error: "12.5 mm", "20.3°"."""
     name, size = readable_unit(unit, value, length)
     return quantity(value / size, name, error / size, digits)
 
 
 def read_length(text: str, length: float | None = None) -> float:
-    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L" where L is known [m].
-
-    Raises:
-        ValueError: No finite number, or another unit.
-    """
+    """A length [m] typed as "80mm", "0.08" in m, or "0.1L" where L is known; or `ValueError`."""
     text = text.strip()
     if length is not None and text.endswith("L"):
         return length * read_number(text[:-1])
@@ -162,9 +146,9 @@ def read_length(text: str, length: float | None = None) -> float:
 
 
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
-    """Comma-separated lengths [m], each with its unit or all without; a zero needs none.
+    """Comma-separated lengths [m], each as `read_length` takes it, all with a unit or all without.
 
-    None if the text is anything else than so many of what `read_length` takes.
+    A zero needs none. None if the text is anything else, or not so many.
     """
     parts = text.split(",")
     try:

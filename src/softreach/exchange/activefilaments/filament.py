@@ -129,14 +129,11 @@ def design_script(arm: Manipulator) -> str:
 
 
 def filament_of(arm: Manipulator) -> Filament:
-    """The filament of ActiveFilaments.jl with the tips of an arm.
+    """The filament of ActiveFilaments.jl with the tips of an arm; refused if there is none.
 
     There each ring has one family of equidistant sectors. Several families in one ring become
     several rings in the same place that share its Young's modulus evenly, so that stiffness is the
     same; their activations are multiplied by the number of families, so that forces are the same.
-
-    Raises:
-        InvalidInput: Something that a filament there does not have.
     """
     for name, value, allowed in _faults(arm):
         raise InvalidInput(name, value, f"{allowed} {_THERE}")

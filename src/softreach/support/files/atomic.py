@@ -48,13 +48,6 @@ def check_place(
     """The place, absolute and without links, where a file or a folder may be written.
 
     `foreign` is given for a folder, which is replaced only if it holds nothing foreign.
-
-    Raises:
-        InvalidInput: Something is there that may not be replaced.
-        NotWritten: Nothing can be written there.
-
-    Warns:
-        SoftreachWarning: The replacement of a folder was killed between two renames.
     """
     shown = os.fspath(path)
     place = Path(os.path.realpath(shown))
@@ -93,10 +86,6 @@ def writing(path: StrPath, *, overwrite: bool = False) -> Iterator[io.BufferedWr
     After an error or Ctrl-C an older file is as it was. The file is ours and not the library's that
     fills it, so that no error of writing, flushing or closing can get lost; its name keeps the
     suffix of `path`.
-
-    Raises:
-        InvalidInput: Something is there that may not be replaced; see `check_place`.
-        NotWritten: It cannot be written, for instance as the disk is full.
     """
     place = check_place(path, overwrite=overwrite)
     with _one_line(path):
@@ -144,11 +133,7 @@ def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False
 
 
 def place_to_read(path: StrPath) -> str:
-    """The place of a folder to be read: its name, or where a killed process left it.
-
-    Warns:
-        SoftreachWarning: It is read from there.
-    """
+    """The place of a folder to be read: its name, or where a killed process left it."""
     if whole := _whole(Path(os.path.realpath(path))):
         warn(f"{path}: a killed command left {whole.name}, which is read")
         return os.fspath(whole)

@@ -28,12 +28,7 @@ Formats = Mapping[str, FileFormat]
 
 
 def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -> FileFormat:
-    """The format that a path names by its suffix.
-
-    Raises:
-        InvalidInput: Another suffix; the error lists those there are.
-        MissingExtra: The format needs a library that is not installed.
-    """
+    """The format that a path names by its suffix; what writing it needs must be installed."""
     known = formats.get(Path(path).suffix.lower())
     if known is None:
         raise InvalidInput(name, fspath(path), "a file name ending in " + ", ".join(formats))

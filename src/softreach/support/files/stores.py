@@ -124,9 +124,8 @@ class Opened:
     def noting(self, *, raising: bool = False) -> Iterator[dict[Chunk, DamagedStore]]:
         """Read damaged files as missing ones, and collect what is wrong with each.
 
-        Args:
-            raising: Whether the first is raised in the end, and not before: Zarr reads chunks at
-                once, would lose all errors but the first, and print them at exit.
+        With `raising` the first is raised in the end, and not before: Zarr reads chunks at once,
+        would lose all errors but the first, and print them at exit.
         """
         before, noted = self._noted, dict[Chunk, DamagedStore]()
         self._noted = noted
@@ -138,20 +137,12 @@ class Opened:
                 raise next(iter(noted.values())) from None
 
     def check_arrays(self) -> None:
-        """Check what describes each array.
-
-        Raises:
-            DamagedStore: It is missing, or changed.
-        """
+        """Check what describes each array."""
         for name in self.digests:
             _ = self.group[name]
 
     def check_root(self) -> None:
-        """Check that the store is still the one that was opened.
-
-        Raises:
-            StoreFailed: Another took its place, and some of what was read may be of that one.
-        """
+        """Check that the store is still the one that was opened."""
         import zarr
 
         again = zarr.open_group(self.place, mode="r", zarr_format=3)
@@ -162,13 +153,7 @@ class Opened:
 def opened_store(
     location: StoreLike, kind: Kind, mode: Mode = "r", *, durable: bool = False
 ) -> Opened | None:
-    """A store of softreach, if there is any.
-
-    Raises:
-        InvalidInput: No place of a store, or something else is there.
-        DamagedStore: Its root is not as softreach wrote it.
-        StoreFailed: It cannot be reached.
-    """
+    """A store of softreach, if there is any; `StoreFailed` where it cannot be reached."""
     import zarr
     from zarr.storage import StorePath
 
@@ -221,13 +206,7 @@ def absolute(location: StoreLike) -> StoreLike:
 
 
 class CheckedStore(WrapperStore[Any]):
-    """Another store, of which every file is checked when it is read.
-
-    Args:
-        store: The store.
-        opened: What becomes of damage.
-        root: Where in it the root of the arrays is.
-    """
+    """Another store, whose arrays lie at `root`, of which every file is checked when it is read."""
 
     def __init__(self, store: Store, opened: Opened, root: str) -> None:
         super().__init__(store)
@@ -242,11 +221,7 @@ class CheckedStore(WrapperStore[Any]):
     async def get(
         self, key: str, prototype: Any, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """The content of a file; None if it is missing and may be.
-
-        Raises:
-            DamagedStore: It is not what was written, or it is missing.
-        """
+        """The content of a file; None if it is missing and may be."""
         content = await super().get(key, prototype, byte_range)
         chunk = self._chunk(key)
         fault = self._fault(chunk, content) if chunk else ""
@@ -255,11 +230,7 @@ class CheckedStore(WrapperStore[Any]):
         return None if fault else content
 
     async def set(self, key: str, value: Buffer) -> None:
-        """Write a file.
-
-        Raises:
-            StoreFailed: It describes an array otherwise than the root lists.
-        """
+        """Write a file, unless it describes an array otherwise than the root lists."""
         chunk = self._chunk(key)
         opened = self._opened
         listed = opened.digests.get(chunk.array) if chunk and chunk.place is None else None
@@ -318,11 +289,7 @@ def sealed(text: bytes) -> bytes:
 
 
 def unsealed(text: bytes) -> dict[str, Any]:
-    """Attributes of a root.
-
-    Raises:
-        ValueError: It was changed, or is not of softreach.
-    """
+    """Attributes of a root; `ValueError` if it was changed, or is not of softreach."""
     try:
         attributes = json.loads(text)["attributes"]
         if sealed(text.replace(attributes[DIGEST].encode(), BLANK.encode())) == text:

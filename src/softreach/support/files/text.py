@@ -19,11 +19,7 @@ MEGABYTE = 1_000_000
 
 
 def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
-    """The text of a file of at most so many bytes in UTF-8; its lines end with a line feed.
-
-    Raises:
-        InvalidInput: No such file, another kind of file, too large a one, or no text in UTF-8.
-    """
+    """The text of a file of at most so many bytes in UTF-8; its lines end with a line feed."""
     shown = os.fspath(path)
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):  # some never end
@@ -53,12 +49,7 @@ def text_of(name: str, shown: str, content: bytes, most: int) -> str:
 
 
 def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> None:
-    """Write text in UTF-8.
-
-    Raises:
-        InvalidInput: Something is there, and `overwrite` is not given.
-        NotWritten: It cannot be written.
-    """
+    """Write text in UTF-8, whole or not at all."""
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     with writing(path, overwrite=overwrite) as file:
         file.write(text.encode())

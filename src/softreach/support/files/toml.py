@@ -15,10 +15,9 @@ WRONG: Any = object()
 
 
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
-    """The tables of TOML text; `number` makes values of numbers with a point or an exponent.
+    """The tables of TOML text, or `ValueError`.
 
-    Raises:
-        ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
+    `number` makes values of numbers with a point or an exponent.
     """
     try:
         tables = tomllib.loads(text, parse_float=number)
@@ -42,11 +41,7 @@ def _fit_64_bits(value: Any) -> bool:
 def document_of(
     text: str, most: int, source: str, number: Callable[[str], Any] = float
 ) -> dict[str, Any]:
-    """The tables of TOML text of at most so many characters, called `source` in errors.
-
-    Raises:
-        InvalidDesign: Text that is no TOML, or too long.
-    """
+    """The tables of TOML text of at most so many characters, called `source` in errors."""
     if len(text) > most:
         allowed = f"must be at most {most:,} characters long, and has {len(text):,}"
         raise InvalidDesign([Fault("TOML", None, allowed)], source)
@@ -112,12 +107,7 @@ def unknown_key(name: str, keys: Mapping[str, str]) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Text, numbers, truth values and sequences of them as JSON, which is TOML but for a character.
-
-    Raises:
-        TypeError: Another kind of value.
-        ValueError: A number that is not finite.
-    """
+    """Text, finite numbers, truth values and sequences of them as JSON, which is TOML."""
     if not _is_plain(value):
         raise TypeError(f"{type(value).__name__} has no text in TOML")
     return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
