@@ -57,10 +57,8 @@ class Stop(IntEnum):
 class FixedTip(NamedTuple):
     """A tip at its place, pushing."""
 
-    gamma: Array
-    """Activations [unit of each], shape (bundles,)."""
-    force: float
-    """[N]"""
+    gamma: Array  # Activations [unit of each], shape (bundles,)
+    force: float  # [N]
     response: TipResponse
 
 
@@ -71,21 +69,15 @@ class Grown(NamedTuple):
     stop: Stop
     limits: Mask
     """Mask of the bundles at a bound that keeps the force from growing, shape (bundles,)."""
-    slope: float
-    """By how much the force would change if the place moved [N/m]."""
-    before: list[FixedTip]
-    """The tip on the way there, up to nearly as large a force."""
+    slope: float  # By how much the force would change if the place moved [N/m]
+    before: list[FixedTip]  # The tip on the way there, up to nearly as large a force
 
 
 class _Program(NamedTuple):
-    gamma: Array
-    """Change of the activations [unit of each], shape (bundles,)."""
-    force: float
-    """Change of the force [N]."""
-    rate: float
-    """The same in units of force per range of activation."""
-    multipliers: Array
-    """Lagrange multiplier of each bundle's bounds, shape (bundles,)."""
+    gamma: Array  # Change of the activations [unit of each], shape (bundles,)
+    force: float  # Change of the force [N]
+    rate: float  # The same in units of force per range of activation
+    multipliers: Array  # Lagrange multiplier of each bundle's bounds, shape (bundles,)
     slope: float
     """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
 

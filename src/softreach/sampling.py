@@ -24,8 +24,7 @@ _LARGEST_SEED = 2**63 - 1  # what stores hold as a number
 class Sampler(NamedTuple):
     """One way to spread points."""
 
-    begin: Callable[[int, int, int], Draw]
-    """(n, dim, seed) -> a source of points."""
+    begin: Callable[[int, int, int], Draw]  # (n, dim, seed) -> a source of points
     refusal: Callable[[int, int], str | None]
     """(n, dim) -> which n to use instead, or None when n will do."""
 

@@ -37,12 +37,9 @@ class Command:
     seed: int
     sampler: str
     tol: float
-    alpha_over_length: float
-    """Radius of the alpha shapes over the length of each design."""
-    accuracy: float
-    """Relative error asked of the exact volumes."""
-    metrics: tuple[Metric, ...]
-    """As `chosen_metrics` has them."""
+    alpha_over_length: float  # Radius of the alpha shapes over the length of each design
+    accuracy: float  # Relative error asked of the exact volumes
+    metrics: tuple[Metric, ...]  # As `chosen_metrics` has them
     keep_clouds: bool
     stations: tuple[float, ...] = STATIONS
     """Places at which curvature is measured, over the length of each design."""

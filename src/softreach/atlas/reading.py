@@ -258,12 +258,10 @@ def best_designs(
 class Contents(NamedTuple):
     """Contents of an atlas but its tips, each chunk checked."""
 
-    status: NDArray[np.uint8]
-    """DAMAGED for designs of which a chunk is, shape (designs,)."""
+    status: NDArray[np.uint8]  # DAMAGED for designs of which a chunk is, shape (designs,)
     messages: dict[int, str]
     """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
-    tables: dict[str, Any]
-    """Arrays `metrics` and `curvature`; fill values where they are damaged."""
+    tables: dict[str, Any]  # Arrays `metrics` and `curvature`; fill values where they are damaged
 
     def warn_of_damage(self, then: str) -> None:
         """Say how many designs are damaged, and what is wrong with the first of them."""

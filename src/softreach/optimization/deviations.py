@@ -39,8 +39,7 @@ class Deviations:
 
     arm: Manipulator
     parameters: tuple[Parameter, ...]
-    sigmas: Array
-    """Standard deviation of each [its unit], shape (parameters,)."""
+    sigmas: Array  # Standard deviation of each [its unit], shape (parameters,)
 
     @property
     def names(self) -> tuple[str, ...]:

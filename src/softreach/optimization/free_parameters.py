@@ -38,16 +38,11 @@ class FreeParameter:
     """A number in a range, or a choice."""
 
     name: str
-    unit: str
-    """SI unit; "1" for none."""
-    low: float = np.nan
-    """Least value of a range."""
-    high: float = np.nan
-    """Largest value of a range."""
-    choices: tuple[float | str, ...] = ()
-    """Values to choose from, instead of a range."""
-    whole: bool = False
-    """It counts something."""
+    unit: str  # SI unit; "1" for none
+    low: float = np.nan  # Least value of a range
+    high: float = np.nan  # Largest value of a range
+    choices: tuple[float | str, ...] = ()  # Values to choose from, instead of a range
+    whole: bool = False  # It counts something
 
     @property
     def is_real(self) -> bool:

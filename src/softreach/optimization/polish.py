@@ -103,8 +103,7 @@ class _Program:
     goal: int
     floors: Sequence[float] = ()
     most: int = MOST_DESIGNS
-    designs: int = 0
-    """Designs made so far."""
+    designs: int = 0  # Designs made so far
     accepted: Array = field(default_factory=lambda: np.empty(0))
     """Unknowns at which the last quadratic program was set up."""
     _shape: tuple[int, ...] = (0, 0)  # of the poses

@@ -57,10 +57,8 @@ class DesignCase:
 
     arm: Manipulator
     requirements: Requirements
-    accuracy: float
-    """Relative error of volumes."""
-    fine: bool = True
-    """Clouds have as many samples as numbers that are reported need."""
+    accuracy: float  # Relative error of volumes
+    fine: bool = True  # Clouds have as many samples as numbers that are reported need
 
     @lazy
     def reached(self) -> ReachableSet:
@@ -122,8 +120,7 @@ class Goal(NamedTuple):
     """An objective, and whether it is to be large or small."""
 
     objective: Objective
-    sense: float
-    """1 to maximize, -1 to minimize."""
+    sense: float  # 1 to maximize, -1 to minimize
 
     @property
     def name(self) -> str:
@@ -307,10 +304,8 @@ class Problem:
     parameters: FreeParameters
     requirements: Requirements
     goals: tuple[Goal, ...]
-    accuracy: float
-    """Relative error of volumes that are reported."""
-    coarse: float
-    """Relative error of volumes on the way."""
+    accuracy: float  # Relative error of volumes that are reported
+    coarse: float  # Relative error of volumes on the way
 
     @cached_property
     def digest(self) -> str:

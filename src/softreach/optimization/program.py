@@ -39,8 +39,7 @@ class DesignPoint:
     problem: Problem
     values: Values
     accuracy: float
-    like: Sequence[TipMap] = ()
-    """Tip maps of a design nearby, in as many steps."""
+    like: Sequence[TipMap] = ()  # Tip maps of a design nearby, in as many steps
 
     @lazy
     def case(self) -> DesignCase:
@@ -165,8 +164,7 @@ class Point:
 
     design: DesignPoint
     reals: Array
-    poses: Array
-    """Shape (payloads · places, free inputs)."""
+    poses: Array  # Shape (payloads · places, free inputs)
     goal: int
     floors: Sequence[float]
 
@@ -348,18 +346,12 @@ class Point:
 class Part:
     """Equations or inequalities of one requirement, differentiated when they are used first."""
 
-    name: str
-    """Of the requirement."""
-    value: Array
-    """Shape (n,)."""
-    slope: Callable[[], Array]
-    """Makes the derivatives by all unknowns, shape (n, unknowns)."""
-    within: float = 0.0
-    """Distance to a place that is allowed, over L."""
-    scale: float = 1.0
-    """Of what the requirement allows, per unit of the value."""
-    unit: str = ""
-    """Unit of that; "" for that of the limit or measure."""
+    name: str  # Of the requirement
+    value: Array  # Shape (n,)
+    slope: Callable[[], Array]  # Makes the derivatives by all unknowns, shape (n, unknowns)
+    within: float = 0.0  # Distance to a place that is allowed, over L
+    scale: float = 1.0  # Of what the requirement allows, per unit of the value
+    unit: str = ""  # Unit of that; "" for that of the limit or measure
 
 
 def stacked(parts: Sequence[Part]) -> Array:

@@ -269,8 +269,7 @@ class _Followed(NamedTuple):
 
     near: Array
     away: Array
-    share: float
-    """Share of the volume near the boundary."""
+    share: float  # Share of the volume near the boundary
 
     @classmethod
     def of(cls, first: FirstOrder, seed: int) -> _Followed:

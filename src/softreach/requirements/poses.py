@@ -48,10 +48,8 @@ class Judged(NamedTuple):
 
     value: Array
     """Distances by which regions are missed [m], negative where kept to; values of limits."""
-    excess: Array
-    """Excess over L, or over the limit; 0 where nothing is missed, shape (n, rule)."""
-    error: Array
-    """Largest possible addition between the stations looked at, shape (n, rule)."""
+    excess: Array  # Excess over L, or over the limit; 0 where nothing is missed, shape (n, rule)
+    error: Array  # Largest possible addition between the stations looked at, shape (n, rule)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +59,7 @@ class PoseRules:
     arm: Manipulator
     keeps: tuple[Keep, ...]
     limits: dict[str, float]
-    tolerance: float
-    """Error that is allowed in how far a region is missed [m]."""
+    tolerance: float  # Error that is allowed in how far a region is missed [m]
     known_rod: TipMap | None = None
     """Tip map of the arm, if it is to be another than to the usual tolerance."""
 
@@ -169,10 +166,8 @@ class PoseRules:
 class Body(NamedTuple):
     """Sections of an arm in poses, at stations."""
 
-    center: Array
-    """Shape (n, station, 3) [m]."""
-    tangent: Array
-    """Shape (n, station, 3)."""
+    center: Array  # Shape (n, station, 3) [m]
+    tangent: Array  # Shape (n, station, 3)
     radius: Array
     """Of what is widest before activation, body, tendons and the disks that hold these, shape
     (n, station) [m]."""
@@ -182,8 +177,7 @@ class Body(NamedTuple):
     bulge: Array
     """Farthest that the body bulges between two sections from the straight line between their
     points [m], shape (n, station - 1)."""
-    lost: Mask
-    """Poses without an arm, shape (n,)."""
+    lost: Mask  # Poses without an arm, shape (n,)
 
     @classmethod
     def of(cls, rod: TipMap, gamma: Array, parts: int) -> Body:

@@ -29,15 +29,13 @@ class Section:
     """A part of a report: what is given, in this order."""
 
     title: str = ""
-    head: Sequence[str] = ()
-    """Heading of the rows."""
+    head: Sequence[str] = ()  # Heading of the rows
     rows: Sequence[Sequence[str]] = ()
     note: str = ""
     points: Sequence[str] = ()
     figures: Callable[[], Iterable[tuple[Any, str]]] = tuple
     """Draws figures of matplotlib, or reads PNG files, each with its caption."""
-    text: str = ""
-    """Shown as it is, such as a design file."""
+    text: str = ""  # Shown as it is, such as a design file
     printed: int = 30
     """Rows among the lines, with the points; with 0 all of it is on the page alone."""
 

@@ -36,10 +36,8 @@ _SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
 class LengthUnit(NamedTuple):
     """A unit of length with those of areas and volumes beside it."""
 
-    name: str
-    """One of `UNITS`."""
-    size: float
-    """[m]; of L, the length of the arm."""
+    name: str  # One of `UNITS`
+    size: float  # [m]; of L, the length of the arm
 
     @property
     def relative(self) -> bool:

@@ -15,8 +15,7 @@ from softreach.support.files.atomic import Foreign
 class FileFormat(NamedTuple):
     """A format of files, or of folders, that is written."""
 
-    libraries: tuple[str, ...] = ()
-    """Modules that are imported to write it."""
+    libraries: tuple[str, ...] = ()  # Modules that are imported to write it
     write: Callable[[Any, BufferedWriter], None] | None = None
     """Writes a content to a file, where several formats take the same content."""
     foreign: Foreign | None = None

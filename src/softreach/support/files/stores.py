@@ -81,10 +81,8 @@ class DamagedStore(InvalidInput):
 class Chunk(NamedTuple):
     """A file of a store: a chunk of an array, or what describes an array or the store."""
 
-    array: str
-    """Empty for the store itself."""
-    place: tuple[int, ...] | None
-    """None for what describes the array."""
+    array: str  # Empty for the store itself
+    place: tuple[int, ...] | None  # None for what describes the array
 
     @classmethod
     def of_key(cls, key: str) -> Self | None:
@@ -108,8 +106,7 @@ class Opened:
     """True for chunks that must exist; others that are missing hold fill values."""
     digests: dict[str, str] = field(default_factory=dict)
     """Digest of what describes each array, as the root lists it."""
-    place: StorePath = field(init=False)
-    """For xarray."""
+    place: StorePath = field(init=False)  # For xarray
     group: zarr.Group = field(init=False)
     _noted: dict[Chunk, DamagedStore] | None = None
 
