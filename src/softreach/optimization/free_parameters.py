@@ -20,8 +20,7 @@ from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.lazy import lazy
 from softreach.support.quantity import read_quantity
 
-Values = Mapping[str, float | str]
-"""Free parameter -> its value [SI unit], or the chosen name."""
+Values = Mapping[str, float | str]  # Free parameter -> its value [SI unit], or the chosen name
 
 BUNDLES, DESIGN, MATERIAL = "bundles", "design", "material"
 """Choices that are no parameters: how many bundles, which of several designs, of what material."""
@@ -269,5 +268,4 @@ def _of_material(arm: Manipulator, name: Any) -> Manipulator:
 
 _CHOICES = {BUNDLES: _with_bundles, MATERIAL: _of_material}
 _WORDS = (*_CHOICES, DESIGN)
-NAMED_CHOICES = tuple(_CHOICES)
-"""Choices that are no parameters."""
+NAMED_CHOICES = tuple(_CHOICES)  # Choices that are no parameters

@@ -40,8 +40,7 @@ SETS = {
 }
 """Goals and measures of the reachable set, and what they are called there."""
 
-NEAR = 0.1
-"""Relative distance within which objectives at the ends of polishes agree."""
+NEAR = 0.1  # Relative distance within which objectives at the ends of polishes agree
 
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""

@@ -44,8 +44,7 @@ _LEAST_PLACES = 64  # in a region to be covered
 _MOST_PLACES = 100_000
 _ROUGH_TOL = 1e-4  # of tips on the way of a search, in L
 
-Sets = Callable[[Manipulator], ReachableSet]
-"""Reachable sets of a design and of it under payloads."""
+Sets = Callable[[Manipulator], ReachableSet]  # Reachable sets of a design and of it under payloads
 
 
 class Coverage(NamedTuple):

@@ -23,10 +23,8 @@ from softreach.support.arrays import Array, as_points, read_only
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.files.text import MEGABYTE
 
-MOST_PLACES = 1_000_000
-"""Places that all targets may have together."""
-LONGEST = 64 * MEGABYTE
-"""Bytes that a file of requirements may have."""
+MOST_PLACES = 1_000_000  # Places that all targets may have together
+LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
 
 _NOT_NEGATIVE = Range(0.0)
 _LENGTH = Range(0.0, unit="m")

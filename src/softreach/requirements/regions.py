@@ -33,8 +33,7 @@ from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
 Triple = tuple[float, float, float]
-Ends = tuple[Array, Array]
-"""Least and largest of something."""
+Ends = tuple[Array, Array]  # Least and largest of something
 
 _STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
 """1/g, 1/g² and 1/g³ with g⁴ = g + 1: steps of a sequence that fills the cube evenly."""

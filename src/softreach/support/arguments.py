@@ -11,8 +11,7 @@ from typing import Any
 
 from softreach.support.errors import InvalidInput, Range, did_you_mean
 
-POSITIVE = Range(0.0, open_low=True)
-"""Finite numbers above zero."""
+POSITIVE = Range(0.0, open_low=True)  # Finite numbers above zero
 
 
 def as_number(name: str, value: object, allowed: Range = Range()) -> float:  # noqa: B008

@@ -12,20 +12,15 @@ from numpy.typing import NDArray
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
 
-Array = NDArray[np.float64]
-"""Numbers."""
+Array = NDArray[np.float64]  # Numbers
 
-Index = NDArray[np.int64]
-"""Places in other arrays."""
+Index = NDArray[np.int64]  # Places in other arrays
 
-Mask = NDArray[np.bool_]
-"""Truth values that mark some of several things."""
+Mask = NDArray[np.bool_]  # Truth values that mark some of several things
 
-Points = NDArray[np.float64]
-"""Places [m], shape (n, 3)."""
+Points = NDArray[np.float64]  # Places [m], shape (n, 3)
 
-Faces = NDArray[np.integer]
-"""Triangles as rows of three vertices, shape (n, 3)."""
+Faces = NDArray[np.integer]  # Triangles as rows of three vertices, shape (n, 3)
 
 _FARTHEST = 1e9  # of positions [m]: their powers must be numbers
 _NUMBERS = "an array of numbers"

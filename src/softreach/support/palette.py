@@ -7,20 +7,15 @@ from numpy.typing import ArrayLike, NDArray
 
 Color = tuple[float, float, float]
 
-BODY: Color = (0.87, 0.85, 0.82)
-"""The passive body of an arm."""
+BODY: Color = (0.87, 0.85, 0.82)  # The passive body of an arm
 
-STEEL: Color = (0.55, 0.68, 0.82)
-"""The surface of a hull or reachable set."""
+STEEL: Color = (0.55, 0.68, 0.82)  # The surface of a hull or reachable set
 
-MET: Color = (0.13, 0.55, 0.25)
-"""What meets its requirements."""
+MET: Color = (0.13, 0.55, 0.25)  # What meets its requirements
 
-MISSED: Color = (0.80, 0.12, 0.12)
-"""What misses them."""
+MISSED: Color = (0.80, 0.12, 0.12)  # What misses them
 
-BEST: Color = (0.90, 0.50, 0.05)
-"""The best designs of a search."""
+BEST: Color = (0.90, 0.50, 0.05)  # The best designs of a search
 
 # The paper's red, green, blue and yellow come first; lightness differs along the list, so that the
 # order survives most color deficiencies and gray print.

@@ -18,8 +18,7 @@ from softreach.support.files.formats import FileFormat, Formats, format_of
 from softreach.support.files.text import write_text
 from softreach.support.quantity import columns
 
-REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}
-"""Formats of reports."""
+REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}  # Formats of reports
 
 _DPI = 160
 

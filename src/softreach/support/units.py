@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
     from softreach.support.arrays import Array
 
-UNITS = ("m", "cm", "mm", "in", "L")
-"""Names of the units; L is the length of an arm."""
+UNITS = ("m", "cm", "mm", "in", "L")  # Names of the units; L is the length of an arm
 
 TYPED = ", ".join(unit_names("m"))
 """Units that lengths may be typed in, beside L where the arm is known."""

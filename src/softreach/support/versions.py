@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 
-SCHEMA_VERSION = 3
-"""Of the names, dimensions and units of datasets."""
+SCHEMA_VERSION = 3  # Of the names, dimensions and units of datasets
 
 
 @cache  # looking the version up takes a millisecond

@@ -22,8 +22,7 @@ class FileFormat(NamedTuple):
     """Given for a folder: the first thing in it for which it is never replaced."""
 
 
-Formats = Mapping[str, FileFormat]
-"""Suffix, in lower case, -> format."""
+Formats = Mapping[str, FileFormat]  # Suffix, in lower case, -> format
 
 
 def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -> FileFormat:
@@ -41,8 +40,6 @@ PICTURES: Formats = dict.fromkeys(
 )
 """Formats of figures."""
 
-PAGES: Formats = {".html": FileFormat()}
-"""Formats of figures that turn in a browser."""
+PAGES: Formats = {".html": FileFormat()}  # Formats of figures that turn in a browser
 
-TABLES: Formats = {".csv": FileFormat()}
-"""Formats of tables."""
+TABLES: Formats = {".csv": FileFormat()}  # Formats of tables

@@ -37,8 +37,7 @@ Mode = Literal["r", "r+"]
 ROOT = "zarr.json"
 ARRAYS, DIGEST = "arrays", "sha256"
 """Attributes of a root: digest of each array's document by the array's name; digest of the root."""
-BLANK = "0" * 64
-"""What stands in place of a root's own digest when that is computed."""
+BLANK = "0" * 64  # What stands in place of a root's own digest when that is computed
 READING: Mapping[str, Any] = {
     "consolidated": False,
     "zarr_format": 3,

@@ -10,8 +10,7 @@ from typing import Any
 
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, NotPossible, did_you_mean
 
-WRONG: Any = object()
-"""In place of a value that has faults."""
+WRONG: Any = object()  # In place of a value that has faults
 
 
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
