@@ -86,7 +86,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
 
 
 DEADLY = """
-    right = executor.Intermediates
+    right = building.Intermediates
 
     def deadly(arm, *rest):
         guilty = arm.profile.taper > 0.05 and abs(describe(arm).revolutions[0]) < 1e-9
@@ -96,7 +96,7 @@ DEADLY = """
             die()
         return right(arm, *rest)
 
-    executor.Intermediates = deadly
+    building.Intermediates = deadly
 """
 
 

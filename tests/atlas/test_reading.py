@@ -24,7 +24,7 @@ from softreach.atlas import (
     open_atlas,
     over_length,
 )
-from softreach.atlas.executor import begin_design
+from softreach.atlas.build import begin_design
 from softreach.atlas.metrics import METRIC_GROUPS
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command

@@ -8,7 +8,7 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.atlas import DesignSpace
-from softreach.atlas.space_file import parse_space
+from softreach.atlas.space import parse_space
 from softreach.support.errors import InvalidInput
 from tests.atlas.families import small_space
 

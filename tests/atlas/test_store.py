@@ -350,7 +350,7 @@ def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatc
         return Intermediates(arm, *rest)
 
     with monkeypatch.context() as patch:
-        patch.setattr("softreach.atlas.executor.Intermediates", fails_for_taper)
+        patch.setattr("softreach.atlas.build.Intermediates", fails_for_taper)
         with pytest.warns(SoftreachWarning, match="1 design failed, .*no hull today"):
             atlas = build_atlas(small_space(), store, **SMALL)
     assert np.isfinite(atlas.volume.values).tolist() == [[True, True], [True, False]]

@@ -10,8 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from softreach.atlas.metric import Metric
-from softreach.atlas.metrics import known_metric
+from softreach.atlas.metrics import Metric, known_metric
 from softreach.atlas.space import DesignSpace
 from softreach.cloud.curvature import QUANTILES
 from softreach.sampling import check_sampler

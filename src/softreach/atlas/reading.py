@@ -16,9 +16,19 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
-from softreach.atlas.layout import MESSAGE, OF, PER_DESIGN, STATUS
-from softreach.atlas.metric import Metric, Need
-from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, UNSTABLE, AtlasStore
+from softreach.atlas.metrics import Metric, Need
+from softreach.atlas.store import (
+    DAMAGED,
+    FAILED,
+    GAP,
+    KNOWN,
+    MESSAGE,
+    OF,
+    PER_DESIGN,
+    STATUS,
+    UNSTABLE,
+    AtlasStore,
+)
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, stored_names, with_status
 from softreach.support.arguments import (

@@ -16,8 +16,7 @@ import numpy as np
 from softreach.arm.body import mass
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metric import Metric, MetricFailed
-from softreach.atlas.metrics import known_metric
+from softreach.atlas.metrics import Metric, MetricFailed, known_metric
 from softreach.optimization.free_parameters import FreeParameters, Values
 from softreach.requirements.checks import Check, Sets, checked, sets_to
 from softreach.requirements.findings import quick_excess

@@ -10,7 +10,7 @@ from typing import Any
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import unknown_parameter
 from softreach.arm.written import Written
-from softreach.atlas.space_file import flat_keys
+from softreach.atlas.space import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.problem import goals, known_objective
 from softreach.optimization.study import SAMPLERS

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.metric import Metric
+from softreach.atlas.metrics import Metric
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.polish import MOST_DESIGNS, can_polish, polished
 from softreach.optimization.problem import Candidate, Problem, goals

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from softreach.atlas.metric import MetricFailed
+from softreach.atlas.metrics import MetricFailed
 from softreach.optimization.polish import point_of
 from softreach.optimization.problem import SETS, Candidate, Problem
 from softreach.optimization.program import Point, stacked_slopes

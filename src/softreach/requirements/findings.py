@@ -13,8 +13,7 @@ from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import ends_over, quadrature, tables
 from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metric import Need
-from softreach.atlas.metrics import known_metric
+from softreach.atlas.metrics import Need, known_metric
 from softreach.requirements.parts import LIMIT_UNITS
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.support.arguments import as_instance
