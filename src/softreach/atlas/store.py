@@ -1,14 +1,9 @@
 """The Zarr v3 store of an atlas: one chunk is one design, and its status is written last.
 
-No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
-and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
-is computed again, even if some of its chunks exist.
-
-The tasks of a job array may all create a store at once and be killed anywhere: its root, which
-holds the command and lists what describes the arrays, appears whole, and of several the first
-stays; then come the arrays, whose bytes do not depend on the writer. Stores are read and
-designs added only when all of them are there. Each array carries the digest of the command, so that
-the same command, and no other, writes a lost root again.
+The tasks of a job array may all create a store at once and be killed anywhere: chunks and the root,
+which holds the command and lists what describes the arrays, are whole or absent, and of several
+roots the first stays; then come the arrays, whose bytes do not depend on the writer. Each carries
+the digest of the command, so that the same command, and no other, writes a lost root again.
 """
 
 from __future__ import annotations
@@ -51,19 +46,11 @@ from softreach.support.files.stores import (
 if TYPE_CHECKING:
     from zarr.storage import StoreLike, StorePath
 
-
-RESOLUTION = 1e-5
-"""Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
-
 CUBE = "unit_activation"  # The array of activations that all designs share
-
-PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")
-"""The arrays whose chunks are designs."""
-
+PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")  # Arrays whose chunks are designs
 OF = "command_sha256"  # Attribute of each array: digest of the command
-
-MISSING = int(np.iinfo(np.int32).min)  # Number in place of a tip that is NaN, or not stored
-
+_RESOLUTION = 1e-5  # step of stored tips over the shortest length: off by no more than half of it
+_MISSING = int(np.iinfo(np.int32).min)  # in place of a tip that is NaN, or not stored
 _CHUNK = 1 << 20  # numbers of a chunk that all designs share
 _CUBE = {
     "units": "1",
@@ -112,11 +99,11 @@ def array_plans(command: Command) -> Iterator[Plan]:
         sizes = designs | {"quantity": len(profiles)} | command.profile_sizes
         yield plan("curvature", float, sizes, about)
     if command.keep_clouds:  # as fixed-point numbers: half the size, and the same error everywhere
-        step = RESOLUTION * space.length_range[0]
+        step = _RESOLUTION * space.length_range[0]
         about = {"units": "m", "long_name": "tip position", "scale_factor": step}
-        about["_FillValue"] = MISSING
+        about["_FillValue"] = _MISSING
         sizes = designs | {"axis": len(AXES), "sample": command.n}
-        yield plan("tip", np.int32, sizes, about, MISSING)
+        yield plan("tip", np.int32, sizes, about, _MISSING)
     about = {"long_name": "metrics of the designs", "metrics": _meanings(numbers)}
     about["alpha_over_length"] = command.alpha_over_length
     yield plan("metrics", float, designs | {"metric": len(numbers)}, about)
@@ -281,7 +268,7 @@ class AtlasStore:
 def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     """Tips as whole multiples of the scale, shape (3, n); NaN as what fills missing ones."""
     steps = np.rint(tips.T / scale)
-    return np.where(np.isnan(steps), MISSING, steps).astype(np.int32)
+    return np.where(np.isnan(steps), _MISSING, steps).astype(np.int32)
 
 
 def _with_command(

@@ -13,20 +13,14 @@ from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
 
 Array = NDArray[np.float64]  # Numbers
-
 Index = NDArray[np.int64]  # Places in other arrays
-
 Mask = NDArray[np.bool_]  # Truth values that mark some of several things
-
 Points = NDArray[np.float64]  # Places [m], shape (n, 3)
-
 Faces = NDArray[np.integer]  # Triangles as rows of three vertices, shape (n, 3)
+Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])  # Named, of columns of one length
 
 _FARTHEST = 1e9  # of positions [m]: their powers must be numbers
 _NUMBERS = "an array of numbers"
-
-Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
-"""A named tuple of arrays of one length: its columns."""
 
 
 def rows(table: Table, chosen: Mask | Index | slice) -> Table:
@@ -97,10 +91,8 @@ def as_points(name: str, values: object, *, any_scale: bool = False) -> Points:
     if points.size == 0 and points.ndim <= 2:
         return points.reshape(0, 3)
     points = as_rows(name, points, 3, allowed)
-    if not any_scale and max(-points.min(), points.max()) > _FARTHEST:
-        raise InvalidInput(
-            name, f"up to {np.abs(points).max():g} m", f"at most {_FARTHEST:g} m far"
-        )
+    if not any_scale and (farthest := max(-points.min(), points.max())) > _FARTHEST:
+        raise InvalidInput(name, f"up to {farthest:g} m", f"at most {_FARTHEST:g} m far")
     return points
 
 
@@ -112,9 +104,8 @@ def check_finite(name: str, values: Array) -> Array:
     if values.ndim < 2:
         raise InvalidInput(name, values, "finite numbers")
     wrong = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-    text = f"{values[wrong[0]]}"
     hint = f"so are {len(wrong):,} rows in all" if len(wrong) > 1 else ""
-    raise InvalidInput(f"{name}[{wrong[0]}]", text, "finite numbers", hint)
+    raise InvalidInput(f"{name}[{wrong[0]}]", values[wrong[0]], "finite numbers", hint)
 
 
 def as_stations(name: str, values: object) -> Array:

@@ -138,12 +138,8 @@ class InvalidDesign(SoftreachError, ValueError):
 
     def __init__(self, faults: Sequence[Fault], source: str = "") -> None:
         self.faults = tuple(faults)
-        lines = list(map(str, self.faults))
-        if source:
-            count = counted(len(self.faults), "problem")
-            super().__init__("\n  ".join([f"{source}: {count}", *lines]))
-        else:
-            super().__init__("\n".join(lines))
+        head = [f"{source}: {counted(len(self.faults), 'problem')}"] if source else []
+        super().__init__(("\n  " if source else "\n").join([*head, *map(str, self.faults)]))
 
 
 _EXTRAS = {
@@ -206,12 +202,9 @@ def warn(text: str) -> None:
     if _silenced.get():
         return
     frame, level = sys._getframe(1), 2
-    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] == _PACKAGE:
+    while frame and frame.f_globals.get("__name__", "").split(".")[0] == __name__.split(".")[0]:
         frame, level = frame.f_back, level + 1
     warnings.warn(text, SoftreachWarning, stacklevel=level)
-
-
-_PACKAGE = __name__.split(".")[0]
 
 
 @contextmanager

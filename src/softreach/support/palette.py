@@ -8,13 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 Color = tuple[float, float, float]
 
 BODY: Color = (0.87, 0.85, 0.82)  # The passive body of an arm
-
 STEEL: Color = (0.55, 0.68, 0.82)  # The surface of a hull or reachable set
-
 MET: Color = (0.13, 0.55, 0.25)  # What meets its requirements
-
 MISSED: Color = (0.80, 0.12, 0.12)  # What misses them
-
 BEST: Color = (0.90, 0.50, 0.05)  # The best designs of a search
 
 # The paper's red, green, blue and yellow come first; lightness differs along the list, so that the
@@ -41,8 +37,6 @@ _LIGHTS = np.array(
     ],
     float,
 )
-
-
 # Pale, so that bundles stand out; the first is the body. Hatches tell them apart without color.
 _MATERIALS: tuple[tuple[Color, str], ...] = (
     (BODY, ""),
@@ -52,8 +46,6 @@ _MATERIALS: tuple[tuple[Color, str], ...] = (
     ((0.90, 0.80, 0.86), "xxxx"),
     ((0.70, 0.70, 0.72), "++++"),
 )
-
-
 _BLOCK = 1 << 15  # samples at a time: temporary arrays stay in the cache
 
 
@@ -86,8 +78,8 @@ def activation_colors(activation: ArrayLike) -> NDArray[np.uint8]:
     """
     gamma = np.asarray(activation, float)
     blocks = [slice(k, k + _BLOCK) for k in range(0, len(gamma), _BLOCK)]
-    largest = max((_magnitudes(gamma[block]).max(initial=0.0) for block in blocks), default=0.0)
-    largest = largest or 1.0
+    sizes = (_magnitudes(gamma[block]).max(initial=0.0) for block in blocks)
+    largest = max(sizes, default=0.0) or 1.0
     lights = _LIGHTS[np.arange(gamma.shape[1]) % len(_LIGHTS)]
     mix = lights * (255.0 / largest) / np.maximum(lights.sum(axis=0), 1.0)
     colors = np.empty((len(gamma), 3), np.uint8)

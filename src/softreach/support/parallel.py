@@ -39,9 +39,8 @@ def thread_count() -> int:
     setting = os.environ.get("SOFTREACH_NUM_THREADS", "")
     if setting.isdigit() and int(setting) > 0:
         return int(setting)
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    has_affinity = hasattr(os, "sched_getaffinity")
+    return len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
 
 
 def threads_here() -> int:

@@ -18,10 +18,8 @@ from typing import Any
 import softreach
 from softreach.support.errors import InvalidInput
 
-ACTUATORS, PROFILES, METRICS = (
-    f"softreach.{each}" for each in ("actuators", "profiles", "metrics")
-)
-"""Groups of entry points: the name of a class, or of a metric, and where it is."""
+# Groups of entry points: the name of a class, or of a metric, and where it is.
+ACTUATORS, PROFILES, METRICS = "softreach.actuators", "softreach.profiles", "softreach.metrics"
 
 _imported: list[ModuleType] = []
 
@@ -73,14 +71,11 @@ def _tried(name: str, value: str, load: Callable[[], Any]) -> Any:
     try:
         return load()
     except (Exception, SystemExit) as error:
-        cause = _cause(error)
-        raise InvalidInput(name, value or "''", "a module that can be imported", cause) from error
-
-
-def _cause(error: BaseException) -> str:
-    """The error in one line, with the line of the user's code that led to it."""
-    others = ("<", *(str(Path(file).parent) for file in (softreach.__file__, importlib.__file__)))
-    steps = traceback.extract_tb(error.__traceback__)
-    own = [step for step in steps if not step.filename.startswith(others)]
-    place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ") + place
+        files = (softreach.__file__, importlib.__file__)
+        others = ("<", *(str(Path(file).parent) for file in files))
+        steps = traceback.extract_tb(error.__traceback__)
+        own = [step for step in steps if not step.filename.startswith(others)]
+        place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+        said = f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
+        allowed = "a module that can be imported"
+        raise InvalidInput(name, value or "''", allowed, said + place) from error

@@ -10,11 +10,9 @@ from contextlib import contextmanager, suppress
 
 from softreach.support.arguments import as_function
 
-hidden = False  # No bars and no lines; `softreach --quiet` sets it
-
-_PAUSE = 30.0  # [s] between lines
-
 Progress = Callable[[int], None]  # Called with the number of items done since the last call
+hidden = False  # No bars and no lines; `softreach --quiet` sets it
+_PAUSE = 30.0  # [s] between lines
 
 
 def silent(done: int) -> None:

@@ -32,24 +32,20 @@ _UNITS = {
 
 def quantity(value: float, unit: str = "", error: float = math.nan, digits: int = 1) -> str:
     """A value to some digits of its error, such as "0.69164 ± 0.00002 m³", or with five digits."""
-    if math.isfinite(value) and 0 < error < math.inf:
-        return f"{_with_error(value, error, digits)} {unit}".rstrip()
-    return f"{five_digits(value)}{unit if unit == '°' else f' {unit}'}".rstrip()
-
-
-def five_digits(value: float) -> str:
-    """A number with five digits that count, and without an exponent up to a million."""
-    return f"{float(f'{value:.5g}'):.6g}"
-
-
-def _with_error(value: float, error: float, digits: int) -> str:
+    if not (math.isfinite(value) and 0 < error < math.inf):
+        return f"{five_digits(value)}{unit if unit == '°' else f' {unit}'}".rstrip()
     error = max(error, _FINEST * abs(value))
     largest = max(abs(value), error)
     power = math.floor(math.log10(largest)) if largest < _SMALLEST else 0
     scale = 10.0**power
     decimals = max(0, digits - 1 - math.floor(math.log10(error / scale)))
     text = f"{value / scale:.{decimals}f} ± {error / scale:.{decimals}f}"
-    return f"({text})e{power}" if power else text
+    return f"{f'({text})e{power}' if power else text} {unit}".rstrip()
+
+
+def five_digits(value: float) -> str:
+    """A number with five digits that count, and without an exponent up to a million."""
+    return f"{float(f'{value:.5g}'):.6g}"
 
 
 def round_below(value: float) -> float:

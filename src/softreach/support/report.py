@@ -19,7 +19,6 @@ from softreach.support.files.text import write_text
 from softreach.support.quantity import columns
 
 REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}  # Formats of reports
-
 _DPI = 160
 
 
@@ -81,8 +80,7 @@ class Report:
 
         text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
         pages = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-        pictures = [[(_source(f), c) for f, c in part.figures()] for part in self.sections]
-        parts = list(zip(self.sections, pictures, strict=True))
+        parts = [(part, [(_source(f), c) for f, c in part.figures()]) for part in self.sections]
         page = pages.from_string(text).render(report=self, parts=parts)
         write_text(path, page, overwrite=overwrite)
 

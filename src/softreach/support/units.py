@@ -16,20 +16,13 @@ if TYPE_CHECKING:
     from softreach.support.arrays import Array
 
 UNITS = ("m", "cm", "mm", "in", "L")  # Names of the units; L is the length of an arm
-
-TYPED = ", ".join(unit_names("m"))
-"""Units that lengths may be typed in, beside L where the arm is known."""
+TYPED = ", ".join(unit_names("m"))  # Units to type lengths in, beside L where the arm is known
+POWERS = {"m": 1, "m2": 2, "m²": 2, "m3": 3, "m³": 3}  # SI unit -> power of the length
 
 _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 _VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6), "in": ("in³", 0.0254**3)}
 """Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
-
-POWERS = {"m": 1, "m2": 2, "m²": 2, "m3": 3, "m³": 3}
-"""SI unit of lengths, areas and volumes -> power of the length."""
-
 _PRESSURES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}
-
-_SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
 
 
 class LengthUnit(NamedTuple):
@@ -54,7 +47,7 @@ class LengthUnit(NamedTuple):
         """Behind a number: "mm", "mm²", "mL"."""
         if power == 3 and not self.relative:
             return _VOLUMES[self.name][0]
-        return self.name + _SUPERSCRIPTS[power]
+        return self.name + ("", "²", "³")[power - 1]
 
     def label(self, name: str, power: int = 1) -> str:
         """Of an axis with lengths, areas or volumes, such as "x / L", "x [mm]" or "V [mL]"."""

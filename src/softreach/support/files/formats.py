@@ -16,10 +16,8 @@ class FileFormat(NamedTuple):
     """A format of files, or of folders, that is written."""
 
     libraries: tuple[str, ...] = ()  # Modules that are imported to write it
-    write: Callable[[Any, BufferedWriter], None] | None = None
-    """Writes a content to a file, where several formats take the same content."""
-    foreign: Foreign | None = None
-    """Given for a folder: the first thing in it for which it is never replaced."""
+    write: Callable[[Any, BufferedWriter], None] | None = None  # Where several take one content
+    foreign: Foreign | None = None  # Of a folder: the first thing for which it is never replaced
 
 
 Formats = Mapping[str, FileFormat]  # Suffix, in lower case, -> format
@@ -39,7 +37,5 @@ PICTURES: Formats = dict.fromkeys(
     FileFormat(("matplotlib",)),
 )
 """Formats of figures."""
-
 PAGES: Formats = {".html": FileFormat()}  # Formats of figures that turn in a browser
-
 TABLES: Formats = {".csv": FileFormat()}  # Formats of tables

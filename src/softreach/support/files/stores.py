@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,16 +35,11 @@ Kind = Literal["cloud", "atlas"]
 Mode = Literal["r", "r+"]
 
 ROOT = "zarr.json"
+# Attributes of a root: digest of each array's document by the array's name; digest of the root.
 ARRAYS, DIGEST = "arrays", "sha256"
-"""Attributes of a root: digest of each array's document by the array's name; digest of the root."""
 BLANK = "0" * 64  # What stands in place of a root's own digest when that is computed
-READING: Mapping[str, Any] = {
-    "consolidated": False,
-    "zarr_format": 3,
-    "chunks": None,
-    "decode_times": False,
-}
-"""Options with which xarray reads a store: as it was written, and numbers as numbers."""
+# Options with which xarray reads a store: as it was written, and numbers as numbers.
+READING: Any = {"consolidated": False, "zarr_format": 3, "chunks": None, "decode_times": False}
 
 _REMEDY = {
     "cloud": "compute the cloud again, or bring back a copy",
@@ -99,12 +94,9 @@ class Opened:
 
     location: object
     kind: Kind
-    durable: bool
-    """Whether a file is on the disk, not only on its way there, when it counts as written."""
-    required: Callable[[Chunk], bool] = lambda _: False
-    """True for chunks that must exist; others that are missing hold fill values."""
-    digests: dict[str, str] = field(default_factory=dict)
-    """Digest of what describes each array, as the root lists it."""
+    durable: bool  # A file that counts as written is on the disk, not only on its way there
+    required: Callable[[Chunk], bool] = lambda _: False  # Others that are missing hold fill values
+    digests: dict[str, str] = field(default_factory=dict)  # Of each array's document, as listed
     place: StorePath = field(init=False)  # For xarray
     group: zarr.Group = field(init=False)
     _noted: dict[Chunk, DamagedStore] | None = None
@@ -218,12 +210,10 @@ class CheckedStore(WrapperStore[Any]):
         self, key: str, prototype: Any, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
         """The content of a file; None if it is missing and may be."""
-        content = await super().get(key, prototype, byte_range)
-        chunk = self._chunk(key)
-        fault = self._fault(chunk, content) if chunk else ""
-        if chunk and fault:
-            self._opened.report(chunk, fault)
-        return None if fault else content
+        content, chunk = await super().get(key, prototype, byte_range), self._chunk(key)
+        if chunk and (fault := self._fault(chunk, content)):
+            return self._opened.report(chunk, fault)
+        return content
 
     async def set(self, key: str, value: Buffer) -> None:
         """Write a file, unless it describes an array otherwise than the root lists."""
@@ -250,13 +240,12 @@ class CheckedStore(WrapperStore[Any]):
         if content is None:
             needed = chunk.array in opened.digests if described else opened.required(chunk)
             return "missing" if needed else ""
+        if described and chunk.array:
+            same = opened.digests.get(chunk.array) == sha256(content.to_bytes())
+            return "" if same else "changed since it was written"
         if described:
-            text = content.to_bytes()
-            if chunk.array:
-                same = opened.digests.get(chunk.array) == sha256(text)
-                return "" if same else "changed since it was written"
             try:
-                opened.digests = unsealed(text)[ARRAYS]
+                opened.digests = unsealed(content.to_bytes())[ARRAYS]
             except ValueError as error:
                 return str(error)
             return ""
@@ -297,9 +286,8 @@ def unsealed(text: bytes) -> dict[str, Any]:
 
 def seal(folder: Path) -> None:
     """List what describes the arrays of a new store on disk in its root."""
-    digests = {
-        path.parent.name: sha256(path.read_bytes()) for path in sorted(folder.glob(f"*/{ROOT}"))
-    }
+    paths = sorted(folder.glob(f"*/{ROOT}"))
+    digests = {path.parent.name: sha256(path.read_bytes()) for path in paths}
     root = json.loads((folder / ROOT).read_bytes())
     root["attributes"] |= {ARRAYS: digests, DIGEST: BLANK}
     (folder / ROOT).write_bytes(sealed(json.dumps(root, indent=2).encode()))

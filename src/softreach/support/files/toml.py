@@ -20,15 +20,15 @@ def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]
     """
     try:
         tables = tomllib.loads(text, parse_float=number)
-        if not _fit_64_bits(tables):
-            raise OverflowError
+        if _fit_64_bits(tables):
+            return tables
     except tomllib.TOMLDecodeError:
         raise
-    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
-        raise ValueError("a whole number has more than 64 bits") from None
     except RecursionError:
         raise ValueError("lists or tables are nested too deep") from None
-    return tables
+    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
+        pass
+    raise ValueError("a whole number has more than 64 bits")
 
 
 def _fit_64_bits(value: Any) -> bool:
