@@ -59,12 +59,14 @@ if TYPE_CHECKING:
     import xarray as xr
     from zarr.storage import StoreLike
 
-
-_AHEAD = 512  # tasks that an executor has at a time
-
 Values = dict[str, Array]
 Outcome = tuple[int, str]  # Number of a design, and why it failed; empty if it did not
 OnOutcome = Callable[[Outcome], None]
+
+_AHEAD = 512  # tasks that an executor has at a time
+_EXECUTORS = "a concurrent.futures executor, or a Dask client"
+_SAMPLE_MEMORY = 700  # bytes of memory of a sample and its share of the triangulation
+_opened: dict[tuple[str, int], AtlasStore] = {}  # Stores by the token of a call and the process
 
 
 @runtime_checkable
@@ -77,8 +79,6 @@ class DaskClient(Protocol):
 
 
 ExecutorLike = Executor | DaskClient | None
-
-_opened: dict[tuple[str, int], AtlasStore] = {}  # Stores by the token of a call and the process
 
 
 def run_designs(
@@ -154,28 +154,23 @@ class _Remote(NamedTuple):
 
 
 def _run_remotely(remote: _Remote, index: int) -> Outcome:
-    """Compute and store a design in a worker; a repeated call gives the same result."""
-    try:
-        return begin_design(_store_of(remote), index)()
-    except SoftreachError as error:
-        raise StoreFailed(str(error)) from None  # this one can be sent back
-
-
-def _store_of(remote: _Remote) -> AtlasStore:
-    """The store, opened once by each worker process, which uses one thread by default."""
+    """Compute and store a design in a worker, which opens the store once and uses one thread."""
     from zarr.storage import MemoryStore
 
     key = remote.token, os.getpid()  # a forked process has what its parent opened
-    if key not in _opened:
-        if key[1] != remote.origin:
-            os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
-            if isinstance(remote.location, dict | MemoryStore):
-                where = "in the memory of another process"
-                raise NotPossible(f"the store is {where}; use a path or a URL")
-        _opened.clear()
-        store = AtlasStore.open(remote.location, durable=remote.durable)
-        _opened[key] = replace(store, command=remote.command)  # which has all functions
-    return _opened[key]
+    try:
+        if key not in _opened:
+            if key[1] != remote.origin:
+                os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
+                if isinstance(remote.location, dict | MemoryStore):
+                    where = "in the memory of another process"
+                    raise NotPossible(f"the store is {where}; use a path or a URL")
+            _opened.clear()
+            store = AtlasStore.open(remote.location, durable=remote.durable)
+            _opened[key] = replace(store, command=remote.command)  # which has all functions
+        return begin_design(_opened[key], index)()
+    except SoftreachError as error:
+        raise StoreFailed(str(error)) from None  # this one can be sent back
 
 
 @no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
@@ -229,10 +224,6 @@ def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:
     message = f"{type(error).__name__}: {error}"
     store.write_status(index, message)
     return index, message
-
-
-_EXECUTORS = "a concurrent.futures executor, or a Dask client"
-_SAMPLE_MEMORY = 700  # bytes of memory of a sample and its share of the triangulation
 
 
 def build_atlas(
@@ -324,11 +315,12 @@ def build_atlas(
         keep_clouds=as_flag("keep_clouds", keep_clouds),
     )
     if space.gaps:
-        _warn_of_gaps(space)
-    atlas, numbers = (
-        AtlasStore.begin(store, command, durable=durable),
-        range(first, space.size, count),
-    )
+        index, reason = next(iter(space.gaps.items()))
+        stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
+        lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
+        warn(f"{lost}, first {space.values(index)}: {reason}")
+    atlas = AtlasStore.begin(store, command, durable=durable)
+    numbers = range(first, space.size, count)
     content = contents(atlas, tips_of=numbers)
     content.warn_of_damage("; damaged designs are computed again")
     ended = np.isin(content.status, (DONE, GAP, UNSTABLE))
@@ -344,13 +336,6 @@ def _shard_of(name: str, value: Any) -> tuple[int, int]:
         return pair
     shown = "/".join(map(str, pair)) if len(pair) == 2 else as_given(value)
     raise InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
-
-
-def _warn_of_gaps(space: DesignSpace) -> None:
-    index, reason = next(iter(space.gaps.items()))
-    stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
-    lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
-    warn(f"{lost}, first {space.values(index)}: {reason}")
 
 
 def _warn_of_metrics(built: xr.Dataset) -> None:

@@ -16,7 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
-from softreach.atlas.metrics import Metric, Need
+from softreach.atlas.metrics import Need
 from softreach.atlas.store import (
     DAMAGED,
     FAILED,
@@ -51,9 +51,7 @@ if TYPE_CHECKING:
 
     AtlasLike = StoreLike | xr.Dataset
 
-
 EXPLAINED = (FAILED, GAP, UNSTABLE)  # The status of designs that have a message
-
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 _QUICK = 3e8  # bytes of tips
@@ -217,10 +215,8 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     if rod.supports_unstable:
         tip, stability = with_unstable(rod).tips_and_status(activation)
         return with_status(cloud_dataset(arm, activation, tip, **drawn), stability)
-    if "tip" in opened:
-        tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)
-    else:
-        tip = rod.tips(activation)
+    kept = "tip" in opened
+    tip = np.ascontiguousarray(row["tip"].values.T, float) if kept else rod.tips(activation)
     return cloud_dataset(arm, activation, tip, **drawn)
 
 
@@ -276,10 +272,9 @@ class Contents(NamedTuple):
     def warn_of_damage(self, then: str) -> None:
         """Say how many designs are damaged, and what is wrong with the first of them."""
         if damaged := np.flatnonzero(self.status == DAMAGED).tolist():
-            what = (
-                f"{counted(len(damaged), 'design')} {'is' if len(damaged) == 1 else 'are'} damaged"
-            )
-            warn(f"{what}, first number {damaged[0]}: {self.messages[damaged[0]]}{then}")
+            first = f"first number {damaged[0]}: {self.messages[damaged[0]]}"
+            are = "is" if len(damaged) == 1 else "are"
+            warn(f"{counted(len(damaged), 'design')} {are} damaged, {first}{then}")
 
 
 def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] = ()) -> Contents:
@@ -371,16 +366,15 @@ def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, floa
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
     for name in store.opened.digests.keys() - {*PER_DESIGN}:
         _ = store.array(name)[...]
-    numbers = range(store.command.space.size) if tips else ()
-    content = contents(store, tips_of=numbers)
+    content = contents(store, tips_of=range(store.command.space.size) if tips else ())
     return _counted(content.status, content.messages, tips)
 
 
 def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
     names = ("todo", "done", "failed", "gaps", "unstable", "damaged")  # in the order of the status
-    counts = dict(zip(names, np.bincount(status, minlength=len(names)).tolist(), strict=True))
-    verified = {"tips_verified": tips_verified, "messages": messages}
-    return AtlasStatus(designs=status.size, **counts, **verified)
+    counts: Any = zip(names, np.bincount(status, minlength=len(names)).tolist(), strict=True)
+    told = {"tips_verified": tips_verified, "messages": messages}
+    return AtlasStatus(designs=status.size, **dict(counts), **told)
 
 
 def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
@@ -440,12 +434,8 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
             table = np.moveaxis(content.tables[name], len(dims), 0)[k]
             known = np.expand_dims(done, (*range(done.ndim, table.ndim),))
             values = np.where(known, table, np.nan)
-            variables[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
+            about: dict[str, Any] = {"units": metric.unit, "long_name": metric.meaning}
+            if Need.ALPHA in metric.needs:
+                about["alpha_over_length"] = command.alpha_over_length
+            variables[metric.name] = (*dims, *metric.over), values, about
     return variables
-
-
-def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
-    attrs: dict[str, Any] = {"units": metric.unit, "long_name": metric.meaning}
-    if Need.ALPHA in metric.needs:
-        attrs["alpha_over_length"] = command.alpha_over_length
-    return attrs

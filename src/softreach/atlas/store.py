@@ -49,6 +49,9 @@ if TYPE_CHECKING:
 CUBE = "unit_activation"  # The array of activations that all designs share
 PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")  # Arrays whose chunks are designs
 OF = "command_sha256"  # Attribute of each array: digest of the command
+CUBE_DIGEST = "unit_activation_sha256"  # Attribute of the root: digest of the activations
+TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
+KNOWN = (DONE, UNSTABLE)  # The status of designs of which metrics are stored
 _RESOLUTION = 1e-5  # step of stored tips over the shortest length: off by no more than half of it
 _MISSING = int(np.iinfo(np.int32).min)  # in place of a tip that is NaN, or not stored
 _CHUNK = 1 << 20  # numbers of a chunk that all designs share
@@ -147,12 +150,6 @@ def _meanings(metrics: Sequence[Metric]) -> str:
 def _labels(command: Command, name: str, labels: Sequence[str]) -> Plan:
     data = np.array(labels, dtype=np.dtypes.StringDType())
     return _plan(command, name, str, {name: len(data)}, {}, "", data)
-
-
-TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
-KNOWN = (DONE, UNSTABLE)  # The status of designs of which metrics are stored
-
-CUBE_DIGEST = "unit_activation_sha256"  # Attribute of the root: digest of the activations
 
 
 @dataclass(frozen=True, eq=False)
