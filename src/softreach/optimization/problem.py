@@ -169,10 +169,7 @@ def known_objective(word: str, given: str | Metric) -> Objective:
     return _rough(metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)))
 
 
-def _rough(
-    name: str, unit: str, meaning: str, compute: Callable[[DesignCase], Estimate]
-) -> Objective:
-    return Objective(name, unit, meaning, compute, smooth=False)
+_rough = partial(Objective, smooth=False)
 
 
 def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
@@ -180,9 +177,8 @@ def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
 
 
 def _coverage(case: DesignCase) -> Estimate:
-    covered = case.check.coverages
-    shares, errors = [each.share for each in covered], [each.error for each in covered]
-    return Estimate(float(np.mean(shares)), float(np.mean(errors)))
+    shares = [(each.share, each.error) for each in case.check.coverages]
+    return Estimate(*np.mean(shares, axis=0).tolist())
 
 
 def _effort(total: Callable[[Array], float]) -> Callable[[DesignCase], Estimate]:
@@ -192,10 +188,9 @@ def _effort(total: Callable[[Array], float]) -> Callable[[DesignCase], Estimate]
 def _sampled(values: Any) -> Estimate:
     """Mean of values over samples of the activation box, and its standard error."""
     known = np.asarray(values, float)
-    known = known[np.isfinite(known)]
-    if not len(known):
-        return Estimate(math.nan)
-    return Estimate(float(known.mean()), float(known.std() / math.sqrt(len(known))))
+    if count := len(known := known[np.isfinite(known)]):
+        return Estimate(float(known.mean()), float(known.std() / math.sqrt(count)))
+    return Estimate(math.nan)
 
 
 def _dexterity(case: DesignCase) -> xr.Dataset:
@@ -319,12 +314,6 @@ class Problem:
         text = json.dumps(record, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 
-    @property
-    def is_finer_on_finer_sets(self) -> bool:
-        """True if reachable sets decide, so that what is best depends on their accuracy."""
-        names = {goal.name for goal in self.goals} | {*self.requirements.measures}
-        return bool(self.requirements.regions) or not names.isdisjoint(SETS)
-
     def case(self, values: Values, accuracy: float) -> DesignCase:
         """The design with these values, to be asked to a relative error of volumes."""
         fine = accuracy <= self.accuracy
@@ -388,11 +377,9 @@ class Problem:
         feasible = [each for each in every if each.is_feasible]
         if not feasible or len(self.goals) < 2:
             return [min(feasible or every, key=self.score)] if every else []
-        costs = np.array([self.costs(each) for each in feasible])
-
-        def is_beaten(k: int) -> bool:
-            no_worse, better = (costs <= costs[k]).all(axis=1), (costs < costs[k]).any(axis=1)
-            return bool((no_worse & better).any() or (costs[:k] == costs[k]).all(axis=1).any())
-
-        kept = (k for k in range(len(costs)) if not is_beaten(k))
+        costs, kept = np.array([self.costs(each) for each in feasible]), []
+        for k, own in enumerate(costs):
+            is_beaten = (costs <= own).all(axis=1) & (costs < own).any(axis=1)
+            if not (is_beaten.any() or (costs[:k] == own).all(axis=1).any()):
+                kept.append(k)
         return [feasible[k] for k in sorted(kept, key=lambda k: tuple(costs[k]))]

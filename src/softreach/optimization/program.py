@@ -189,7 +189,7 @@ class Point:
     def inequalities(self) -> tuple[Part, ...]:
         """Quantities kept above 0: limits, measures, regions, other goals."""
         near = (_near_place(part) for part in self._tips if part.within > 0.0)
-        return (*near, *self._rules(), *self._shares(), *self._of_design(), *self._other_goals())
+        return (*near, *self._rules(), *self._of_design())
 
     @property
     def _size(self) -> int:
@@ -298,15 +298,14 @@ class Point:
                 slope[place, near, at] = ((ahead - behind) / apart)[place]
         return slope
 
-    def _shares(self) -> Iterator[Part]:
-        for target, region in self.design.problem.requirements.regions:
+    def _of_design(self) -> Iterator[Part]:
+        """Shares of regions, measures and limits of the design, and the costs of other goals."""
+        needs, goals = self.design.problem.requirements, self.design.problem.goals
+        for target, region in needs.regions:
             for number in range(len(self.design.rods)):
                 share = self.design.share(number, region)
                 slope = partial(self.design.share_slope, number, region)
                 yield self._limit(target.name, -1.0, share, target.share, slope)
-
-    def _of_design(self) -> Iterator[Part]:
-        needs = self.design.problem.requirements
         limits = [
             (name, sense, limit)
             for name, ends in needs.measures.items()
@@ -317,6 +316,12 @@ class Point:
         for name, sense, limit in limits + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
             slope = partial(self.design.slope, name)
             yield self._limit(name, sense, self.design.value(name), limit, slope)
+        for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
+            if k != self.goal:
+                scale = abs(floor) or 1.0
+                value = np.array([(floor - self._cost(goal)) / scale])
+                slope = partial(lambda g, s: -self._cost_slope(g)[None] / s, goal, scale)
+                yield Part(goal.name, value, slope, scale=scale)
 
     def _limit(
         self, name: str, sense: float, value: float, limit: float, derived: Callable[[], Array]
@@ -331,15 +336,6 @@ class Point:
 
         room = np.array([sense * (limit - value) / scale - _SPARE])
         return Part(name, room, slope, scale=scale)
-
-    def _other_goals(self) -> Iterator[Part]:
-        goals = self.design.problem.goals
-        for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
-            if k != self.goal:
-                scale = abs(floor) or 1.0
-                value = np.array([(floor - self._cost(goal)) / scale])
-                slope = partial(lambda g, s: -self._cost_slope(g)[None] / s, goal, scale)
-                yield Part(goal.name, value, slope, scale=scale)
 
 
 @dataclass(frozen=True)
@@ -366,16 +362,10 @@ def stacked_slopes(parts: Sequence[Part]) -> Array:
 
 def _near_place(part: Part) -> Part:
     """Room on both sides along each axis in a cube within the distance that is allowed."""
-    half = _ROOM * part.within / np.sqrt(3.0)
+    half, scale = _ROOM * part.within / np.sqrt(3.0), part.scale * np.sqrt(3.0) / _ROOM
     value = np.concatenate([half - part.value, half + part.value])
-    scale = part.scale * np.sqrt(3.0) / _ROOM
-    return Part(
-        part.name,
-        value,
-        lambda: np.concatenate([-part.slope(), part.slope()]),
-        scale=scale,
-        unit=part.unit,
-    )
+    slope = partial(lambda of: np.concatenate([-of(), of()]), part.slope)
+    return Part(part.name, value, slope, scale=scale, unit=part.unit)
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:

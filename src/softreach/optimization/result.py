@@ -241,9 +241,8 @@ class Search(Reported):
                 if path.name not in names and path.read_text("utf-8").startswith(_FOUND):
                     path.unlink()
         for name, every in (("front.csv", False), ("candidates.csv", True)):
-            write_table(
-                place / name, self.table(every=every, unit=unit or "m"), overwrite=overwrite
-            )
+            table = self.table(every=every, unit=unit or "m")
+            write_table(place / name, table, overwrite=overwrite)
         self.report(unit).save(place / "report.html", overwrite=overwrite)
 
     def _design_text(self, each: Candidate) -> str:
@@ -305,11 +304,7 @@ class Search(Reported):
             title="Search of designs",
             verdict=_verdict(self),
             state=self.verdict,
-            facts=[
-                f"{counted(self.designs, 'design')}, {self.seconds:.1f} s",
-                *_remarks(self),
-                *fault,
-            ],
+            facts=[*_remarks(self), *fault],
             sections=[
                 _best(self, shown),
                 Section(
@@ -424,6 +419,7 @@ def _number_text(parameter: FreeParameter, value: float | str, unit: LengthUnit)
 
 def _remarks(search: Search) -> Iterator[str]:
     problem, judged = search.problem, search.judged
+    yield f"{counted(search.designs, 'design')}, {search.seconds:.1f} s"
     ways = [f"{judged['bounds']} by bounds alone"] if judged["bounds"] else []
     ways += [f"{judged['coarse']} on coarse sets (to {problem.coarse:g})"] * bool(judged["coarse"])
     ways.append(f"{judged['full']} to full accuracy ({problem.accuracy:g})")

@@ -15,7 +15,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import Metric
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.polish import MOST_DESIGNS, can_polish, polished
-from softreach.optimization.problem import Candidate, Problem, goals
+from softreach.optimization.problem import SETS, Candidate, Problem, goals
 from softreach.optimization.result import Search
 from softreach.optimization.study import SAMPLERS, Sampler, Study
 from softreach.requirements.requirements import Requirements
@@ -129,10 +129,12 @@ def search(
         first=first,
     )
     polishes = as_flag("polish", polish) and can_polish(problem)
-    progress = as_progress(progress)
-    last = polishes and (len(targets) > 1 or problem.is_finer_on_finer_sets)
+    asked = {*needs.measures, *(goal.name for goal in targets)}
+    by_sets = bool(needs.regions) or not asked.isdisjoint(SETS)  # what is best depends on accuracy
+    last = polishes and (len(targets) > 1 or by_sets)
     kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
-    return _Run(problem, study, designs, kept, polishes, follow, progress).result(first)
+    run = _Run(problem, study, designs, kept, polishes, follow, as_progress(progress))
+    return run.result(first)
 
 
 @dataclass(eq=False)

@@ -121,20 +121,29 @@ class Study:
         if self.kind != "cma" or len(self.candidates) < _WARM:
             return
         complete = (self._optuna.trial.TrialState.COMPLETE,)
+        options = {"n_startup_trials": 0, "warn_independent_sampling": False}
+        make = self._optuna.samplers.CmaEsSampler
         with _quiet():
-            self._study.sampler = self._optuna.samplers.CmaEsSampler(
-                source_trials=self._study.get_trials(states=complete),
-                n_startup_trials=0,
-                seed=self.seed + 1,
-                warn_independent_sampling=False,
-            )
+            trials = self._study.get_trials(states=complete)
+            self._study.sampler = make(source_trials=trials, seed=self.seed + 1, **options)
 
     def _created(self, storage: Any) -> optuna.Study:
+        samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
+        population = {"population_size": max(8, min(self._first, 48))}
+        after = {"multivariate": True, "constant_liar": True, "n_startup_trials": self._first}
+        make, options = {
+            "cma": (samplers.CmaEsSampler, quiet),
+            "tpe": (samplers.TPESampler, after),
+            "nsga2": (samplers.NSGAIISampler, population),
+            "nsga3": (samplers.NSGAIIISampler, population),
+            "sobol": (samplers.QMCSampler, {"scramble": True, **quiet}),
+            "random": (samplers.RandomSampler, {}),
+        }[self.kind]
         return self._optuna.create_study(
             study_name=_NAME,
             storage=storage,
             directions=["minimize"] * max(1, len(self.problem.goals)),
-            sampler=self._made_sampler(),
+            sampler=make(seed=self.seed, **options),
             load_if_exists=True,
         )
 
@@ -165,20 +174,6 @@ class Study:
         real = all(each.is_real for each in self.problem.parameters.free)
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
-    def _made_sampler(self) -> Any:
-        samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
-        population = {"population_size": max(8, min(self._first, 48))}
-        after = {"multivariate": True, "constant_liar": True, "n_startup_trials": self._first}
-        make, options = {
-            "cma": (samplers.CmaEsSampler, quiet),
-            "tpe": (samplers.TPESampler, after),
-            "nsga2": (samplers.NSGAIISampler, population),
-            "nsga3": (samplers.NSGAIIISampler, population),
-            "sobol": (samplers.QMCSampler, {"scramble": True, **quiet}),
-            "random": (samplers.RandomSampler, {}),
-        }[self.kind]
-        return make(seed=self.seed, **options)
-
     @lazy
     def _space(self) -> dict[str, Any]:
         kinds, space = self._optuna.distributions, {}
@@ -205,13 +200,11 @@ def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
     """Designs evenly spread over all ranges and choices, after the one that the user has."""
     from scipy.stats import qmc
 
-    start = problem.parameters.start()
-    if start is not None:
+    if (start := problem.parameters.start()) is not None:
         yield start
     free = problem.parameters.free
     sampler = qmc.Sobol(len(free), rng=np.random.default_rng(seed))
-    cube = sampler.random(1 << max(0, math.ceil(math.log2(max(count, 1)))))[:count]
-    for place in cube:
+    for place in sampler.random_base2(math.ceil(math.log2(max(count, 1))))[:count]:
         yield {each.name: each.at(float(x)) for each, x in zip(free, place, strict=True)}
 
 
@@ -226,7 +219,7 @@ def _storage(place: str) -> Any:
         raise InvalidInput("storage", place, "a file in a folder that exists")
     is_new = not path.exists() or not path.stat().st_size
     is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
-    if not is_new and not (_is_own_database(path) if is_database else _is_own_journal(path)):
+    if not is_new and not _is_of_a_search(path, is_database=is_database):
         raise InvalidInput("storage", place, "a new file, or that of a search: choose another name")
     if is_database:
         return f"sqlite:///{path}"
@@ -244,20 +237,17 @@ def _storage(place: str) -> Any:
     return JournalStorage(JournalFileBackend(str(path)))
 
 
-def _is_own_database(path: Path) -> bool:
+def _is_of_a_search(path: Path, *, is_database: bool) -> bool:
     import sqlite3
 
-    with suppress(sqlite3.Error):
-        place = f"{path.absolute().as_uri()}?mode=ro"
-        with closing(sqlite3.connect(place, uri=True)) as database:
-            names = database.execute("SELECT study_name FROM studies").fetchall()
-        return set(names) <= {(_NAME,)}
-    return False
-
-
-def _is_own_journal(path: Path) -> bool:
-    with suppress(ValueError, KeyError, TypeError), path.open("rb") as file:
-        first = json.loads(file.readline(4096))
+    with suppress(sqlite3.Error, ValueError, KeyError, TypeError):
+        if is_database:
+            place = f"{path.absolute().as_uri()}?mode=ro"
+            with closing(sqlite3.connect(place, uri=True)) as database:
+                names = database.execute("SELECT study_name FROM studies").fetchall()
+            return set(names) <= {(_NAME,)}
+        with path.open("rb") as file:
+            first = json.loads(file.readline(4096))
         return first["op_code"] == 0 and first["study_name"] == _NAME
     return False
 
