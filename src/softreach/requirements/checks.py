@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.requirements.advice import advice
 from softreach.requirements.findings import (
     Finding,
     Verdict,
+    advice,
     design_limits,
     limit_finding,
     measure_findings,
@@ -133,8 +133,7 @@ class Check(Reported):
         Returns:
             As `configuration` has them; None where there are no places.
         """
-        count = min(as_integer("count", count, 0), len(self.places))
-        if not count:
+        if not (count := min(as_integer("count", count, 0), len(self.places))):
             return None
         rows = np.unique(np.linspace(0, len(self.places) - 1, count).round().astype(int))
         arm = with_payload(self.arm, self.payloads[-1])
@@ -152,15 +151,14 @@ class Check(Reported):
         counts = counts or [f"met, all {len(own)}"]
         space = 9 if "undecided" in own else 6
         rows = [(f.word.ljust(space), f.name, f.text) for f in self.findings]
-        caption = "The arm at the places that it must reach."
-        drawn = partial(plot_check, self, unit=unit)
+        caption, drawn = "The arm at the places that it must reach.", partial(plot_check, self)
         return Report(
             title="Requirements of an arm",
             verdict=f"Requirements of an arm of {unit.text(self.arm.length)}: {'; '.join(counts)}",
             state=self.verdict,
             sections=[
                 Section(title="Requirements", rows=rows, printed=max(1, len(rows))),
-                Section(title="Picture", figures=lambda: [(drawn().figure, caption)]),
+                Section(title="Picture", figures=lambda: [(drawn(unit=unit).figure, caption)]),
                 Section(title="The design", text=self.arm.to_toml()),
                 Section(title="The requirements", text=self.requirements.to_toml()),
             ],
@@ -240,9 +238,8 @@ def check(
     needs = as_instance("requirements", requirements, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.2))
     if not (needs.targets or needs.keeps or needs.limits.given or needs.measures):
-        raise NotPossible(
-            "the requirements are empty: add a target, a region to keep to, a limit or a measure"
-        )
+        hint = "add a target, a region to keep to, a limit or a measure"
+        raise NotPossible(f"the requirements are empty: {hint}")
     return checked(arm, needs, accuracy, step=as_progress(progress))
 
 

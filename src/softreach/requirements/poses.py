@@ -183,7 +183,13 @@ class Body(NamedTuple):
     def of(cls, rod: TipMap, gamma: Array, parts: int) -> Body:
         """The sections between so many parts."""
         z = np.linspace(0.0, rod.length, parts + 1)
-        frames, strains, radius = rod.frames(gamma, z), rod.strains(gamma, z), _widest(rod.arm, z)
+        frames, strains = rod.frames(gamma, z), rod.strains(gamma, z)
+        radius = rod.arm.profile.radius(z)
+        if rod.arm.bundles:
+            outline = rod.arm.outline(z)
+            held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
+            held = held[2:] | held[1:-1] | held[:-2]
+            radius = radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
         turn = np.linalg.norm(strains.curvature, axis=2) * np.maximum(strains.extension, 1.0)
         speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z))
         step = rod.length / parts
@@ -216,17 +222,6 @@ class Body(NamedTuple):
         bound = np.maximum(between.max(axis=1), seen)
         seen[lost] = bound[lost] = np.nan
         return seen, bound
-
-
-def _widest(arm: Manipulator, z: Array) -> Array:
-    """Radius of what is farthest from the axis, body or bundles, at ascending stations Z [m]."""
-    radius = arm.profile.radius(z)
-    if not arm.bundles:
-        return radius
-    outline = arm.outline(z)
-    held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
-    held = held[2:] | held[1:-1] | held[:-2]
-    return radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
 
 
 class Posed(NamedTuple):

@@ -167,10 +167,10 @@ class Requirements:
         try:
             return cls(**parts)
         except InvalidInput as error:
-            fault = Fault(error.name, error.value, f"must be {error.allowed}")
-            raise InvalidDesign([fault], source) from None
+            faults = [Fault(error.name, error.value, f"must be {error.allowed}")]
         except InvalidDesign as error:
-            raise InvalidDesign(error.faults, source) from None
+            faults = error.faults
+        raise InvalidDesign(faults, source)
 
     def to_toml(self) -> str:
         """The text of a file in m and kg, from which `from_toml` makes the same."""
@@ -301,9 +301,9 @@ class _Reader(FaultReader):
         numbers = {"within": "m", "share": "", "places": "m"}
         values = self._part(raw, path, numbers, ("name", "file"))
         file = values.pop("file", None)
-        sources = [x for x in (values.get("places"), file, values.get("region")) if x is not None]
-        if len(sources) != 1:
-            allowed = f"needs one of places, file, {', '.join(_SHAPES)}, and has {len(sources)}"
+        count = sum(x is not None for x in (values.get("places"), file, values.get("region")))
+        if count != 1:
+            allowed = f"needs one of places, file, {', '.join(_SHAPES)}, and has {count}"
             return self._refuse(path, None, allowed)
         if file is not None:
             try:
@@ -346,9 +346,8 @@ class _Reader(FaultReader):
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
-                return Mesh.load(
-                    self._beside(table, "vertices_m and faces"), unit=raw.get("mesh_unit")
-                )
+                file = self._beside(table, "vertices_m and faces")
+                return Mesh.load(file, unit=raw.get("mesh_unit"))
             except InvalidInput as error:
                 of_unit = error.name == "unit"
                 place, value = (f"{path}_unit", error.value) if of_unit else (path, table)
