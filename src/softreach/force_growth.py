@@ -1,10 +1,8 @@
 """Growth of a force while the tip stays where it is: linear programs, each corrected by Newton.
 
-The bundles move so that the force with which the tip pushes grows most: a linear program in the
-change of activations, of which none may be large, and of the force, under ∂r/∂γ δγ + ∂r/∂F δF = 0
-and the bounds. Newton's method then puts the tip back to its place. A step counts only if the force
-grew about as foreseen and the rod rests stably; otherwise it is tried at half its length. So the
-bundles follow a path of stable equilibria along which the force grows.
+A linear program in small changes of activations and of the force, under ∂r/∂γ δγ + ∂r/∂F δF = 0 and
+the bounds, has the most growth. A step counts only if the force grew about as foreseen and the rod
+rests stably; otherwise it is tried at half its length.
 """
 
 from __future__ import annotations
@@ -67,8 +65,7 @@ class Grown(NamedTuple):
 
     fixed: FixedTip
     stop: Stop
-    limits: Mask
-    """Mask of the bundles at a bound that keeps the force from growing, shape (bundles,)."""
+    limits: Mask  # Of the bundles at a bound that keeps the force from growing, shape (bundles,)
     slope: float  # By how much the force would change if the place moved [N/m]
     before: list[FixedTip]  # The tip on the way there, up to nearly as large a force
 
@@ -78,8 +75,7 @@ class _Program(NamedTuple):
     force: float  # Change of the force [N]
     rate: float  # The same in units of force per range of activation
     multipliers: Array  # Lagrange multiplier of each bundle's bounds, shape (bundles,)
-    slope: float
-    """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
+    slope: float  # Change of the force if the place moved [N/m]; NaN if it was not solved
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +149,9 @@ class Growth:
                 if reach < _OF_SHORTEST * self._shortest:
                     return None
             share, unstable = self._step(path, best)
-            if share > 0.0 and self._is_too_coarse(path[-1]):
+            near_loss = share > 0.0 and path[-1].response.margin <= _NEAR_LOSS
+            may_err = near_loss and not self.pushing.is_finest
+            if may_err and self.pushing.error(*path[-1]) > 0.5 * self.allowed:
                 break
             reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
             reach = min(reach, _LONGEST)
@@ -175,11 +173,6 @@ class Growth:
             return 0.0, not stable
         path.append(tried)
         return share, False
-
-    def _is_too_coarse(self, fixed: FixedTip) -> bool:
-        if fixed.response.margin > _NEAR_LOSS or self.pushing.is_finest:
-            return False
-        return self.pushing.error(*fixed) > 0.5 * self.allowed
 
     @property
     def _shortest(self) -> float:

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Stop", "blocked_force"]
 
-
 _MEANINGS = " ".join(f"{stop.value}={stop.name.lower()}" for stop in Stop)
 
 

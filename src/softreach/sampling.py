@@ -17,7 +17,6 @@ from softreach.support.errors import InvalidInput
 Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 
-
 _LARGEST_SEED = 2**63 - 1  # what stores hold as a number
 
 
@@ -25,8 +24,7 @@ class Sampler(NamedTuple):
     """One way to spread points."""
 
     begin: Callable[[int, int, int], Draw]  # (n, dim, seed) -> a source of points
-    refusal: Callable[[int, int], str | None]
-    """(n, dim) -> which n to use instead, or None when n will do."""
+    refusal: Callable[[int, int], str | None]  # (n, dim) -> which n will do; None if n does
 
 
 def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
@@ -37,7 +35,7 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
 
 def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterator[Array]:
     """The points of `sample_cube`, of checked arguments, in consecutive blocks up to `size`."""
-    draw = SAMPLERS[sampler].begin(n, dim, seed) if dim else _nothing
+    draw = (SAMPLERS[sampler].begin if dim else _uniform)(n, dim, seed)
     for first in range(0, n, size):
         yield draw(first, min(size, n - first))
 
@@ -50,10 +48,6 @@ def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
     if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)
     return n, seed
-
-
-def _nothing(first: int, count: int) -> Array:
-    return np.empty((count, 0))
 
 
 def _uniform(n: int, dim: int, seed: int) -> Draw:

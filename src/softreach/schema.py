@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 
-
 _CELL = 1 / 20  # of the arm's length
 _EDGES = POSITIVE._replace(unit="m")
 
@@ -45,6 +44,16 @@ _OTHERS = {  # where they are asked for
     "bundle_activation": (("sample", "line"), None, "activation that drives and lengths lead to"),
     "marker_position": (("sample", "marker", "axis"), "m", "place of each marker"),
 }
+_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided 4=snaps"
+_KINDS = {"tip": np.float64, "activation": np.float64, "status": np.int8}
+_ATTRIBUTES = {
+    "design": (str, "the text of a design file"),
+    "softreach_version": (str, "a text"),
+    "sampler": (str, "the name of a sampler"),
+    "tol": ((int, float), "a number"),
+    "seed": (int, "a whole number"),  # a cloud of another program has none
+}
+_SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}
 
 
 def cloud_dataset(
@@ -65,9 +74,6 @@ def cloud_dataset(
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length
     return cloud
-
-
-_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided 4=snaps"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
@@ -138,8 +144,7 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     for name, (dims, _, _) in _CLOUD.items():
         if cloud[name].dims != dims:
             raise InvalidInput(f"cloud.{name}", cloud[name].dims, f"a variable over {dims}")
-    version = cloud.attrs.get("schema_version")
-    if version != SCHEMA_VERSION:
+    if (version := cloud.attrs.get("schema_version")) != SCHEMA_VERSION:
         raise InvalidInput("cloud.attrs['schema_version']", version, str(SCHEMA_VERSION))
     return cloud
 
@@ -150,16 +155,6 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
     for what, given, allowed in _faults(cloud):
         raise InvalidInput(f"cloud.{what}", given, allowed)
     return cloud
-
-
-_KINDS = {"tip": np.float64, "activation": np.float64, "status": np.int8}
-_ATTRIBUTES = {
-    "design": (str, "the text of a design file"),
-    "softreach_version": (str, "a text"),
-    "sampler": (str, "the name of a sampler"),
-    "tol": ((int, float), "a number"),
-    "seed": (int, "a whole number"),  # a cloud of another program has none
-}
 
 
 def _faults(cloud: xr.Dataset) -> Iterator[tuple[str, Any, Any]]:
@@ -209,9 +204,8 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[tuple[str, A
 def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, Any]:
     """Names of the bundles, of all or of some; units if they differ, symbols if units tell none."""
     names = list(arm.input_names if names is None else names)
-    units = _units(arm, names)
     of_name = dict(zip(arm.input_names, input_symbols(arm), strict=True))
-    symbols = tuple(of_name[name] for name in names)
+    units, symbols = _units(arm, names), tuple(of_name[name] for name in names)
     coordinates: dict[str, Any] = {"bundle": names}
     if len(set(units)) > 1:
         coordinates["unit"] = ("bundle", list(units))
@@ -223,9 +217,6 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
     of_name = dict(zip(arm.input_names, arm.input_units, strict=True))
     return tuple(of_name[name] for name in (of_name if names is None else names))
-
-
-_SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}
 
 
 def _symbols_of(units: Iterable[str]) -> tuple[str, ...]:
@@ -299,10 +290,9 @@ def _pose(arm: Manipulator) -> dict[str, list[float]]:
 
 def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
     """The frame of the places in a dataset, which it must name."""
-    frame = data.attrs.get("frame")
-    if frame not in ("world", "base"):
-        raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
-    return frame
+    if (frame := data.attrs.get("frame")) in ("world", "base"):
+        return frame
+    raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
 
 
 def base_of(data: xr.Dataset) -> Array:
