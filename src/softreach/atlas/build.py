@@ -247,16 +247,14 @@ def build_atlas(
 
     All designs share one set of unit activations, scaled to each one's bounds. Every design is
     stored when it is done: after an interruption, even by kill -9, the same call continues and ends
-    with the same numbers. What is stored is verified first: damaged designs are computed again. A
-    design that fails is recorded with its error, the rest goes on, and the
-    next call tries it again. Combinations that no arm can have stay gaps.
+    with the same numbers. Damaged designs are computed again, and so are those that failed, which
+    are recorded with their errors. Combinations that no arm can have stay gaps.
 
-    Under loads, only samples with a stable equilibrium count, and `lost_share` tells the share of
-    the others. A design of which no sample is stable has no other metric: the rest is NaN, with a
-    message, and it is not tried again.
+    Under loads, only samples with a stable equilibrium count; `lost_share` is the share of the
+    others. Without any, a design has no other metric, but a message, and is not tried again.
 
-    Stored clouds are rounded to 1e-5 of the shortest length, an error of half of that at most in
-    each coordinate, which halves their size; metrics are computed before.
+    Stored clouds are rounded to 1e-5 of the shortest length, which halves their size; metrics are
+    computed before.
 
     Args:
         space: The designs.
@@ -274,27 +272,23 @@ def build_atlas(
             per thread in memory; a `concurrent.futures` executor; or a Dask client. Workers write
             to the store, which they must see at the same place, and use one thread each unless
             ``SOFTREACH_NUM_THREADS`` says otherwise.
-        shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
-            store without knowing of each other.
-        durable: Whether a design counts as done only when not even a power cut can lose it.
-            Without, it can damage designs of the last seconds, which the next call notices.
-        progress: Called with the number of designs done since its last call; by default a bar is
-            shown on a terminal.
+        shard: (i, k) computes every k-th design from the i-th on, i from 0, so that k processes
+            share a store.
+        durable: Whether a design counts as done only when not even a power cut can lose it; else
+            it can damage designs of the last seconds, which the next call notices.
+        progress: Called with the number of designs done since its last call; None for a bar.
 
     Returns:
         The atlas as `open_atlas` has it.
 
     Raises:
-        InvalidInput: An argument out of range, no valid design, or a store that another command
-            began; the message says what differs.
+        InvalidInput: An argument out of range, no valid design, or a store of another command.
         DamagedStore: The root of the store is damaged, and another command began it.
         StoreFailed: The store cannot be written, for instance because the disk is full.
-        SoftreachError: A worker died and broke its executor; the same call with a new one
-            continues.
+        SoftreachError: A worker died and broke its executor; a new one continues.
 
     Warns:
-        SoftreachWarning: There are gaps, failed or damaged designs, or designs whose points are too
-            sparse for the radius.
+        SoftreachWarning: Gaps, failed or damaged designs, or points too sparse for the radius.
     """
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)

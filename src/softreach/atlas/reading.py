@@ -61,8 +61,8 @@ _MOST_MESSAGES = 10
 def open_atlas(store: StoreLike) -> xr.Dataset:
     """An atlas with a dimension for each parameter, so that ``atlas.volume.sel(taper=...)`` works.
 
-    Clouds are read when they are used. Designs that are not done are NaN, and
-    so are those of which no activation is stable, but for their `lost_share`.
+    Clouds are read when they are used. Designs that are not done are NaN, and so are those of which
+    no activation is stable, but for their `lost_share`.
 
     Args:
         store: Path, URL or Zarr store.
@@ -134,8 +134,7 @@ class AtlasStatus:
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """Number of designs of an atlas that are done, and faults of the others.
 
-    Metrics are verified, and so are tips if they are on disk and take no more than a second;
-    `verify_atlas` verifies all of them.
+    Metrics are verified, and tips only if they are few and on disk; `verify_atlas` reads all.
 
     Args:
         atlas: A store; or a dataset from `open_atlas`, which has the status of when it was opened.
@@ -160,9 +159,7 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
 
 
 def verify_atlas(store: StoreLike) -> AtlasStatus:
-    """Read all of an atlas and check it: what is damaged, and how much is done.
-
-    The command that built the atlas computes again what is damaged.
+    """Read all of an atlas: what is damaged, which its command repairs, and how much is done.
 
     Args:
         store: Path, URL or Zarr store.
@@ -192,8 +189,8 @@ def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
 def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
 
-    Stored tips are rounded to 1e-5 of the shortest length; without them the cloud is computed
-    again, exactly as it was, and so are those of loaded designs, whose samples have a status.
+    Stored tips are rounded to 1e-5 of the shortest length; without them, and of loaded designs,
+    whose samples have a status, the cloud is computed again, exactly as it was.
 
     Args:
         atlas: A store, or a dataset from `open_atlas`.
@@ -234,8 +231,8 @@ def best_designs(
         atlas: A store, or a dataset from `open_atlas`.
         metric: What to compare.
         smallest: Whether smaller values are better.
-        where: Constraints that all hold, such as `unreachability<=0.4`; parameters are called by
-            their names, or with the units of the command line, as in `taper_deg<=1`.
+        where: Constraints that all hold, such as `unreachability<=0.4`, or `taper_deg<=1` in the
+            units of the command line.
         count: How many designs at most.
 
     Returns:

@@ -67,12 +67,11 @@ def search(
     """The designs that meet requirements and are best in one objective or in several.
 
     A design is judged by bounds first, which prove in a millisecond what it cannot do, then on
-    coarse sets. The first quarter of the designs is spread evenly over all ranges and choices; the
-    best of them are polished by quadratic programs on exact derivatives, in which the poses at the
-    targets move along with the design; then a sampler of Optuna (CMA-ES for numbers, TPE where
-    there are choices, NSGA-II for several objectives) looks where it pays, and the best of what it
-    finds are polished again. What is reported was computed again to full accuracy, the best
-    polished there once more.
+    coarse sets. The first quarter is spread evenly over all ranges and choices; the best are
+    polished by quadratic programs on exact derivatives, in which the poses at the targets move
+    along; then a sampler of Optuna (CMA-ES for numbers, TPE where there are choices, NSGA-II for
+    several objectives) looks where it pays, and the best of what it finds are polished again. What
+    is reported was computed again to full accuracy, the best polished there once more.
 
     Args:
         base: The design to vary, or several by name, one of which is chosen.
@@ -88,10 +87,8 @@ def search(
         designs: Number of designs that are looked at, with those of polishes.
         accuracy: Relative error of the volumes that are reported.
         polish: Whether designs are polished, where objectives have derivatives.
-        sampler: Sampler of Optuna: "cma", "tpe", "nsga2", "nsga3", "sobol", "random"; "auto"
-            chooses.
-        seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
-            number of threads.
+        sampler: Of Optuna: "cma", "tpe", "nsga2", "nsga3", "sobol", "random"; "auto" chooses.
+        seed: Of the first designs and of the sampler; the number of threads changes no result.
         storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
             same call goes on where it was interrupted, and ends as if it had not been. Searches of
             other seeds may share it, and each ends with the best of all.

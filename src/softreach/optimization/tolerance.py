@@ -79,10 +79,9 @@ def tolerance(
     To first order the boundary of the reachable set moves along its normal by σ_n, the root of the
     sum of (σ ∂r/∂p · n)²: the share of the set that is kept is 1 - ∮ σ_n dA / (√(2π) V) in the
     mean, theory (99). Its quantile is that of samples of the deviations; a place at a depth d
-    within the boundary is kept with the probability Φ(d / σ_n). Beside a sharp rim that is too
-    much, as only the nearer of both sheets counts. Nothing of this is taken on trust: arms are
-    really made with the first of these samples, their sets are compared, and places are searched
-    for from all solutions of the design.
+    within the boundary is kept with the probability Φ(d / σ_n), less beside a sharp rim, where
+    only the nearer of both sheets counts. To check this, arms are really made with the first of
+    these samples, their sets are compared, and places are searched for from all solutions.
 
     Args:
         arm: The design, of three free bundles or more.
