@@ -130,10 +130,8 @@ def _run_in_pool(
                     store.write_status(*outcome)
                 on_outcome(outcome)
     except BrokenExecutor as error:
-        raise NotPossible(
-            "a worker died and broke its executor; finished designs are safe: the same call with "
-            "a new executor continues"
-        ) from error
+        then = "finished designs are safe: the same call with a new executor continues"
+        raise NotPossible(f"a worker died and broke its executor; {then}") from error
     finally:
         for future in pending:
             future.cancel()
@@ -341,10 +339,9 @@ def _warn_of_metrics(built: xr.Dataset) -> None:
     radius = built.volume.attrs["alpha_over_length"] if "spacing" in built else 0.0
     if radius and (sparse := int((radius < 3.0 * over_length(built, "spacing")).sum())):
         whose = "its volume is" if sparse == 1 else "their volumes are"
-        warn(
-            f"alpha = {radius:.4g} L is below three mean spacings of the points of "
-            f"{counted(sparse, 'design')} and {whose} too small; use more points or a larger alpha"
-        )
+        few = f"alpha = {radius:.4g} L is below three mean spacings of the points of"
+        remedy = "use more points or a larger alpha"
+        warn(f"{few} {counted(sparse, 'design')} and {whose} too small; {remedy}")
 
 
 def _run(

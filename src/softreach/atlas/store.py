@@ -55,10 +55,8 @@ KNOWN = (DONE, UNSTABLE)  # The status of designs of which metrics are stored
 _RESOLUTION = 1e-5  # step of stored tips over the shortest length: off by no more than half of it
 _MISSING = int(np.iinfo(np.int32).min)  # in place of a tip that is NaN, or not stored
 _CHUNK = 1 << 20  # numbers of a chunk that all designs share
-_CUBE = {
-    "units": "1",
-    "long_name": "place in the activation box of each design: 0 is its lower bound, 1 its upper",
-}
+_OF_BOX = "place in the activation box of each design: 0 is its lower bound, 1 its upper"
+_CUBE = {"units": "1", "long_name": _OF_BOX}
 _STATION = {"units": "1", "long_name": "station Z before activation, over the design's length"}
 STATUS = {
     "long_name": "status of the design",

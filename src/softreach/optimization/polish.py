@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -140,16 +141,10 @@ class _Program:
                 constraints.append({"type": kind, "fun": fun, "jac": jac})
         # A cost that changes by less, over that of the start, is that of the end.
         options = {"maxiter": _ITERATIONS, "ftol": _TOLERANCE * self.accuracy * _GENTLE}
+        ends: Any = {"bounds": [(0.0, 1.0)] * len(first), "constraints": constraints}
+        slsqp = partial(minimize, method="SLSQP", options=options, **ends)
         try:
-            end = minimize(
-                self._cost,
-                first,
-                jac=self._cost_slope,
-                bounds=[(0.0, 1.0)] * len(first),
-                constraints=constraints,
-                method="SLSQP",
-                options=options,
-            ).x
+            end = slsqp(self._cost, first, jac=self._cost_slope).x
         except _Spent:
             end, self.accepted = self.accepted, np.empty(0)
         return np.clip(end, 0.0, 1.0) if np.isfinite(end).all() else first

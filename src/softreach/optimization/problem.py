@@ -32,18 +32,11 @@ if TYPE_CHECKING:
 
     from softreach.workspace import ReachableSet
 
-SETS = {
-    "exact_volume": "volume",
-    "exact_convex_volume": "convex_volume",
-    "exact_unreachability": "unreachability",
-}
+SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachability")}
 """Goals and measures of the reachable set, and what they are called there."""
-
 NEAR = 0.1  # Relative distance within which objectives at the ends of polishes agree
-
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
-
 _COARSE, _FINE = 1 << 12, 1 << 15  # samples of the cloud of coarse and of fine cases
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves

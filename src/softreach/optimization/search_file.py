@@ -63,8 +63,8 @@ def read_search(
         document = tables_of(text)
     except ValueError:
         document = {}  # for which the requirements are refused
-    reader = _Reader(document, given or {}, folder, design_from)
-    bases = reader.bases()
+    reader = _Reader(document, given or {})
+    bases = reader.bases(folder, design_from)
     if bases:
         reader.parameters(bases)
     lengths = {arm.length for arm in bases.values()}
@@ -86,22 +86,17 @@ def read_search(
 class _Reader(FaultReader):
     """Reads the table, and what was given beside it."""
 
-    def __init__(
-        self,
-        document: Mapping[str, Any],
-        given: Mapping[str, Any],
-        folder: Path,
-        design_from: Callable[[str], Manipulator],
-    ) -> None:
+    def __init__(self, document: Mapping[str, Any], given: Mapping[str, Any]) -> None:
         super().__init__()
         self.free: dict[str, Any] = {}
         self.choices: dict[str, Any] = {}
-        self._folder, self._design_from, self._given = folder, design_from, given
-        self._raw = self._table(document, "search")
+        self._given, self._raw = given, self._table(document, "search")
         self._check_keys(self._raw, "search", _KEYS)
         self._raw |= {key: self._table(self._raw, key, "search.") for key in _TABLES}
 
-    def bases(self) -> dict[str, Manipulator]:
+    def bases(
+        self, folder: Path, design_from: Callable[[str], Manipulator]
+    ) -> dict[str, Manipulator]:
         """Designs to vary by what they are called; none where none can be read."""
         of_file = "design" not in self._given
         path, value = self._value("design")
@@ -113,9 +108,9 @@ class _Reader(FaultReader):
             self._refuse(path, value, "must be different designs, one or more")
         bases = {}
         for name in names:
-            file = self._folder / name
+            file = folder / name
             place = str(file) if of_file and file.is_file() else name
-            bases[name] = self._tried(path, name, partial(self._design_from, place))
+            bases[name] = self._tried(path, name, partial(design_from, place))
         return {name: arm for name, arm in bases.items() if arm is not WRONG}
 
     def parameters(self, bases: Mapping[str, Manipulator]) -> None:

@@ -118,13 +118,9 @@ def search(
     designs = as_integer("designs", designs, 1, 1_000_000)
     first = max(min(designs, 4 * len(problem.parameters)), int(_FIRST_SHARE * designs))
     follow = (lambda _: None) if follow is None else as_function("follow", follow)
-    study = Study(
-        problem,
-        storage=None if storage is None else as_path("storage", storage),
-        sampler=as_one_of("sampler", sampler, SAMPLERS),
-        seed=seed,
-        first=first,
-    )
+    place = None if storage is None else as_path("storage", storage)
+    chosen = as_one_of("sampler", sampler, SAMPLERS)
+    study = Study(problem, storage=place, sampler=chosen, seed=seed, first=first)
     polishes = as_flag("polish", polish) and can_polish(problem)
     asked = {*needs.measures, *(goal.name for goal in targets)}
     by_sets = bool(needs.regions) or not asked.isdisjoint(SETS)  # what is best depends on accuracy

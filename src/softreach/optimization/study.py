@@ -25,9 +25,7 @@ Sampler = Literal["auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random"]
 SAMPLERS: tuple[str, ...] = get_args(Sampler)
 
 _NAME = "softreach"
-_MISSED = 1e12
-"""Cost of a design that misses requirements by 1: more than any objective has, as only the order
-matters to the samplers."""
+_MISSED = 1e12  # cost of a design that misses requirements by 1: more than any objective has
 _NEVER = 1e15  # cost of what cannot exist
 _WARM = 10  # designs that CMA-ES begins from at least: the best tenth of them must be one or more
 _JUDGED, _KEY, _PROBLEM = "judged", "asked", "problem"
@@ -109,12 +107,8 @@ class Study:
         params = dict(candidate.values)
         for each in self.problem.parameters.real:
             params[each.name] = float(np.clip(float(params[each.name]), each.low, each.high))
-        return self._optuna.trial.create_trial(
-            params=params,
-            distributions=self._space,
-            values=self._costs(candidate),
-            user_attrs=attributes,
-        )
+        known = {"values": self._costs(candidate), "user_attrs": attributes}
+        return self._optuna.trial.create_trial(params=params, distributions=self._space, **known)
 
     def focus(self) -> None:
         """Let a sampler that begins at one place begin where the best of the known designs are."""

@@ -363,10 +363,8 @@ def _cover_findings(made: Check) -> Iterator[Finding]:
         # Where every place is reached that was tried, no share is left to be in doubt.
         error = worst.error if worst.share < 1.0 else 0.0
         verdict = verdict_of(worst.share - target.share, error)
-        text = (
-            f"{100 * worst.share:.2f} ± {100 * worst.error:.2g} % covered of at least "
-            f"{100 * target.share:.4g} %{_under(worst.payload)}"
-        )
+        covered = f"{100 * worst.share:.2f} ± {100 * worst.error:.2g} % covered"
+        text = f"{covered} of at least {100 * target.share:.4g} %{_under(worst.payload)}"
         yield Finding(target.name, "cover", verdict, max(target.share - worst.share, 0.0), text)
 
 

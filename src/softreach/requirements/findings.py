@@ -165,10 +165,8 @@ def measure_findings(
     if any(Need.REACHABLE_SET in metric.needs for metric in metrics):
         known()  # with its warnings
     with no_warnings():
-        fine, coarse = (
-            Intermediates.of_one(arm, samples, accuracy, known)
-            for samples in (_SAMPLES, _SAMPLES // _FEWER)
-        )
+        counts = (_SAMPLES, _SAMPLES // _FEWER)
+        fine, coarse = (Intermediates.of_one(arm, count, accuracy, known) for count in counts)
         for metric in metrics:
             value, name = float(metric.value(fine, {})), metric.name
             if Need.REACHABLE_SET in metric.needs:  # of which 0 stands for no error that is known

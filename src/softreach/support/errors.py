@@ -142,18 +142,9 @@ class InvalidDesign(SoftreachError, ValueError):
         super().__init__(("\n  " if source else "\n").join([*head, *map(str, self.faults)]))
 
 
-_EXTRAS = {
-    "matplotlib": "plot",
-    "pyarrow": "export",
-    "trimesh": "export",
-    "meshio": "export",
-    "skimage": "surface",
-    "distributed": "cluster",
-    "viser": "studio",
-    "jinja2": "report",
-    "optuna": "search",
-    "cmaes": "search",
-}
+_EXTRAS = {"matplotlib": "plot", "skimage": "surface", "distributed": "cluster", "viser": "studio"}
+_EXTRAS |= {"jinja2": "report", "optuna": "search", "cmaes": "search"}
+_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")
 """Module -> extra of softreach that brings it."""
 
 
@@ -163,10 +154,9 @@ class MissingExtra(SoftreachError, ImportError):
     def __init__(self, *modules: str) -> None:
         names = dict.fromkeys(name.replace("skimage", "scikit-image") for name in modules)
         extras = ",".join(dict.fromkeys(_EXTRAS[name] for name in modules))
-        super().__init__(
-            f"this needs {' and '.join(names)}; install {'them' if len(names) > 1 else 'it'} with: "
-            f"pip install 'softreach[{extras}]', or in a clone with: make setup"
-        )
+        them = "them" if len(names) > 1 else "it"
+        remedy = f"pip install 'softreach[{extras}]', or in a clone with: make setup"
+        super().__init__(f"this needs {' and '.join(names)}; install {them} with: {remedy}")
 
 
 def check_installed(*modules: str) -> None:

@@ -189,10 +189,8 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
             yield body
         for place, first, fiber in zip(places, firsts, arm.fibers, strict=False):
             if place == k and isinstance(fiber.offset, tuple):
-                raise NotPossible(
-                    f"ActiveFilaments.jl spaces bundles evenly: give {fiber.name!r} one offset, or "
-                    "make each of its bundles a fiber"
-                )
+                hint = f"give {fiber.name!r} one offset, or make each of its bundles a fiber"
+                raise NotPossible(f"ActiveFilaments.jl spaces bundles evenly: {hint}")
             if place == k:
                 angle = fiber.helical_angle_on(arm.profile, arm.section)
                 pairs = (fiber.bounds * body.scale).tolist()

@@ -32,10 +32,7 @@ def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -
     return known
 
 
-PICTURES: Formats = dict.fromkeys(
-    (".png", ".pdf", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"),
-    FileFormat(("matplotlib",)),
-)
-"""Formats of figures."""
+_FIGURES = (".png", ".pdf", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
+PICTURES: Formats = dict.fromkeys(_FIGURES, FileFormat(("matplotlib",)))  # Formats of figures
 PAGES: Formats = {".html": FileFormat()}  # Formats of figures that turn in a browser
 TABLES: Formats = {".csv": FileFormat()}  # Formats of tables

@@ -41,10 +41,8 @@ BLANK = "0" * 64  # What stands in place of a root's own digest when that is com
 # Options with which xarray reads a store: as it was written, and numbers as numbers.
 READING: Any = {"consolidated": False, "zarr_format": 3, "chunks": None, "decode_times": False}
 
-_REMEDY = {
-    "cloud": "compute the cloud again, or bring back a copy",
-    "atlas": "run the command that built the atlas again, which repairs it",
-}
+_REMEDY = {"cloud": "compute the cloud again, or bring back a copy"}
+_REMEDY["atlas"] = "run the command that built the atlas again, which repairs it"
 _ALLOWED = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
 _KEY = re.compile(r"([^/]+)/c((?:/\d+)*)", re.ASCII)
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.partial$")  # what a killed writer of Zarr leaves
