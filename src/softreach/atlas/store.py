@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -66,16 +66,17 @@ STATUS = {
 MESSAGE = {"long_name": "why a design has no numbers"}
 
 
-class Plan(NamedTuple):
-    """An array to create."""
-
-    name: str
-    options: dict[str, Any]  # As Zarr's `create_array` has them
-    data: Any  # Values to write at once; None for those that designs bring, and for activations
+Plan = tuple[str, dict[str, Any], Any]
+"""Name of an array, options of Zarr's `create_array`, and values to write at once, if any."""
 
 
 def array_plans(command: Command) -> Iterator[Plan]:
-    """Every array of an atlas."""
+    """Every array of an atlas; activations are drawn, and others brought by designs."""
+
+    def labels(name: str, texts: Sequence[str]) -> Plan:
+        data = np.array(texts, dtype=np.dtypes.StringDType())
+        return plan(name, str, {name: len(data)}, {}, "", data)
+
     space, numbers, profiles = command.space, command.numbers, command.profiles
     plan, varied = partial(_plan, command), space.varied()
     designs = dict(zip(space.dims, space.shape, strict=True))
@@ -86,13 +87,13 @@ def array_plans(command: Command) -> Iterator[Plan]:
         dim = name if space.layout == "grid" else "design"
         fill = 0 if values.dtype == int else np.nan
         yield plan(name, values.dtype, {dim: len(values)}, about, fill, values)
-    yield _labels(command, "metric", [metric.name for metric in numbers])
-    yield _labels(command, "axis", AXES)
+    yield labels("metric", [metric.name for metric in numbers])
+    yield labels("axis", AXES)
     yield plan(CUBE, float, {"sample": command.n, "bundle": space.bundles}, _CUBE)
     yield plan("status", np.uint8, designs, STATUS, 0)
     yield plan("message", str, designs, MESSAGE, "")
     if profiles:
-        yield _labels(command, "quantity", [metric.name for metric in profiles])
+        yield labels("quantity", [metric.name for metric in profiles])
         for name, values in (("station", command.stations), ("quantile", command.quantiles)):
             about = _STATION if name == "station" else {"units": "1"}
             yield plan(name, float, {name: len(values)}, about, data=np.array(values))
@@ -138,16 +139,11 @@ def _plan(
     if name == "tip":  # activations are random bits, and the same bytes anywhere
         blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
         options["compressors"] = blosc, Crc32cCodec()
-    return Plan(name, options, data)
+    return name, options, data
 
 
 def _meanings(metrics: Sequence[Metric]) -> str:
     return "; ".join(f"{metric.name} [{metric.unit}]: {metric.meaning}" for metric in metrics)
-
-
-def _labels(command: Command, name: str, labels: Sequence[str]) -> Plan:
-    data = np.array(labels, dtype=np.dtypes.StringDType())
-    return _plan(command, name, str, {name: len(data)}, {}, "", data)
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,9 +306,9 @@ def _holds_arrays_of(command: Command, place: StorePath) -> bool:
     """True if a store whose root is damaged or lost was begun by this command."""
     import zarr
 
-    for plan in array_plans(command):
+    for name, _, _ in array_plans(command):
         with suppress(Exception):  # each kind of store has its own for what is missing or damaged
-            array = zarr.open_array(place / plan.name, mode="r", zarr_format=3)
+            array = zarr.open_array(place / name, mode="r", zarr_format=3)
             return array.attrs[OF] == sha256(command.to_json().encode())
     return False
 
@@ -324,9 +320,10 @@ def _attributes(command: Command) -> dict[str, Any]:
 
     memory: dict[str, Any] = {}
     group = zarr.create_group(MemoryStore(memory), zarr_format=3)
-    plans = list(array_plans(command))
-    for plan in plans:
-        group.create_array(plan.name, **plan.options)
+    digests: dict[str, str] = {}
+    for name, options, _ in array_plans(command):
+        group.create_array(name, **options)
+        digests[name] = sha256(memory[f"{name}/{ROOT}"].to_bytes())
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
     return {
         "title": "reachability cloud atlas",
@@ -334,7 +331,7 @@ def _attributes(command: Command) -> dict[str, Any]:
         CUBE_DIGEST: drawn_cube(command)[1],
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),
-        ARRAYS: {p.name: sha256(memory[f"{p.name}/{ROOT}"].to_bytes()) for p in plans},
+        ARRAYS: digests,
         DIGEST: BLANK,
     }
 
@@ -343,23 +340,22 @@ def _complete(store: AtlasStore) -> None:
     """Write what all designs share, and the gaps, where they lack or err."""
     from zarr.errors import ContainsArrayError
 
-    for plan in array_plans(store.command):
+    for name, options, data in array_plans(store.command):
         with store.opened.noting() as noted:
-            there = plan.name in store.opened.group
-            if there and plan.name not in PER_DESIGN:
-                _ = store.array(plan.name)[...]
+            there = name in store.opened.group
+            if there and name not in PER_DESIGN:
+                _ = store.array(name)[...]
         if there and not noted:
             continue
         with suppress(ContainsArrayError):  # begun by another task, or only its values are lost
-            store.opened.group.create_array(plan.name, **plan.options)
-        data = plan.data
-        if plan.name == CUBE:
+            store.opened.group.create_array(name, **options)
+        if name == CUBE:
             data, drawn = drawn_cube(store.command)
             if drawn != store.opened.group.attrs[CUBE_DIGEST]:
                 other = "this machine draws other activations than the one that began it"
                 raise StoreFailed(f"{store.location}: {other}")
         if data is not None:
-            store.array(plan.name)[...] = data
+            store.array(name)[...] = data
     gaps = store.command.space.gaps
     status = store.status() if gaps else np.empty(0)
     for index, reason in gaps.items():

@@ -38,10 +38,6 @@ if TYPE_CHECKING:
 _AT_END = 1e-3  # of a range
 _FOUND = "# Found by a search of softreach"
 _FILES = ("best.toml", "front.csv", "candidates.csv", "report.html")
-_PICTURE = (
-    "Designs that were judged, in their order or by their objectives, and the free parameters "
-    "of the best in their ranges."
-)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -437,7 +433,9 @@ def _figures(search: Search, unit: LengthUnit) -> Iterator[tuple[Any, str]]:
     from softreach.plot.arm import plot_check
     from softreach.plot.results import plot_search
 
-    yield plot_search(search, unit=unit), _PICTURE
+    judged = "Designs that were judged, in their order or by their objectives"
+    best = "the free parameters of the best in their ranges"
+    yield plot_search(search, unit=unit), f"{judged}, and {best}."
     if search.problem.requirements.targets or search.problem.requirements.keeps:
         with suppress(SoftreachError):  # nothing holds it under its loads
             caption = "The best design at the places that it must reach."

@@ -3,8 +3,6 @@
 [ActiveFilamentsJl] is the program of the theory's authors.
 """
 
-from __future__ import annotations
-
 from softreach.exchange.activefilaments.cloud import gamma_path, read_cloud, write_cloud
 from softreach.exchange.activefilaments.filament import design_script, read_design, write_design
 
