@@ -351,8 +351,20 @@ def check_folder(folder: Path, *, overwrite: bool) -> None:
 def _best(search: Search, unit: LengthUnit) -> Section:
     pairs = zip(search.goals, search.best.objectives, strict=bool(search.best.objectives))
     rows = [(_goal_text(goal), _value_text(goal, value, unit), "") for goal, value in pairs]
-    rows += _parameter_rows(search, unit)
-    ends = ", ".join(f"{name} at its {end} end" for name, end in search.at_ends.items())
+    values, at_ends, parameters = search.best.values, search.at_ends, search.problem.parameters
+    free = {parameter.name: parameter for parameter in parameters.free}
+    for name, each in free.items():
+        if each.choices:
+            reach = f"one of {', '.join(_number_text(each, x, unit) for x in each.choices)}"
+        else:
+            low = each.low / readable_unit(each.unit, each.high, unit)[1]
+            reach = f"{low:.5g} to {readable(each.high, each.unit, unit)}"
+        end = f", at its {at_ends[name]} end" if name in at_ends else ""
+        rows.append((name, _number_text(each, values[name], unit) + end, reach))
+    for tie in parameters.ties:
+        value = tie.factor * float(values[tie.of]) + tie.constant
+        rows.append((tie.name, _number_text(free[tie.of], value, unit), f"follows {tie.of}"))
+    ends = ", ".join(f"{name} at its {end} end" for name, end in at_ends.items())
     note = f"At an end of their range: {ends}. A wider range may be better." if ends else ""
     return Section(title="Best design", head=("number", "best", "range"), rows=rows, note=note)
 
@@ -391,22 +403,6 @@ def _value_text(goal: Goal, value: Estimate, unit: LengthUnit) -> str:
     if not math.isfinite(value.value):
         return "-"
     return readable(value.value, goal.objective.unit, unit, value.error)
-
-
-def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
-    values, ends, parameters = search.best.values, search.at_ends, search.problem.parameters
-    free = {parameter.name: parameter for parameter in parameters.free}
-    for name, each in free.items():
-        if each.choices:
-            reach = f"one of {', '.join(_number_text(each, x, unit) for x in each.choices)}"
-        else:
-            low = each.low / readable_unit(each.unit, each.high, unit)[1]
-            reach = f"{low:.5g} to {readable(each.high, each.unit, unit)}"
-        end = f", at its {ends[name]} end" if name in ends else ""
-        yield name, _number_text(each, values[name], unit) + end, reach
-    for tie in parameters.ties:
-        value = tie.factor * float(values[tie.of]) + tie.constant
-        yield tie.name, _number_text(free[tie.of], value, unit), f"follows {tie.of}"
 
 
 def _number_text(parameter: FreeParameter, value: float | str, unit: LengthUnit) -> str:

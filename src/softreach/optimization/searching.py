@@ -251,7 +251,18 @@ class _Run:
 
     def _at_full_accuracy(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """The best, polished on finer sets and judged as they are reported: none by bounds."""
-        problem, known = self.problem, self._beyond_bounds(candidates)
+        problem = self.problem
+        # What bounds prove of a design is less than it misses: where no design meets all, those of
+        # which they prove less than the best misses are judged as the others are.
+        known = [each for each in candidates if each.fidelity != "bounds"]
+        least = min((each.excess for each in known if not each.fault), default=np.inf)
+        bounds = [each for each in candidates if each.fidelity == "bounds" and not each.fault]
+        waiting = sorted(bounds, key=problem.score)
+        while waiting and waiting[0].excess < least:
+            values, waiting = [each.values for each in waiting[:_BATCH]], waiting[_BATCH:]
+            tasks = (partial(self._judged, each, bounds=False) for each in values)
+            known += (judged := list(parallel.in_order(tasks)))
+            least = min([least, *(each.excess for each in judged if not each.fault)])
         best = problem.front(known)
         if len(problem.goals) < 2 or not (best and best[0].is_feasible):
             finite = [each for each in known if np.isfinite(each.excess)]
@@ -262,20 +273,3 @@ class _Run:
             best.append(end := polished(problem, best[0], left, *turn, problem.accuracy))
             self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]
-
-    def _beyond_bounds(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Candidates without those that bounds discard.
-
-        What bounds prove of a design is less than it misses: where no design meets all, those of
-        which they prove less than the best misses are judged as the others are.
-        """
-        known = [each for each in candidates if each.fidelity != "bounds"]
-        least = min((each.excess for each in known if not each.fault), default=np.inf)
-        bounds = [each for each in candidates if each.fidelity == "bounds" and not each.fault]
-        waiting = sorted(bounds, key=self.problem.score)
-        while waiting and waiting[0].excess < least:
-            values, waiting = [each.values for each in waiting[:_BATCH]], waiting[_BATCH:]
-            tasks = (partial(self._judged, each, bounds=False) for each in values)
-            known += (judged := list(parallel.in_order(tasks)))
-            least = min([least, *(each.excess for each in judged if not each.fault)])
-        return known

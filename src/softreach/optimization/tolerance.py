@@ -198,22 +198,18 @@ class Tolerance:
             f"volume          {self.volume}",
             f"unreachability  {self.unreachability}",
             *(f"{each.name} covered  {each}" for each in self.regions),
-            *(_target_text(each) for each in self.targets),
         ]
+        for target in self.targets:
+            count, least = len(target.probability), int(target.probability.argmin())
+            text = f"{100 * target.probability[least]:.3g} %"
+            if np.isfinite(share := target.made[least]):
+                error = 100 * target.made_error[least]
+                text += f" (of arms made {100 * share:.3g} ± {error:.2g} %)"
+            which = f" at place {least + 1} of {count:,}, the least likely" if count > 1 else ""
+            lines.append(f"{target.name} reached  {text}{which}")
         order = np.argsort(-self.costs, kind="stable")
         each = ", ".join(f"{self.parameters[k]} {100 * self.costs[k]:.2g} %" for k in order[:6])
         return "\n  ".join([*lines, f"lost by each alone  {each}"])
-
-
-def _target_text(target: TargetTolerance) -> str:
-    least = int(target.probability.argmin())
-    text = f"{100 * target.probability[least]:.3g} %"
-    made = target.made[least]
-    if np.isfinite(made):
-        text += f" (of arms made {100 * made:.3g} ± {100 * target.made_error[least]:.2g} %)"
-    count = len(target.probability)
-    which = f" at place {least + 1} of {count:,}, the least likely" if count > 1 else ""
-    return f"{target.name} reached  {text}{which}"
 
 
 def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:

@@ -40,12 +40,8 @@ def bar(label: str | Callable[[], str], total: int | None) -> Iterator[Progress]
         return
     from rich import console, progress
 
-    columns = (
-        progress.TextColumn("{task.description}"),
-        progress.BarColumn(),
-        progress.TaskProgressColumn(show_speed=True),
-        progress.TimeRemainingColumn(),
-    )
+    times = progress.TaskProgressColumn(show_speed=True), progress.TimeRemainingColumn()
+    columns = (progress.TextColumn("{task.description}"), progress.BarColumn(), *times)
     on_error = console.Console(stderr=True)
     with progress.Progress(*columns, console=on_error, transient=True) as display:
         task = display.add_task(said(), total=total)
