@@ -5,8 +5,6 @@ the bounds, has the most growth. A step counts only if the force grew about as f
 rests stably; otherwise it is tried at half its length.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache

@@ -3,8 +3,6 @@
 A sequence depends on its four arguments alone: blocks only cut it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Intermediate results behind the metrics of a design, each computed once, at its first use."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple, Self

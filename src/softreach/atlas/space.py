@@ -1,7 +1,5 @@
 """A family of designs: one design, some of its parameters, and the values they take."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Free parameters of a search: ranges, choices, ties, and the arm with given values of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A design made better from where it stands: quadratic programs on exact derivatives (SLSQP)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

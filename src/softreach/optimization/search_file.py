@@ -1,7 +1,5 @@
 """Searches as people write them: a file of requirements with a table `[search]`, units in keys."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Search for the best designs: spread, polish, sample where it pays, judge the best again."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Parts of requirements as frozen values: targets to reach, regions to keep to, limits."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Regions of space, in the world: boxes, spheres, half-spaces and closed meshes."""
 
-from __future__ import annotations
-
 import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Requirements of an arm: what it is for, as a frozen value and as TOML with units."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Arguments of public functions, converted in their first lines and refused in one way."""
 
-from __future__ import annotations
-
 import math
 import os
 import sys

@@ -1,7 +1,5 @@
 """Arrays that users pass, converted and checked in one place, and names for what they hold."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from operator import itemgetter
 from typing import Any, TypeVar

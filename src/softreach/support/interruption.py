@@ -1,7 +1,5 @@
 """End of a command by a signal: Ctrl-C, a request to terminate, a terminal that is closed."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

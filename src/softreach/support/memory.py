@@ -1,7 +1,5 @@
 """Free memory, and the refusal of what needs more."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import math

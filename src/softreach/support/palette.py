@@ -1,7 +1,5 @@
 """Color of a bundle in every picture and file, and the color that its activations mix to."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

@@ -1,7 +1,5 @@
 """Threads over blocks of work, as kernels release the interpreter lock; Ctrl-C gets in between."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections import deque

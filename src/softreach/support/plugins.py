@@ -3,8 +3,6 @@
 Nothing else runs code: design files and stores name kinds and metrics, never modules.
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 import traceback

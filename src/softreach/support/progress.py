@@ -1,7 +1,5 @@
 """Progress of long work: callbacks, a bar on a terminal, lines elsewhere."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -1,7 +1,5 @@
 """Numbers as people write them: a value with its error and its unit."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Sequence

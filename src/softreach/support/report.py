@@ -1,7 +1,5 @@
 """Reports: what was found, printed in lines or written as one page with its pictures inside."""
 
-from __future__ import annotations
-
 import base64
 import io
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """The versions of the package and of its datasets, which everything that is stored carries."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version

@@ -11,8 +11,6 @@ full one, so that a folder takes four steps; each name says how far a killed pro
 What a killed process leaves under a hidden name stays, as nothing tells it from a slow one.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import os

@@ -1,7 +1,5 @@
 """Formats of files: their suffix, and what writing them needs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from io import BufferedWriter
 from os import PathLike, fspath

@@ -1,7 +1,5 @@
 """TOML as people write it: its tables with all their faults at once, and values as text."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib
