@@ -81,9 +81,8 @@ class Chunk(NamedTuple):
         """The file with this key, from the root of the store on; None for any other."""
         if key == ROOT or key.endswith(f"/{ROOT}"):
             return cls(key.removesuffix(ROOT).rstrip("/"), None)
-        if (found := _KEY.fullmatch(key)) is None:
-            return None
-        return cls(found[1], tuple(map(int, found[2].split("/")[1:])))
+        found = _KEY.fullmatch(key)
+        return cls(found[1], tuple(map(int, found[2].split("/")[1:]))) if found else None
 
 
 @dataclass(eq=False)
@@ -183,8 +182,7 @@ def place_of(location: Any, mode: Mode) -> StorePath:
 
 def absolute(location: StoreLike) -> StoreLike:
     """The same place for a process elsewhere."""
-    if isinstance(location, str):
-        # A path, so that files are written beside their place and renamed.
+    if isinstance(location, str):  # a path, so that files are written beside their place
         location = location.removeprefix("file://")
     if isinstance(location, os.PathLike) or (isinstance(location, str) and "://" not in location):
         return str(Path(location).absolute())
@@ -215,8 +213,7 @@ class CheckedStore(WrapperStore[Any]):
 
     async def set(self, key: str, value: Buffer) -> None:
         """Write a file, unless it describes an array otherwise than the root lists."""
-        chunk = self._chunk(key)
-        opened = self._opened
+        chunk, opened = self._chunk(key), self._opened
         listed = opened.digests.get(chunk.array) if chunk and chunk.place is None else None
         if listed and listed != sha256(value.to_bytes()):
             raise StoreFailed(f"{key} of {opened.location} was written by another Zarr release")
@@ -255,10 +252,8 @@ class CheckedStore(WrapperStore[Any]):
 
 def _sync_in(path: Path, root: Path) -> None:
     """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
-    for place in (path, *path.parents):
+    for place in (path, *path.parents[: len(path.relative_to(root).parts)]):
         sync(place)
-        if place == root:
-            return
 
 
 def sha256(text: bytes) -> str:
