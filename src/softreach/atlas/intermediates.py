@@ -1,6 +1,7 @@
 """Intermediate results behind the metrics of a design, each computed once, at its first use."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -35,22 +36,15 @@ class Settings(NamedTuple):
     metrics: tuple[Metric, ...] = ()  # That will be computed
 
 
+@dataclass(eq=False)
 class Intermediates:
-    """Need -> its value for one design, computed at first use.
+    """Need -> its value for one design, computed at first use."""
 
-    `cube` holds unit activations that all designs share, shape (n, bundles); `sets` is the source
-    of the reachable set, if it is known elsewhere.
-    """
-
-    def __init__(
-        self,
-        arm: Manipulator,
-        cube: Array,
-        command: Command | Settings,
-        sets: Callable[[], Any] | None = None,
-    ) -> None:
-        self.arm, self.cube, self.command, self.known_set = arm, cube, command, sets
-        self._cache: dict[Need, Any] = {}
+    arm: Manipulator
+    cube: Array  # Unit activations that all designs share, shape (n, bundles)
+    command: Command | Settings
+    known_set: Callable[[], Any] | None = None  # Source of the reachable set, if it is known
+    _cache: dict[Need, Any] = field(default_factory=dict)
 
     @classmethod
     def of_one(

@@ -32,6 +32,11 @@ from softreach.support.quantity import read_number, read_whole_number
 Layout = Literal["grid", "list"]
 
 _MOST = 1_000_000  # designs, each of which is looked at and has files of its own
+_MOST_VALUES = 100_000  # of one parameter
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
+_KEYS = ("design", "layout", "designs", "seed", "parameters")
+_SAMPLERS = ("sobol", "latin")
+_LAYOUTS = ("grid", "list", *_SAMPLERS)
 
 
 def column(name: str, values: ArrayLike) -> tuple[float, ...]:
@@ -277,13 +282,6 @@ def _ends(name: str, ends: ArrayLike) -> np.ndarray:
     return floats
 
 
-_KEYS = ("design", "layout", "designs", "seed", "parameters")
-_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
-_MOST = 100_000  # values of one parameter
-_SAMPLERS = ("sobol", "latin")
-_LAYOUTS = ("grid", "list", *_SAMPLERS)
-
-
 def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignSpace:
     """A design space from the text of a file.
 
@@ -298,14 +296,8 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     "rings[0].material.young_modulus_pa" = [1e5, 1e6]
     ```
 
-    With `sobol` and `latin` the keys `designs` (their number) and `seed` apply too.
-
-    Args:
-        text: TOML.
-        design_from: Name or path of a design -> the design.
-
-    Raises:
-        InvalidInput: A key or value that is wrong, with what is allowed.
+    With `sobol` and `latin` the keys `designs` (their number) and `seed` apply too; `design_from`
+    makes a design of its name or path.
     """
     try:
         document = document_of(text, "space", float)
@@ -360,7 +352,8 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
         return parameter.name, _read(value, partial(names.number, key))
     except (InvalidInput, ValueError):
         kind = "numbers" if key in names.written else names.allowed(key)
-        allowed = f"{kind}: a list, or start:stop:count with both ends and a count up to {_MOST}"
+        ends = f"start:stop:count with both ends and a count up to {_MOST_VALUES}"
+        allowed = f"{kind}: a list, or {ends}"
         raise InvalidInput(key, value, allowed) from None
 
 
@@ -368,7 +361,7 @@ def _read(value: Any, read: Callable[[Any], float]) -> list[float]:
     if isinstance(value, str) and ":" in value:
         start, stop, count = value.split(":")
         number = read_whole_number(count)
-        if not 0 < number <= _MOST:
+        if not 0 < number <= _MOST_VALUES:
             raise ValueError(value)
         values = np.linspace(read(start), read(stop), number)
         return [float(f"{value:.15g}") for value in values]  # 1.8 and not 1.8000000000000003

@@ -53,9 +53,7 @@ def read_search(
     ```
 
     What is `given` by the same keys goes before the table; paths in the text start from `folder`.
-
-    Raises:
-        InvalidDesign: All faults, of the requirements too, in the words of the file.
+    All faults are named at once, of the requirements too, in the words of the file.
     """
     try:
         document = tables_of(text)

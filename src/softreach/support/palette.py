@@ -64,15 +64,10 @@ def bundle_color(index: int) -> Color:
 
 
 def activation_colors(activation: ArrayLike) -> NDArray[np.uint8]:
-    """RGB of each sample: every bundle adds its light in proportion to |γ| / max |γ|.
+    """RGB of each sample, 0 to 255: every bundle adds its light in proportion to |γ| / max |γ|.
 
-    With three bundles R, G and B are the three relative magnitudes, as in the paper.
-
-    Args:
-        activation: Activations γ [-], shape (sample, bundle); NaN is black.
-
-    Returns:
-        Colors from 0 to 255, shape (sample, 3).
+    With three bundles R, G and B are the three relative magnitudes, as in the paper. Activations
+    are of shape (sample, bundle), of which NaN is black, and colors of shape (sample, 3).
     """
     gamma = np.asarray(activation, float)
     blocks = [slice(k, k + _BLOCK) for k in range(0, len(gamma), _BLOCK)]

@@ -1,8 +1,7 @@
 """Zarr stores that let no damage through: crc32c in each chunk, sha256 of the documents.
 
-The root lists the sha256 of the `zarr.json` of each array, and ends with its own. So a changed bit
-of any file is noticed when the file is read, and so is a missing chunk, which Zarr itself reads as
-fill values. A whole chunk of another place, or an older copy of the store, is not noticed.
+The root lists the sha256 of the `zarr.json` of each array, and ends with its own, so that a changed
+bit and a missing chunk are noticed; a whole chunk of another place, or an older store, is not.
 """
 
 from __future__ import annotations
