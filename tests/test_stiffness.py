@@ -23,12 +23,7 @@ from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import tip_jacobian, tip_positions
 from softreach.rod.rods import as_tip_map, free_bundles
 from softreach.rod.tip_map import TipStatus
-from softreach.stiffness import (
-    cloud_compliance,
-    principal_compliances,
-    stiffness_along,
-    tip_compliance,
-)
+from softreach.stiffness import principal_compliances, stiffness_along, tip_compliance
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
 from softreach.workspace import reachable_set
@@ -149,7 +144,7 @@ def test_stiffness_along_a_principal_direction_is_one_over_its_compliance():
 def test_a_cloud_has_the_compliance_of_each_sample_and_none_where_nothing_rests():
     arm = sr.designs.lce_arm().replace(loads=Loads(gravity=SIDE, payload=0.005))
     cloud = sr.compute_cloud(arm, n=3000)
-    found = cloud_compliance(cloud)
+    found = sr.stiffness.cloud_compliance(cloud)
     expected = tip_compliance(arm, cloud.activation.values)
     np.testing.assert_array_equal(found.compliance.values, expected)
     lost = cloud.status.values == TipStatus.SNAPS
@@ -163,7 +158,7 @@ def test_a_cloud_has_the_compliance_of_each_sample_and_none_where_nothing_rests(
 def test_a_cloud_is_colored_by_compliance_in_ratios_where_these_are_large():
     coloring = pytest.importorskip("softreach.plot.coloring")
     cloud = sr.compute_cloud(rubber(TRUNK, None), n=500)
-    soft = cloud_compliance(cloud).largest_compliance
+    soft = sr.stiffness.cloud_compliance(cloud).largest_compliance
     values = soft.values.copy()
     values[:] = np.geomspace(0.01, 1.0, 500)
     wide = coloring.color_samples(cloud, soft.copy(data=values))

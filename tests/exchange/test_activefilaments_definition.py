@@ -11,16 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import softreach as sr
-from softreach.arm import (
-    Chamber,
-    LinearTaper,
-    Material,
-    Pieces,
-    PiecewiseTaper,
-    Samples,
-    Section,
-    designs,
-)
+from softreach.arm import LinearTaper, Material, Pieces, PiecewiseTaper, Samples, Section, designs
 from softreach.arm.parameters import changed
 from softreach.cli.app import run
 from softreach.exchange.activefilaments import (
@@ -147,7 +138,7 @@ LINEAR = Samples(stations_over_length=(0, 1), values=(0.1, 0.2))
 STIFF = sr.Ring(inner_ratio=0.5, material=Material(young_modulus=1e6))
 
 
-AIR = Chamber(distance=0.01, radius=0.002, activation_bounds=(0, 1), name="air")
+AIR = sr.Chamber(distance=0.01, radius=0.002, activation_bounds=(0, 1), name="air")
 ROUND = PiecewiseTaper(length=1, stations_over_length=(0, 1), radii=(0.1, 0.1))
 INSIDE = STIFF.replace(inner_ratio=0.7, outer_ratio=0.8)
 

@@ -6,14 +6,7 @@ import os
 import pickle
 import secrets
 from collections.abc import Callable, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
@@ -31,15 +24,7 @@ from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
 from softreach.rod.tip_map import check_tol, no_equilibrium_message
 from softreach.sampling import check_sampler
 from softreach.support import parallel
-from softreach.support.arguments import (
-    POSITIVE,
-    as_flag,
-    as_function,
-    as_given,
-    as_instance,
-    as_number,
-    plain,
-)
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number, plain
 from softreach.support.arrays import Array
 from softreach.support.errors import (
     InvalidInput,
@@ -52,7 +37,7 @@ from softreach.support.errors import (
 from softreach.support.files.stores import StoreFailed
 from softreach.support.interruption import check_stopped
 from softreach.support.memory import check_memory
-from softreach.support.progress import Progress, bar
+from softreach.support.progress import Progress, as_progress, bar
 from softreach.workspace.reach import ACCURACIES
 
 if TYPE_CHECKING:
@@ -119,7 +104,7 @@ def _run_in_pool(
                 pending[pool.submit(_run_remotely, remote, index)] = index
             if not pending:
                 return
-            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+            for future in wait(pending, return_when="FIRST_COMPLETED").done:
                 index = pending.pop(future)
                 try:
                     outcome = future.result()
@@ -292,7 +277,7 @@ def build_atlas(
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)
     durable = as_flag("durable", durable)
     as_instance("executor", executor, (type(None), Executor, DaskClient), _EXECUTORS)
-    progress = None if progress is None else as_function("progress", progress)
+    progress = None if progress is None else as_progress(progress)
     check_sampler(sampler, n, 0, seed)
     check_memory("n", n, _SAMPLE_MEMORY * n)
     command = Command(

@@ -17,18 +17,7 @@ from softreach.arm.written import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.metrics import Need
-from softreach.atlas.store import (
-    DAMAGED,
-    FAILED,
-    GAP,
-    KNOWN,
-    MESSAGE,
-    OF,
-    PER_DESIGN,
-    STATUS,
-    UNSTABLE,
-    AtlasStore,
-)
+from softreach.atlas.store import ABOUT, DAMAGED, EXPLAINED, KNOWN, OF, PER_DESIGN, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, stored_names, with_status
 from softreach.support.arguments import (
@@ -51,7 +40,6 @@ if TYPE_CHECKING:
 
     AtlasLike = StoreLike | xr.Dataset
 
-EXPLAINED = (FAILED, GAP, UNSTABLE)  # The status of designs that have a message
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 _QUICK = 3e8  # bytes of tips
@@ -422,8 +410,8 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     for index, message in content.messages.items():
         texts[index] = message
     variables: dict[str, Any] = {
-        "status": (dims, content.status.reshape(shape), STATUS),
-        "message": (dims, texts.reshape(shape), MESSAGE),
+        "status": (dims, content.status.reshape(shape), ABOUT["status"]),
+        "message": (dims, texts.reshape(shape), ABOUT["message"]),
     }
     done = np.isin(content.status, KNOWN).reshape(shape)
     for name, metrics in (("metrics", command.numbers), ("curvature", command.profiles)):

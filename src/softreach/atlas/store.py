@@ -24,24 +24,8 @@ from softreach.sampling import sample_cube
 from softreach.schema import AXES
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, warn
+from softreach.support.files import stores
 from softreach.support.files.atomic import sync
-from softreach.support.files.stores import (
-    ARRAYS,
-    BLANK,
-    DIGEST,
-    ROOT,
-    Chunk,
-    DamagedStore,
-    Opened,
-    StoreFailed,
-    absolute,
-    opened_store,
-    place_of,
-    sealed,
-    sha256,
-    storage_errors,
-    writing,
-)
 
 if TYPE_CHECKING:
     from zarr.storage import StoreLike, StorePath
@@ -52,18 +36,19 @@ OF = "command_sha256"  # Attribute of each array: digest of the command
 CUBE_DIGEST = "unit_activation_sha256"  # Attribute of the root: digest of the activations
 TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
 KNOWN = (DONE, UNSTABLE)  # The status of designs of which metrics are stored
+EXPLAINED = (FAILED, GAP, UNSTABLE)  # The status of designs that have a message
 _RESOLUTION = 1e-5  # step of stored tips over the shortest length: off by no more than half of it
 _MISSING = int(np.iinfo(np.int32).min)  # in place of a tip that is NaN, or not stored
 _CHUNK = 1 << 20  # numbers of a chunk that all designs share
 _OF_BOX = "place in the activation box of each design: 0 is its lower bound, 1 its upper"
 _CUBE = {"units": "1", "long_name": _OF_BOX}
 _STATION = {"units": "1", "long_name": "station Z before activation, over the design's length"}
-STATUS = {
-    "long_name": "status of the design",
-    "flag_values": [0, 1, 2, 3, 4, 5],
-    "flag_meanings": "to_do done failed gap unstable damaged",
+_FLAGS = "to_do done failed gap unstable damaged"
+_NUMBERS = {"flag_values": [0, 1, 2, 3, 4, 5], "flag_meanings": _FLAGS}
+ABOUT: dict[str, dict[str, Any]] = {
+    "status": {"long_name": "status of the design", **_NUMBERS},
+    "message": {"long_name": "why a design has no numbers"},
 }
-MESSAGE = {"long_name": "why a design has no numbers"}
 
 
 Plan = tuple[str, dict[str, Any], Any]
@@ -90,8 +75,8 @@ def array_plans(command: Command) -> Iterator[Plan]:
     yield labels("metric", [metric.name for metric in numbers])
     yield labels("axis", AXES)
     yield plan(CUBE, float, {"sample": command.n, "bundle": space.bundles}, _CUBE)
-    yield plan("status", np.uint8, designs, STATUS, 0)
-    yield plan("message", str, designs, MESSAGE, "")
+    yield plan("status", np.uint8, designs, ABOUT["status"], 0)
+    yield plan("message", str, designs, ABOUT["message"], "")
     if profiles:
         yield labels("quantity", [metric.name for metric in profiles])
         for name, values in (("station", command.stations), ("quantile", command.quantiles)):
@@ -134,7 +119,7 @@ def _plan(
         "fill_value": fill,
         "compressors": (Crc32cCodec(),),
         "dimension_names": tuple(sizes),
-        "attributes": attrs | {OF: sha256(command.to_json().encode())},
+        "attributes": attrs | {OF: stores.sha256(command.to_json().encode())},
     }
     if name == "tip":  # activations are random bits, and the same bytes anywhere
         blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
@@ -152,7 +137,7 @@ class AtlasStore:
 
     location: StoreLike
     command: Command
-    opened: Opened = field(repr=False)
+    opened: stores.Opened = field(repr=False)
     _arrays: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -161,14 +146,14 @@ class AtlasStore:
 
         Where it is durable, a power cut loses nothing that was written.
         """
-        location = absolute(location)
+        location = stores.absolute(location)
         opened = None
-        with writing(location):
-            with suppress(DamagedStore):
-                opened = opened_store(location, "atlas", "r+", durable=durable)
+        with stores.writing(location):
+            with suppress(stores.DamagedStore):
+                opened = stores.opened_store(location, "atlas", "r+", durable=durable)
             if opened is None:
                 _write_root(location, command, durable)
-                opened = opened_store(location, "atlas", "r+", durable=durable)
+                opened = stores.opened_store(location, "atlas", "r+", durable=durable)
         allowed = "a new folder, or an atlas; this one holds other files"
         opened, stored = _with_command(opened, location, allowed)
         if (begun := stored.softreach_version) != (now := command.softreach_version):
@@ -178,7 +163,7 @@ class AtlasStore:
             hint = f"this one differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
         store = cls(location, command, opened)  # this command has all functions
-        with writing(location), opened.noting():  # what is damaged counts as missing
+        with stores.writing(location), opened.noting():  # what is damaged counts as missing
             _complete(store)
         return store
 
@@ -187,9 +172,10 @@ class AtlasStore:
         cls, location: StoreLike, mode: Literal["r", "r+"] = "r+", *, durable: bool = False
     ) -> Self:
         """Open an atlas, in mode "r" at a place that cannot be written to."""
-        location = absolute(location)
-        opened = opened_store(location, "atlas", mode, durable=durable)
-        why = f"it does not exist, or has no {ROOT}" if opened is None else "this is no atlas"
+        location = stores.absolute(location)
+        opened = stores.opened_store(location, "atlas", mode, durable=durable)
+        lacks = f"it does not exist, or has no {stores.ROOT}"
+        why = lacks if opened is None else "this is no atlas"
         allowed = f"an atlas written by build_atlas; {why}"
         opened, command = _with_command(opened, location, allowed)
         opened.check_arrays()
@@ -211,7 +197,7 @@ class AtlasStore:
         status[[self.number(chunk) for chunk in noted]] = DAMAGED
         return status
 
-    def number(self, chunk: Chunk) -> int:
+    def number(self, chunk: stores.Chunk) -> int:
         """The design that a chunk belongs to."""
         shape = self.command.space.shape
         return int(np.ravel_multi_index((chunk.place or ())[: len(shape)], shape))
@@ -223,7 +209,7 @@ class AtlasStore:
     @cached_property
     def cube(self) -> Array:
         """Unit activations that all designs share, shape (n, bundles)."""
-        with storage_errors(f"{self.location} cannot be read"):
+        with stores.storage_errors(f"{self.location} cannot be read"):
             return np.asarray(self.array(CUBE)[...])
 
     def write(
@@ -239,7 +225,7 @@ class AtlasStore:
         Tips are NaN without equilibrium, and None if clouds are not kept.
         """
         place, command = self.command.space.place(index), self.command
-        with writing(self.location):
+        with stores.writing(self.location):
             self.array("metrics")[place] = np.array([metrics[m.name] for m in command.numbers])
             if command.profiles:
                 self.array("curvature")[place] = [metrics[m.name] for m in command.profiles]
@@ -251,7 +237,7 @@ class AtlasStore:
     def write_status(self, index: int, message: str, status: int = FAILED) -> None:
         """Store how a design ended, and why."""
         place = self.command.space.place(index)
-        with writing(self.location):
+        with stores.writing(self.location):
             self.array("message")[place] = np.array(message, dtype=np.dtypes.StringDType())
             self.array("status")[place] = status
 
@@ -263,8 +249,8 @@ def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
 
 
 def _with_command(
-    opened: Opened | None, location: StoreLike, allowed: str
-) -> tuple[Opened, Command]:
+    opened: stores.Opened | None, location: StoreLike, allowed: str
+) -> tuple[stores.Opened, Command]:
     """A store and its command; what all designs share must be there from now on."""
     text = None if opened is None else opened.group.attrs.get("command")
     if opened is None or not isinstance(text, str):
@@ -277,7 +263,7 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
     import zarr
     from zarr.storage import LocalStore, WrapperStore
 
-    place = place_of(location, "r+")
+    place = stores.place_of(location, "r+")
     lost = _holds_arrays_of(command, place)
 
     class Root(WrapperStore):
@@ -287,7 +273,7 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
             return None
 
         async def set(self, key: str, value: Any) -> None:
-            value = type(value).from_bytes(sealed(value.to_bytes()))
+            value = type(value).from_bytes(stores.sealed(value.to_bytes()))
             if lost:
                 return await super().set(key, value)
             names = [name async for name in self.list_dir(key.rpartition("/")[0])]
@@ -299,7 +285,7 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
     attributes = _attributes(command)
     zarr.create_group(Root(place.store), path=place.path, zarr_format=3, attributes=attributes)
     if durable and isinstance(place.store, LocalStore):
-        sync(place.store.root / place.path / ROOT)
+        sync(place.store.root / place.path / stores.ROOT)
 
 
 def _holds_arrays_of(command: Command, place: StorePath) -> bool:
@@ -309,7 +295,7 @@ def _holds_arrays_of(command: Command, place: StorePath) -> bool:
     for name, _, _ in array_plans(command):
         with suppress(Exception):  # each kind of store has its own for what is missing or damaged
             array = zarr.open_array(place / name, mode="r", zarr_format=3)
-            return array.attrs[OF] == sha256(command.to_json().encode())
+            return array.attrs[OF] == stores.sha256(command.to_json().encode())
     return False
 
 
@@ -323,7 +309,7 @@ def _attributes(command: Command) -> dict[str, Any]:
     digests: dict[str, str] = {}
     for name, options, _ in array_plans(command):
         group.create_array(name, **options)
-        digests[name] = sha256(memory[f"{name}/{ROOT}"].to_bytes())
+        digests[name] = stores.sha256(memory[f"{name}/{stores.ROOT}"].to_bytes())
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
     return {
         "title": "reachability cloud atlas",
@@ -331,8 +317,8 @@ def _attributes(command: Command) -> dict[str, Any]:
         CUBE_DIGEST: drawn_cube(command)[1],
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),
-        ARRAYS: digests,
-        DIGEST: BLANK,
+        stores.ARRAYS: digests,
+        stores.DIGEST: stores.BLANK,
     }
 
 
@@ -353,7 +339,7 @@ def _complete(store: AtlasStore) -> None:
             data, drawn = drawn_cube(store.command)
             if drawn != store.opened.group.attrs[CUBE_DIGEST]:
                 other = "this machine draws other activations than the one that began it"
-                raise StoreFailed(f"{store.location}: {other}")
+                raise stores.StoreFailed(f"{store.location}: {other}")
         if data is not None:
             store.array(name)[...] = data
     gaps = store.command.space.gaps
@@ -366,4 +352,4 @@ def _complete(store: AtlasStore) -> None:
 def drawn_cube(command: Command) -> tuple[Array, str]:
     """The activations that the command draws on this machine, and their SHA-256."""
     cube = sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
-    return cube, sha256(np.ascontiguousarray(cube).tobytes())
+    return cube, stores.sha256(np.ascontiguousarray(cube).tobytes())

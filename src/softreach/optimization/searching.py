@@ -15,18 +15,10 @@ from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.polish import MOST_DESIGNS, can_polish, polished
 from softreach.optimization.problem import SETS, Candidate, Problem, goals
 from softreach.optimization.result import Search
-from softreach.optimization.study import SAMPLERS, Sampler, Study
+from softreach.optimization.study import Sampler, Study
 from softreach.requirements.requirements import Requirements
 from softreach.support import parallel
-from softreach.support.arguments import (
-    as_flag,
-    as_function,
-    as_instance,
-    as_integer,
-    as_number,
-    as_one_of,
-    as_path,
-)
+from softreach.support.arguments import as_flag, as_function, as_instance, as_integer, as_number
 from softreach.support.arrays import Array
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES
@@ -116,9 +108,7 @@ def search(
     designs = as_integer("designs", designs, 1, 1_000_000)
     first = max(min(designs, 4 * len(problem.parameters)), int(_FIRST_SHARE * designs))
     follow = (lambda _: None) if follow is None else as_function("follow", follow)
-    place = None if storage is None else as_path("storage", storage)
-    chosen = as_one_of("sampler", sampler, SAMPLERS)
-    study = Study(problem, storage=place, sampler=chosen, seed=seed, first=first)
+    study = Study(problem, storage=storage, sampler=sampler, seed=seed, first=first)
     polishes = as_flag("polish", polish) and can_polish(problem)
     asked = {*needs.measures, *(goal.name for goal in targets)}
     by_sets = bool(needs.regions) or not asked.isdisjoint(SETS)  # what is best depends on accuracy

@@ -15,7 +15,9 @@ import numpy as np
 
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
+from softreach.support.arguments import as_one_of, as_path
 from softreach.support.errors import InvalidInput, check_installed, in_short
+from softreach.support.files.atomic import StrPath
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
@@ -39,11 +41,12 @@ class Study:
     """
 
     def __init__(
-        self, problem: Problem, *, storage: str | None, sampler: str, seed: int, first: int
+        self, problem: Problem, *, storage: StrPath | None, sampler: str, seed: int, first: int
     ) -> None:
         """Open the storage, if there is one; the first designs are spread evenly."""
+        place = None if storage is None else as_path("storage", storage)
         self.problem, self._first = problem, first
-        self._sampler, self.seed = sampler, seed
+        self._sampler, self.seed = as_one_of("sampler", sampler, SAMPLERS), seed
         self.candidates: list[Candidate] = []
         """All designs that were judged, in their order."""
         self._kept: dict[str, Candidate] = {}  # in the storage, by what was asked
@@ -53,7 +56,7 @@ class Study:
         self._optuna = _library()
         with _quiet():
             self._study = self._created(None)
-            self._storage = None if storage is None else self._opened(storage)
+            self._storage = None if place is None else self._opened(place)
             for values in first_designs(problem, first, seed):
                 self._study.enqueue_trial(dict(values))
 

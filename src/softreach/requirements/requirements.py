@@ -18,14 +18,7 @@ from softreach.requirements.parts import LIMIT_UNITS, LONGEST, MOST_PLACES, Keep
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats
-from softreach.support.errors import (
-    Fault,
-    InvalidDesign,
-    InvalidInput,
-    NotPossible,
-    Range,
-    SoftreachError,
-)
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.files.text import read_text, write_text
 from softreach.support.files.toml import (
     WRONG,
@@ -389,8 +382,6 @@ class _Reader(FaultReader):
         try:
             made = kind(**right)
             return WRONG if wrong else made
-        except NotPossible as error:
-            return self._refuse(path, None, str(error))
         except InvalidInput as error:
             field = error.name.partition(" ")[0].partition("[")[0]
             key = next((key for key in raw if key.startswith(field)), "")
@@ -398,6 +389,8 @@ class _Reader(FaultReader):
             said = "" if key or error.name == field else f"{error.name} "
             place = f"{path}.{key}" if key else path
             return self._refuse(place, value, f"{said}must be {error.allowed}")
+        except SoftreachError as error:
+            return self._refuse(path, None, str(error))
 
     def _numbers(
         self,
