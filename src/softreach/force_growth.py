@@ -107,7 +107,7 @@ class Growth:
         """The tip at its place without force; None if it is not there or not stable."""
         if not np.isfinite(self._begun.tip).all():
             return None
-        fixed = self._corrected(self.box.clip(self.start), 0.0, 0.0, self._begun)
+        fixed = self._fixed(self.box.clip(self.start), 0.0, 0.0, self._begun)
         return fixed if fixed and self._is_stable(fixed) else None
 
     @lazy
@@ -119,7 +119,7 @@ class Growth:
         """The end of the growth, from the last of those `begun` in other steps; None if none is."""
         if begun:  # in these steps, under the same force
             last = begun[-1]
-            fixed = self._corrected(last.gamma, last.force, 0.0, last.response)
+            fixed = self._fixed(last.gamma, last.force, 0.0, last.response)
         else:
             fixed = self.first
         if fixed is None or (begun and not self._is_stable(fixed)):
@@ -163,7 +163,7 @@ class Growth:
         """Try a step: its share of the growth foreseen, 0 if not taken; was it for stability?"""
         fixed = path[-1]
         gamma, force = self.box.clip(fixed.gamma + best.gamma), fixed.force + best.force
-        tried = self._corrected(gamma, force, self.unit, _ahead(path, force))
+        tried = self._fixed(gamma, force, self.unit, _ahead(path, force))
         if tried is None:
             return 0.0, fixed.response.margin <= _NEAR_LOSS
         share, stable = (tried.force - fixed.force) / best.force, self._is_stable(tried)
@@ -232,9 +232,7 @@ class Growth:
         room = np.minimum(gamma - box.low, box.high - gamma) / box.scales
         return box.is_free & (room <= _AT_BOUND)
 
-    def _corrected(
-        self, gamma: Array, force: float, unit: float, near: TipResponse
-    ) -> FixedTip | None:
+    def _fixed(self, gamma: Array, force: float, unit: float, near: TipResponse) -> FixedTip | None:
         """The tip put to its place by Newton's method; None if it does not come there.
 
         Bundles that begin at a bound stay there, if enough others are left. The force [N] yields
@@ -305,7 +303,7 @@ class Growth:
         )
         gamma = box.clip(box.low + solution.x[:-1] * box.scales)
         force = float(solution.x[-1]) * self.unit
-        better = self._corrected(gamma, force, self.unit, fixed.response)
+        better = self._fixed(gamma, force, self.unit, fixed.response)
         if better is None or better.force < fixed.force:
             return fixed
         return better if self._is_stable(better) else fixed

@@ -330,9 +330,7 @@ def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     return CellGrid.around(points, default if edge is None else as_number("cell", edge, _EDGES))
 
 
-def cell_dataset(
-    grid: CellGrid, **variables: tuple[NDArray[np.generic], dict[str, str]]
-) -> xr.Dataset:
+def cell_dataset(grid: CellGrid, **variables: tuple[NDArray[Any], dict[str, str]]) -> xr.Dataset:
     """Variables, each with its attributes, over the centers x, y, z [m] of cubes."""
     import xarray as xr
 

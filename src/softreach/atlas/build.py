@@ -86,10 +86,10 @@ def run_designs(
             name = f"compute of metric {metric.name}"
             raise InvalidInput(name, metric.compute, allowed, hint) from None
     pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
-    _run_in_pool(pool, store, indices, on_outcome)
+    _run_pool(pool, store, indices, on_outcome)
 
 
-def _run_in_pool(
+def _run_pool(
     pool: Executor, store: AtlasStore, indices: Sequence[int], on_outcome: OnOutcome
 ) -> None:
     key = token, origin = secrets.token_hex(8), os.getpid()

@@ -47,12 +47,10 @@ class Intermediates:
     _cache: dict[Need, Any] = field(default_factory=dict)
 
     @classmethod
-    def of_one(
-        cls, arm: Manipulator, samples: int, accuracy: float, sets: Callable[[], Any]
-    ) -> Self:
+    def of_one(cls, arm: Manipulator, n: int, accuracy: float, sets: Callable[[], Any]) -> Self:
         """Of one design, with a radius of alpha shapes that its samples, a power of 2, allow."""
-        cube = sample_cube("sobol", samples, max(arm.inputs, 1))
-        alpha = _SPACINGS / float(np.cbrt(samples))
+        cube = sample_cube("sobol", n, max(arm.inputs, 1))
+        alpha = _SPACINGS / float(np.cbrt(n))
         return cls(arm, cube, Settings(_TOL, accuracy, alpha), sets)
 
     @cached_property

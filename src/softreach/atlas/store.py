@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -168,9 +168,7 @@ class AtlasStore:
         return store
 
     @classmethod
-    def open(
-        cls, location: StoreLike, mode: Literal["r", "r+"] = "r+", *, durable: bool = False
-    ) -> Self:
+    def open(cls, location: StoreLike, mode: stores.Mode = "r+", *, durable: bool = False) -> Self:
         """Open an atlas, in mode "r" at a place that cannot be written to."""
         location = stores.absolute(location)
         opened = stores.opened_store(location, "atlas", mode, durable=durable)

@@ -237,9 +237,7 @@ _OBJECTIVES = (
     _rough("payload", "kg", "payload under which 80 % of the volume is left", _payload),
     _rough("compliance", "m/N", "mean of the largest compliance of the tip", _compliance),
     Objective("mass", "kg", "mass of the arm", lambda case: Estimate(mass(case.arm), 0.0)),
-    Objective(
-        "actuators", "1", "number of inputs", lambda case: Estimate(float(case.arm.inputs), 0.0)
-    ),
+    Objective("actuators", "1", "number of inputs", lambda case: Estimate(case.arm.inputs, 0.0)),
 )
 OBJECTIVES = {each.name: each for each in _OBJECTIVES}
 """Objectives by name, beside the metrics of the atlas."""

@@ -90,9 +90,7 @@ class _Reader(FaultReader):
         self._check_keys(self._raw, "search", _KEYS)
         self._raw |= {key: self._table(self._raw, key, "search.") for key in _TABLES}
 
-    def bases(
-        self, folder: Path, design_from: Callable[[str], Manipulator]
-    ) -> dict[str, Manipulator]:
+    def bases(self, folder: Path, load: Callable[[str], Manipulator]) -> dict[str, Manipulator]:
         """Designs to vary by what they are called; none where none can be read."""
         of_file = "design" not in self._given
         path, value = self._value("design")
@@ -106,7 +104,7 @@ class _Reader(FaultReader):
         for name in names:
             file = folder / name
             place = str(file) if of_file and file.is_file() else name
-            bases[name] = self._tried(path, name, partial(design_from, place))
+            bases[name] = self._tried(path, name, partial(load, place))
         return {name: arm for name, arm in bases.items() if arm is not WRONG}
 
     def parameters(self, bases: Mapping[str, Manipulator]) -> None:

@@ -278,7 +278,7 @@ def checked(
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
         posed.append(solved(rules, needs.places, needs.within, step, quick=quick))
         for target, region in needs.regions:
-            share = float(_is_covered(rules, target, region.places(count), sets, step).mean())
+            share = float(_covered(rules, target, region.places(count), sets, step).mean())
             error = float(share_error(share, count))
             coverages.append(Coverage(target.name, payload, share, error, count))
     whole = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
@@ -294,9 +294,7 @@ def checked(
     return replace(made, findings=findings)
 
 
-def _is_covered(
-    rules: PoseRules, target: Target, places: Array, sets: Sets, step: Progress
-) -> Mask:
+def _covered(rules: PoseRules, target: Target, places: Array, sets: Sets, step: Progress) -> Mask:
     if len(rules):
         posed = solved(rules, places, np.full(len(places), target.within), step)
         near = max(target.within, TOL * rules.arm.length)

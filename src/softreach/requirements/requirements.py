@@ -272,7 +272,7 @@ class _Reader(FaultReader):
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""
         payloads = self._numbers(document, "", {"payloads": "kg"}, _KEYS)
-        limits = self._table(document, "limits")
+        raw = self._table(document, "limits")
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
         return payloads | {
@@ -282,9 +282,7 @@ class _Reader(FaultReader):
                 for kind in ("stay_inside", "avoid")
                 for each in self._tables(document, kind)
             ],
-            "limits": self._made(
-                Limits, limits, "limits", self._numbers(limits, "limits", LIMIT_UNITS)
-            ),
+            "limits": self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS)),
             "measures": self._measures(self._table(document, "measures")),
         }
 

@@ -83,16 +83,14 @@ def as_instance(name: str, value: Any, kind: Any, what: str) -> Any:
     raise InvalidInput(name, as_given(value), what)
 
 
-def as_dataset(
-    name: str, value: Any, *variables: str, kind: str = "Dataset", what: str = ""
-) -> Any:
+def as_dataset(name: str, value: Any, *needed: str, kind: str = "Dataset", what: str = "") -> Any:
     """An `xarray.Dataset` (or another `kind`), called `what`, that has some variables."""
-    with_variables = f" with {', '.join(variables)}" if variables else ""
+    with_variables = f" with {', '.join(needed)}" if needed else ""
     allowed = f"{what or f'an xarray.{kind}'}{with_variables}"
     xarray = sys.modules.get("xarray")  # who has a dataset has imported it
     if xarray is None or not isinstance(value, getattr(xarray, kind)):
         raise InvalidInput(name, as_given(value), allowed)
-    if missing := [variable for variable in variables if variable not in value]:
+    if missing := [variable for variable in needed if variable not in value]:
         raise InvalidInput(name, f"a {kind} without {', '.join(missing)}", allowed)
     return value
 

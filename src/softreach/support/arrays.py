@@ -146,9 +146,7 @@ def as_faces(name: str, values: object, count: int) -> Faces:
     return _within(name, faces, faces.shape[1:] == (3,), count, allowed).astype(np.int64)
 
 
-def _within(
-    name: str, indices: NDArray[Any], fits: bool, count: int, allowed: str
-) -> NDArray[np.integer]:
+def _within(name: str, indices: NDArray[Any], fits: bool, count: int, allowed: str) -> NDArray[Any]:
     if not fits or (indices.size and indices.dtype.kind not in "iu"):
         raise InvalidInput(name, _described(indices, indices), allowed)
     if indices.size and not (indices.min() >= 0 and indices.max() < count):

@@ -83,14 +83,12 @@ class FaultReader:
             self._refuse(f"{path}{key}", raw, "must be a table")
         return raw if isinstance(raw, dict) else {}
 
-    def _tables(
-        self, document: Mapping[str, Any], key: str
-    ) -> Iterator[tuple[dict[str, Any], str]]:
-        raw = document.get(key, [])
-        if not isinstance(raw, list):
-            self._refuse(key, raw, f"must be tables: write [[{key}]]")
+    def _tables(self, raw: Mapping[str, Any], key: str) -> Iterator[tuple[dict[str, Any], str]]:
+        tables = raw.get(key, [])
+        if not isinstance(tables, list):
+            self._refuse(key, tables, f"must be tables: write [[{key}]]")
             return
-        for k, table in enumerate(raw):
+        for k, table in enumerate(tables):
             if isinstance(table, dict):
                 yield table, f"{key}[{k}]"
             else:
