@@ -134,12 +134,9 @@ class Metric:
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The metric that `to_dict` described; to compute it, the real one has to be passed."""
-        known = {
-            "needs": tuple(Need[name] for name in values["needs"]),
-            "over": tuple(values["over"]),
-            "compute": _Elsewhere(values["compute"]),
-        }
-        return cls(**{**values, **known})
+        needs = tuple(Need[name] for name in values["needs"])
+        over, compute = tuple(values["over"]), _Elsewhere(values["compute"])
+        return cls(**{**values, "needs": needs, "over": over, "compute": compute})
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,8 @@ from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
 
+Floors = Sequence[float]
+
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
 MOST_DESIGNS = 60
@@ -43,24 +45,18 @@ def can_polish(problem: Problem) -> bool:
 @parallel.undivided()
 @no_warnings()
 def polished(
-    problem: Problem,
-    start: Candidate,
-    designs: int,
-    goal: int,
-    floors: Sequence[float],
-    accuracy: float | None = None,
+    problem: Problem, start: Candidate, most: int, turn: tuple[int, Floors], accuracy: float
 ) -> Candidate:
     """The local optimum of one goal next to a design; poses at the targets move along with it.
 
-    The costs of the other goals do not exceed the `floors`; the relative error of volumes is that
-    of coarse sets unless another `accuracy` is given. Returned is the better of both ends, with the
-    number of designs that were made: none for a start that is too far from what is required.
+    In `turn` is a goal, by its number, and the largest costs of the others; `accuracy` is the
+    relative error of volumes. Returned is the better of both ends, with the number of designs that
+    were made: none for a start that is too far from what is required.
     """
     if start.excess > _HOPELESS:
         return replace(start, designs=0)
-    accuracy = accuracy or problem.coarse
-    kept = len(_BACK) * (start.is_feasible and designs >= _AMPLE)
-    program = _Program(problem, start, accuracy, goal, floors, designs - kept)
+    kept = len(_BACK) * (start.is_feasible and most >= _AMPLE)
+    program = _Program(problem, start, accuracy, *turn, most - kept)
     try:
         end = program.optimum()
         candidate = problem.judged(program.values_of(end), program.point(end).design.case)
@@ -68,7 +64,7 @@ def polished(
         if start.is_feasible and not candidate.is_feasible:
             # A program that was cut, or stalled, ends a little outside of what is required.
             low, high = (problem.parameters.reals(each.values) for each in (candidate, start))
-            for back in _BACK[: max(designs - spent, 0)]:
+            for back in _BACK[: max(most - spent, 0)]:
                 values = problem.parameters.moved(start.values, low + back * (high - low))
                 again = problem.judged(values, problem.case(values, accuracy))
                 spent += 1
@@ -100,7 +96,7 @@ class _Program:
     start: Candidate
     accuracy: float
     goal: int
-    floors: Sequence[float] = ()
+    floors: Floors = ()
     most: int = MOST_DESIGNS
     designs: int = 0  # Designs made so far
     accepted: Array = field(default_factory=lambda: np.empty(0))

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachability")}
 """Goals and measures of the reachable set, and what they are called there."""
 NEAR = 0.1  # Relative distance within which objectives at the ends of polishes agree
+Names = str | Metric | Sequence[str | Metric]
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
 _COARSE, _FINE = 1 << 12, 1 << 15  # samples of the cloud of coarse and of fine cases
@@ -124,11 +125,7 @@ class Goal(NamedTuple):
         return value if math.isfinite(value.value) else Estimate(math.nan)
 
 
-def goals(
-    maximize: str | Metric | Sequence[str | Metric],
-    minimize: str | Metric | Sequence[str | Metric],
-    requirements: Requirements,
-) -> tuple[Goal, ...]:
+def goals(maximize: Names, minimize: Names, requirements: Requirements) -> tuple[Goal, ...]:
     """Objectives with their senses, in the order in which names or metrics are given.
 
     Those about targets or regions are refused where the requirements have none.

@@ -22,11 +22,8 @@ from softreach.support.lazy import lazy
 from softreach.workspace.gradient import VolumeGradient, boundary_samples, gradient_of
 from softreach.workspace.tip_derivatives import TipDerivatives
 
-OF_ARM: dict[str, Callable[[Manipulator], float]] = {
-    "mass": mass,
-    "load_number": load_number,
-    "actuators": lambda arm: float(arm.inputs),
-}
+OF_ARM: dict[str, Callable[[Manipulator], float]] = {"mass": mass, "load_number": load_number}
+OF_ARM["actuators"] = lambda arm: float(arm.inputs)
 _TOL = 1e-7  # of tips at the targets, in L
 STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
 _PLACES = 8192  # of a region, whose share is covered

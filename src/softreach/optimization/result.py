@@ -292,6 +292,8 @@ class Search(Reported):
         shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
         missed = sorted((x for x in self.findings if not x.met), key=lambda each: -each.excess)
         fault = self.best.fault.splitlines()[:1] if self.best.fault else map(str, missed)
+        head = ("requirement", "", "of the best design")
+        rows = [(each.name, each.word, each.text) for each in self.findings]
         try:
             design = self.arm.to_toml()
         except SoftreachError as error:
@@ -303,12 +305,7 @@ class Search(Reported):
             facts=[*_remarks(self), *fault],
             sections=[
                 _best(self, shown),
-                Section(
-                    title="Requirements",
-                    head=("requirement", "", "of the best design"),
-                    rows=[(each.name, each.word, each.text) for each in self.findings],
-                    printed=0,
-                ),
+                Section(title="Requirements", head=head, rows=rows, printed=0),
                 *_front(self, shown),
                 Section(title="Pictures", figures=lambda: _figures(self, shown)),
                 Section(title="Provenance", rows=[*self.provenance.items()], printed=0),

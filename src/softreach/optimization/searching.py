@@ -97,13 +97,9 @@ def search(
     as_instance("requirements", needs, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     targets = goals(maximize, minimize, needs)
-    problem = Problem(
-        parameters=free_parameters(base, free, choices),
-        requirements=needs,
-        goals=targets,
-        accuracy=accuracy,
-        coarse=min(_COARSER * accuracy, max(accuracy, _COARSEST)),
-    )
+    parameters = free_parameters(base, free, choices)
+    errors = {"accuracy": accuracy, "coarse": min(_COARSER * accuracy, max(accuracy, _COARSEST))}
+    problem = Problem(parameters=parameters, requirements=needs, goals=targets, **errors)
     seed = as_integer("seed", seed, 0, 2**31)
     designs = as_integer("designs", designs, 1, 1_000_000)
     first = max(min(designs, 4 * len(problem.parameters)), int(_FIRST_SHARE * designs))
@@ -188,9 +184,9 @@ class _Run:
         most = min(MOST_DESIGNS, self._left // max(1, len(starts)))
         tasks = []
         for k, start in enumerate(starts):
-            goal, floors = self._turn(start, k)
-            what = ["polish", dict(start.values), most, goal, floors]
-            make = partial(polished, self.problem, start, most, goal, floors)
+            turn = self._turn(start, k)
+            what = ["polish", dict(start.values), most, *turn]
+            make = partial(polished, self.problem, start, most, turn, self.problem.coarse)
             tasks.append(partial(self._study.judged, what, make))
         for candidate, is_new in parallel.in_order(tasks):
             if candidate.designs:
@@ -258,6 +254,6 @@ class _Run:
         left = min(MOST_DESIGNS, self._designs - self._spent)
         if self._polishes and left >= _LEAST_OF_POLISH:
             turn = self._turn(best[0])
-            best.append(end := polished(problem, best[0], left, *turn, problem.accuracy))
+            best.append(end := polished(problem, best[0], left, turn, problem.accuracy))
             self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]

@@ -215,12 +215,8 @@ class Tolerance:
 def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
     """Numbers to first order, and of arms that are made with the first of the changes."""
     deviations = first.deviations
-    spreads = [
-        first.kept(),
-        first.of_set("volume", "m3", 1.0),
-        first.of_set("unreachability", "1", -1.0),
-        *(first.covered(*region) for region in first.regions),
-    ]
+    of_set = first.of_set("volume", "m3", 1.0), first.of_set("unreachability", "1", -1.0)
+    spreads = [first.kept(), *of_set, *(first.covered(*region) for region in first.regions)]
     made: list[tuple[list[float], list[Mask]]] = []
     errors = np.zeros(len(spreads))
     if checked:

@@ -168,10 +168,6 @@ class Limits:
 
 
 _OF_POSES = ("shortening", "force", "pressure", "stroke", "bending")
-LIMIT_UNITS = dict.fromkeys((field.name for field in dataclasses.fields(Limits)), "") | {
-    "force": "N",
-    "pressure": "Pa",
-    "stroke": "m",
-    "mass": "kg",
-}
+_UNITS = {"force": "N", "pressure": "Pa", "stroke": "m", "mass": "kg"}
+LIMIT_UNITS = {field.name: _UNITS.get(field.name, "") for field in dataclasses.fields(Limits)}
 """Limit -> its SI unit."""

@@ -445,10 +445,8 @@ class _Reader(FaultReader):
             return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
         units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
         hint = "" if unit != "m" or self.length is not None else "; L is not known here"
-        return (
-            f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under '
-            f"{name}_{unit.lower()}{hint}"
-        )
+        key = f"{name}_{unit.lower()}{hint}"
+        return f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under {key}'
 
 
 def _keys(name: str, unit: str) -> dict[str, str]:
