@@ -212,13 +212,9 @@ class Growth:
             return _Program(np.zeros(box.bundles), 0.0, 0.0, np.zeros(box.bundles), np.nan)
         change = reach * solution.x
         price = solution.lower.marginals + solution.upper.marginals
-        return _Program(
-            change[:-1] * box.scales,
-            float(change[-1]) * self.unit,
-            float(solution.x[-1]),
-            price[:-1],
-            float(np.linalg.norm(solution.eqlin.marginals)) * self.unit / length,
-        )
+        slope = float(np.linalg.norm(solution.eqlin.marginals)) * self.unit / length
+        gamma, force = change[:-1] * box.scales, float(change[-1]) * self.unit
+        return _Program(gamma, force, float(solution.x[-1]), price[:-1], slope)
 
     def _columns(self, response: TipResponse, unit: float) -> Array:
         """Motion of the tip [L] by each activation over its range and by the unit of force."""
@@ -288,19 +284,12 @@ class Growth:
             return respond(x.tobytes())
 
         gradient = np.append(np.zeros(box.bundles), -1.0)
-        solution: Any = minimize(
-            lambda x: -x[-1],
-            x,
-            jac=lambda x: gradient,
-            method="SLSQP",
-            bounds=[*((0.0, 1.0 if free else 0.0) for free in box.is_free), (0.0, None)],
-            constraints={
-                "type": "eq",
-                "fun": lambda x: (at(x).tip - self.place) / length,
-                "jac": lambda x: self._columns(at(x), self.unit),
-            },
-            options={"ftol": 1e-10, "maxiter": 25},
-        )
+        held: Any = {"type": "eq", "fun": lambda x: (at(x).tip - self.place) / length}
+        held["jac"] = lambda x: self._columns(at(x), self.unit)
+        ends = [*((0.0, 1.0 if free else 0.0) for free in box.is_free), (0.0, None)]
+        known: Any = {"constraints": held, "bounds": ends}
+        known["options"] = {"ftol": 1e-10, "maxiter": 25}
+        solution = minimize(lambda x: -x[-1], x, jac=lambda x: gradient, method="SLSQP", **known)
         gamma = box.clip(box.low + solution.x[:-1] * box.scales)
         force = float(solution.x[-1]) * self.unit
         better = self._fixed(gamma, force, self.unit, fixed.response)

@@ -310,12 +310,9 @@ def storable(dataset: xr.Dataset) -> xr.Dataset:
 
 def stored_names(dataset: xr.Dataset) -> xr.Dataset:
     """The inverse of `storable`: names that xarray can fill, join and pickle."""
-    names = {
-        name: (each.dims, np.array(each.values.tolist(), dtype=str), each.attrs)
-        for name, each in dataset.coords.items()
-        if each.dtype.kind == "T"
-    }
-    return dataset.assign_coords(names)
+    named = {name: x for name, x in dataset.coords.items() if x.dtype.kind == "T"}
+    texts = {name: np.array(x.values.tolist(), dtype=str) for name, x in named.items()}
+    return dataset.assign_coords({k: (x.dims, texts[k], x.attrs) for k, x in named.items()})
 
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:

@@ -334,11 +334,8 @@ def command_of(atlas: xr.Dataset) -> Command:
 
 def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, float, float]]:
     """Variable, lowest and highest value allowed, in SI units."""
-    written = {
-        written_name(str(name), unit): (str(name), unit)
-        for name, values in atlas.variables.items()
-        if (unit := values.attrs.get("units", "1"))
-    }
+    units = {str(name): x.attrs.get("units", "1") for name, x in atlas.variables.items()}
+    written = {written_name(name, unit): (name, unit) for name, unit in units.items() if unit}
     for text in where:
         given, sign, number = (*re.split("([<>]=?)", text, maxsplit=1), "", "")[:3]
         if (values := numbers_in(number, 1)) is None:
@@ -388,10 +385,8 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
     content.warn_of_damage(f" ({then})")
     with storage_errors(f"{store.location} cannot be read"):
         raw = xr.open_zarr(store.opened.place, drop_variables=_READ_HERE, **READING)
-        coordinates: dict[str, Any] = {
-            "length": ((), space.length_range[0], {"units": "m"}),
-            **{name: raw[name] for name in space.names},
-        }
+        length = ((), space.length_range[0], {"units": "m"})
+        coordinates: dict[str, Any] = {"length": length} | {x: raw[x] for x in space.names}
     for variable in (raw, *raw.variables.values()):
         for name in (ARRAYS, DIGEST, OF):
             variable.attrs.pop(name, None)

@@ -241,24 +241,17 @@ class DesignSpace:
     def to_dict(self) -> dict[str, Any]:
         """The space in plain values, from which `from_dict` makes an equal one."""
         parameters = {name: [*values] for name, values in self.parameters}
-        return {
-            "design": self.base.to_toml(),
-            "layout": self.layout,
-            "parameters": parameters,
-            "extent": [self.bundles, *self.length_range],
-        }
+        base, extent = self.base.to_toml(), [self.bundles, *self.length_range]
+        return {"design": base, "layout": self.layout, "parameters": parameters, "extent": extent}
 
     @classmethod
     def from_dict(cls, space: Mapping[str, Any]) -> Self:
         """The space that `to_dict` described; its base design is read when it is asked for."""
         bundles, shortest, longest = space["extent"]
         made = object.__new__(cls)
-        vars(made).update(
-            parameters=_plain(space["parameters"]),
-            layout=space["layout"],
-            known=_Survey({}, bundles, (shortest, longest)) if bundles else None,
-            written=space["design"],
-        )
+        known = _Survey({}, bundles, (shortest, longest)) if bundles else None
+        vars(made).update(layout=space["layout"], known=known, written=space["design"])
+        vars(made)["parameters"] = _plain(space["parameters"])
         return made
 
     def __getattr__(self, name: str) -> Any:
