@@ -1,7 +1,5 @@
 """Command that builds an atlas: the same one resumes, another one is refused."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -99,13 +97,13 @@ class Command:
             metrics.append(own if own and same else Metric.from_dict(metric))
         return cls(**{**values, "space": space, "metrics": tuple(metrics)})
 
-    def continuing(self, begun: Command) -> Self:
+    def continuing(self, begun: Self) -> Self:
         """This command for a store that another version began: without metrics added since."""
         names = {metric.name for metric in begun.metrics}
         kept = (m for m in self.metrics if m.name in names or not known_metric(m.name))
         return replace(self, metrics=tuple(kept), softreach_version=begun.softreach_version)
 
-    def differences(self, other: Command) -> list[str]:
+    def differences(self, other: Self) -> list[str]:
         """Differences between this command and another, one line each."""
         own, its = ({m.name: m.to_dict() for m in each.metrics} for each in (self, other))
         lines = [*_differences(_flat(self), _flat(other))]

@@ -1,7 +1,5 @@
 """Metrics of softreach: one table of name, unit, meaning, function and needs, in groups."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +7,7 @@ from enum import Enum
 from functools import partial
 from itertools import chain
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -20,12 +18,6 @@ from softreach.support import plugins
 from softreach.support.arguments import as_given, as_instance, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError, warn
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from softreach.workspace import ReachableSet
-
 
 PROFILE = ("station", "quantile")
 
@@ -240,22 +232,22 @@ def _spacing(shape: AlphaComplex, alpha: float, tips: Array) -> float:
     return math.cbrt(_alpha_volume(shape, alpha) / len(tips))
 
 
-def _fold_volume(reached: ReachableSet) -> float:
+def _fold_volume(reached: Any) -> float:
     return reached.fold_volume if reached.dimension == 3 else 0.0
 
 
-def _mean_multiplicity(reached: ReachableSet) -> float:
+def _mean_multiplicity(reached: Any) -> float:
     volumes = reached.multiplicity
     total = sum(volumes.values())
     return sum(k * volume for k, volume in volumes.items()) / total if total > 0 else math.nan
 
 
-def _multiple_volume(reached: ReachableSet) -> float:
+def _multiple_volume(reached: Any) -> float:
     volumes = reached.multiplicity
     return sum(volume for k, volume in volumes.items() if k > 1) if volumes else math.nan
 
 
-def _quantiles(name: str, statistics: xr.Dataset) -> Array:
+def _quantiles(name: str, statistics: Any) -> Array:
     return statistics[name].values
 
 

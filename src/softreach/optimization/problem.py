@@ -25,12 +25,11 @@ from softreach.support.arguments import as_given, as_names
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, no_warnings
 from softreach.support.lazy import lazy
+from softreach.workspace import ReachableSet
 from softreach.workspace.measure import Estimate
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.workspace import ReachableSet
 
 SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachability")}
 """Goals and measures of the reachable set, and what they are called there."""

@@ -1,7 +1,5 @@
 """Design and poses as one smooth program: values and derivatives at one place of the unknowns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -149,6 +147,18 @@ _SPARE = 1e-4  # over L or relative, by which limits are kept
 _TOUCHES = 1e-12
 _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
+
+
+@dataclass(frozen=True)
+class Part:
+    """Equations or inequalities of one requirement, differentiated when they are used first."""
+
+    name: str  # Of the requirement
+    value: Array  # Shape (n,)
+    slope: Callable[[], Array]  # Makes the derivatives by all unknowns, shape (n, unknowns)
+    within: float = 0.0  # Distance to a place that is allowed, over L
+    scale: float = 1.0  # Of what the requirement allows, per unit of the value
+    unit: str = ""  # Unit of that; "" for that of the limit or measure
 
 
 @dataclass(eq=False)
@@ -333,18 +343,6 @@ class Point:
 
         room = np.array([sense * (limit - value) / scale - _SPARE])
         return Part(name, room, slope, scale=scale)
-
-
-@dataclass(frozen=True)
-class Part:
-    """Equations or inequalities of one requirement, differentiated when they are used first."""
-
-    name: str  # Of the requirement
-    value: Array  # Shape (n,)
-    slope: Callable[[], Array]  # Makes the derivatives by all unknowns, shape (n, unknowns)
-    within: float = 0.0  # Distance to a place that is allowed, over L
-    scale: float = 1.0  # Of what the requirement allows, per unit of the value
-    unit: str = ""  # Unit of that; "" for that of the limit or measure
 
 
 def stacked(parts: Sequence[Part]) -> Array:

@@ -1,7 +1,5 @@
 """Study of a search: designs from Optuna's samplers, in a storage from which it resumes."""
 
-from __future__ import annotations
-
 import json
 import math
 import warnings
@@ -9,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -19,9 +17,6 @@ from softreach.support.arguments import as_one_of, as_path
 from softreach.support.errors import InvalidInput, check_installed, in_short
 from softreach.support.files.atomic import StrPath
 from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    import optuna
 
 Sampler = Literal["auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random"]
 SAMPLERS: tuple[str, ...] = get_args(Sampler)
@@ -124,7 +119,7 @@ class Study:
             trials = self._study.get_trials(states=complete)
             self._study.sampler = make(source_trials=trials, seed=self.seed + 1, **options)
 
-    def _created(self, storage: Any) -> optuna.Study:
+    def _created(self, storage: Any) -> Any:
         samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
         population = {"population_size": max(8, min(self._first, 48))}
         after = {"multivariate": True, "constant_liar": True, "n_startup_trials": self._first}
@@ -144,7 +139,7 @@ class Study:
             load_if_exists=True,
         )
 
-    def _opened(self, place: str) -> optuna.Study:
+    def _opened(self, place: str) -> Any:
         digest = self.problem.digest
         try:
             study = self._created(_storage(place))

@@ -1,10 +1,8 @@
 """Findings about a design: what it misses and by how much, proofs made at once, its numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,9 +21,7 @@ from softreach.support.arrays import Array
 from softreach.support.errors import no_warnings
 from softreach.support.quantity import quantity
 from softreach.support.units import LengthUnit
-
-if TYPE_CHECKING:
-    from softreach.workspace import ReachableSet
+from softreach.workspace import ReachableSet
 
 Verdict = Literal["met", "missed", "undecided"]
 """A requirement is undecided where its margin is smaller than the error of that."""

@@ -1,11 +1,9 @@
 """Poses of an arm: judged by regions and limits, and those chosen for places to reach."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -73,7 +71,7 @@ class PoseRules:
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
 
-    def some(self, columns: Index) -> PoseRules:
+    def some(self, columns: Index) -> Self:
         """Some of the rules, by their columns."""
         keeps = tuple(self.keeps[k] for k in columns if k < len(self.keeps))
         limits = list(self.limits.items())
@@ -180,7 +178,7 @@ class Body(NamedTuple):
     lost: Mask  # Poses without an arm, shape (n,)
 
     @classmethod
-    def of(cls, rod: TipMap, gamma: Array, parts: int) -> Body:
+    def of(cls, rod: TipMap, gamma: Array, parts: int) -> Self:
         """The sections between so many parts."""
         z = np.linspace(0.0, rod.length, parts + 1)
         frames, strains = rod.frames(gamma, z), rod.strains(gamma, z)

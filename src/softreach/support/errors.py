@@ -1,7 +1,5 @@
 """Errors and warnings, said so that the reader knows what to do next."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import sys
@@ -9,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 __all__ = [
     "Fault",
@@ -94,7 +92,7 @@ class Range(NamedTuple):
         below = value < self.high or (value == self.high and not self.open_high)
         return above and below and abs(value) <= sys.float_info.max
 
-    def in_degrees(self) -> Range:
+    def in_degrees(self) -> Self:
         """The same range of an angle, for files and the command line."""
         return self._replace(low=math.degrees(self.low), high=math.degrees(self.high), unit="deg")
 

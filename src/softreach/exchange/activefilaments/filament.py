@@ -1,7 +1,5 @@
 """Filaments of ActiveFilaments.jl: arms written as Julia, and read from the JSON of Julia."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter
@@ -10,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from os import PathLike
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -287,17 +285,17 @@ class _Value:
     place: str
     value: Any
 
-    def of(self, *keys: str) -> _Value:
+    def of(self, *keys: str) -> Self:
         found = self
         for key in keys:
             if not isinstance(found.value, dict) or key not in found.value:
                 raise found.fault(f"an object with {key}")
-            found = _Value(f"{found.place}.{key}", found.value[key])
+            found = type(self)(f"{found.place}.{key}", found.value[key])
         return found
 
-    def each(self, count: float | None = None) -> list[_Value]:
+    def each(self, count: float | None = None) -> list[Self]:
         if isinstance(self.value, list) and self.value and count in (None, len(self.value)):
-            return [_Value(f"{self.place}[{k}]", value) for k, value in enumerate(self.value)]
+            return [type(self)(f"{self.place}[{k}]", value) for k, value in enumerate(self.value)]
         raise self.fault("a list" if count is None else f"a list of {count:g}")
 
     def number(self, allowed: Range = Range()) -> float:  # noqa: B008
