@@ -14,6 +14,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from zarr.storage import MemoryStore, StoreLike  # noqa: TID253  (imported where stores are)
 
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import Intermediates
@@ -42,7 +43,6 @@ from softreach.workspace.reach import ACCURACIES
 
 if TYPE_CHECKING:
     import xarray as xr
-    from zarr.storage import StoreLike
 
 Values = dict[str, Array]
 Outcome = tuple[int, str]  # Number of a design, and why it failed; empty if it did not
@@ -138,8 +138,6 @@ class _Remote(NamedTuple):
 
 def _run_remotely(remote: _Remote, index: int) -> Outcome:
     """Compute and store a design in a worker, which opens the store once and uses one thread."""
-    from zarr.storage import MemoryStore
-
     key = remote.token, os.getpid()  # a forked process has what its parent opened
     try:
         if key not in _opened:

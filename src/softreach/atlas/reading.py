@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from zarr.abc.store import Store  # noqa: TID253  (imported where stores are)
+from zarr.storage import StoreLike, StorePath  # noqa: TID253
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
@@ -36,7 +38,6 @@ from softreach.support.quantity import columns, numbers_in
 
 if TYPE_CHECKING:
     import xarray as xr
-    from zarr.storage import StoreLike
 
     AtlasLike = StoreLike | xr.Dataset
 
@@ -305,9 +306,6 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
 
 def a_store(name: str, value: Any, allowed: str = "a path, a URL or a Zarr store") -> Any:
     """A place where an atlas may be."""
-    from zarr.abc.store import Store
-    from zarr.storage import StorePath
-
     if isinstance(value, str | os.PathLike):
         return as_path(name, value)
     if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):

@@ -6,17 +6,19 @@ roots the first stays; then come the arrays, whose bytes do not depend on the wr
 the digest of the command, so that the same command, and no other, writes a lost root again.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
+import zarr  # noqa: TID253  (imported where stores are)
 from numpy.typing import ArrayLike, NDArray
+from zarr.codecs import BloscCodec, Crc32cCodec  # noqa: TID253
+from zarr.errors import ContainsArrayError  # noqa: TID253
+from zarr.storage import LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
 
 from softreach.atlas.command import Command
 from softreach.atlas.metrics import Metric
@@ -26,9 +28,6 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, warn
 from softreach.support.files import stores
 from softreach.support.files.atomic import sync
-
-if TYPE_CHECKING:
-    from zarr.storage import StoreLike, StorePath
 
 CUBE = "unit_activation"  # The array of activations that all designs share
 PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")  # Arrays whose chunks are designs
@@ -106,8 +105,6 @@ def _plan(
     data: Any = None,
 ) -> Plan:
     """With codecs of the Zarr v3 core, which every reader has; a checksum comes last."""
-    from zarr.codecs import BloscCodec, Crc32cCodec
-
     if name in PER_DESIGN:
         chunks = [1 if dim in command.space.dims else size for dim, size in sizes.items()]
     else:
@@ -258,9 +255,6 @@ def _with_command(
 
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
-    import zarr
-    from zarr.storage import LocalStore, WrapperStore
-
     place = stores.place_of(location, "r+")
     lost = _holds_arrays_of(command, place)
 
@@ -288,8 +282,6 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
 
 def _holds_arrays_of(command: Command, place: StorePath) -> bool:
     """True if a store whose root is damaged or lost was begun by this command."""
-    import zarr
-
     for name, _, _ in array_plans(command):
         with suppress(Exception):  # each kind of store has its own for what is missing or damaged
             array = zarr.open_array(place / name, mode="r", zarr_format=3)
@@ -299,9 +291,6 @@ def _holds_arrays_of(command: Command, place: StorePath) -> bool:
 
 def _attributes(command: Command) -> dict[str, Any]:
     """Attributes of the root, in which what describes the arrays is listed before it is written."""
-    import zarr
-    from zarr.storage import MemoryStore
-
     memory: dict[str, Any] = {}
     group = zarr.create_group(MemoryStore(memory), zarr_format=3)
     digests: dict[str, str] = {}
@@ -322,8 +311,6 @@ def _attributes(command: Command) -> dict[str, Any]:
 
 def _complete(store: AtlasStore) -> None:
     """Write what all designs share, and the gaps, where they lack or err."""
-    from zarr.errors import ContainsArrayError
-
     for name, options, data in array_plans(store.command):
         with store.opened.noting() as noted:
             there = name in store.opened.group

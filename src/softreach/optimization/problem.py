@@ -1,7 +1,5 @@
 """Problem of a search: goals and requirements, and how a design is judged by them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -9,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 
@@ -27,9 +25,6 @@ from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, 
 from softreach.support.lazy import lazy
 from softreach.workspace import ReachableSet
 from softreach.workspace.measure import Estimate
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachability")}
 """Goals and measures of the reachable set, and what they are called there."""
@@ -70,7 +65,7 @@ class DesignCase:
 
     @lazy
     @no_warnings()
-    def cloud(self) -> xr.Dataset:
+    def cloud(self) -> Any:
         """Samples of the activation box."""
         from softreach.cloud import compute_cloud
 
@@ -182,7 +177,7 @@ def _sampled(values: Any) -> Estimate:
     return Estimate(math.nan)
 
 
-def _dexterity(case: DesignCase) -> xr.Dataset:
+def _dexterity(case: DesignCase) -> Any:
     from softreach.cloud.dexterity import dexterity
 
     return dexterity(case.cloud)

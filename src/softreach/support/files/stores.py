@@ -16,19 +16,16 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import google_crc32c
-from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
+import zarr  # noqa: TID253  (imported where stores are)
+from zarr.abc.buffer import Buffer  # noqa: TID253
+from zarr.abc.store import ByteRequest, Store  # noqa: TID253
+from zarr.storage import FsspecStore, LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
 
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.files.atomic import sync
-
-if TYPE_CHECKING:
-    import zarr
-    from zarr.abc.buffer import Buffer
-    from zarr.abc.store import ByteRequest, Store
-    from zarr.storage import StoreLike, StorePath
 
 Kind = Literal["cloud", "atlas"]
 Mode = Literal["r", "r+"]
@@ -127,8 +124,6 @@ class Opened:
 
     def check_root(self) -> None:
         """Check that the store is still the one that was opened."""
-        import zarr
-
         again = zarr.open_group(self.place, mode="r", zarr_format=3)
         if again.attrs[DIGEST] != self.group.attrs[DIGEST]:
             raise StoreFailed(f"{self.location} was replaced while it was read: open it again")
@@ -138,9 +133,6 @@ def opened_store(
     location: StoreLike, kind: Kind, mode: Mode = "r", *, durable: bool = False
 ) -> Opened | None:
     """A store of softreach, if there is any; `StoreFailed` where it cannot be reached."""
-    import zarr
-    from zarr.storage import StorePath
-
     if isinstance(location, str) and "://" not in location:
         if Path(location).is_file():
             raise InvalidInput("store", location, _ALLOWED[kind], "it is a file")
@@ -163,9 +155,6 @@ def opened_store(
 
 def place_of(location: Any, mode: Mode) -> StorePath:
     """The place behind a path, a URL, a mapping or a Zarr store."""
-    from zarr.abc.store import Store
-    from zarr.storage import FsspecStore, MemoryStore, StorePath
-
     if isinstance(location, StorePath):
         return location
     if isinstance(location, dict):

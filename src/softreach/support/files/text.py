@@ -1,19 +1,14 @@
 """Text that others wrote, read up to a limit, and text of ours, written whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import stat
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import TABLES, format_of
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MEGABYTE = 1_000_000
 
@@ -55,8 +50,8 @@ def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> N
         file.write(text.encode())
 
 
-def write_table(path: str | os.PathLike[str], table: pd.DataFrame, *, overwrite: bool) -> None:
-    """Write a CSV, as `write_text`."""
+def write_table(path: str | os.PathLike[str], table: Any, *, overwrite: bool) -> None:
+    """Write a table of pandas as CSV, as `write_text`."""
     format_of(as_path("path", path), TABLES)
     text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
     write_text(path, text, overwrite=overwrite)
