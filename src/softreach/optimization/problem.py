@@ -15,16 +15,21 @@ from softreach.arm.body import mass
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metrics import Metric, MetricFailed, known_metric
+from softreach.cloud import compute_cloud
+from softreach.cloud.dexterity import dexterity
+from softreach.cloud.redundancy import activation_distance
 from softreach.optimization.free_parameters import FreeParameters, Values
 from softreach.requirements.checks import Check, Sets, checked, sets_to
 from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
+from softreach.stiffness import principal_compliances, tip_compliance
 from softreach.support.arguments import as_given, as_names
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, no_warnings
 from softreach.support.lazy import lazy
 from softreach.workspace import ReachableSet
 from softreach.workspace.measure import Estimate
+from softreach.workspace.payload import payload_curve
 
 SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachability")}
 """Goals and measures of the reachable set, and what they are called there."""
@@ -67,8 +72,6 @@ class DesignCase:
     @no_warnings()
     def cloud(self) -> Any:
         """Samples of the activation box."""
-        from softreach.cloud import compute_cloud
-
         return compute_cloud(self.arm, self.samples, sampler="sobol")
 
     @property
@@ -177,29 +180,17 @@ def _sampled(values: Any) -> Estimate:
     return Estimate(math.nan)
 
 
-def _dexterity(case: DesignCase) -> Any:
-    from softreach.cloud.dexterity import dexterity
-
-    return dexterity(case.cloud)
-
-
 def _activation_distance(case: DesignCase) -> Estimate:
-    from softreach.cloud.redundancy import activation_distance
-
     radius = _RADIUS * case.arm.length
     return _sampled(activation_distance(case.cloud, radius, queries=min(4096, case.samples)))
 
 
 def _compliance(case: DesignCase) -> Estimate:
-    from softreach.stiffness import principal_compliances, tip_compliance
-
     gamma = case.cloud.activation.values[:256]
     return _sampled(principal_compliances(tip_compliance(case.arm, gamma)).values[:, 0])
 
 
 def _payload(case: DesignCase) -> Estimate:
-    from softreach.workspace.payload import payload_curve
-
     accuracy = max(case.accuracy, 0.01)
     most = payload_curve(case.arm, [], accuracy=accuracy).largest_payload(_SHARE, accuracy=accuracy)
     return Estimate(most.payload, most.payload_error)
@@ -216,13 +207,13 @@ _OBJECTIVES = (
         "manipulability",
         "m3/input3",
         "mean √det(J Jᵀ) over the box",
-        lambda case: _sampled(_dexterity(case).manipulability),
+        lambda case: _sampled(dexterity(case.cloud).manipulability),
     ),
     _rough(
         "dexterity",
         "1",
         "mean of 1 / condition of J over the box",
-        lambda case: _sampled(1.0 / _dexterity(case).condition),
+        lambda case: _sampled(1.0 / dexterity(case.cloud).condition),
     ),
     _rough("activation_distance", "input", "mean D̄ within L/10", _activation_distance),
     _rough("payload", "kg", "payload under which 80 % of the volume is left", _payload),

@@ -117,13 +117,12 @@ class Sensitivity:
                 if np.isfinite(value):
                     lines.append(f"  by {name}: {quantity(value, per, error)}")
             if (share := self.variance[k]) is not None:
-                order = np.argsort(-share.total, kind="stable")
-                each = ", ".join(
-                    f"{self.parameters[j]} {share.first[j]:.2f} ± {share.first_error[j]:.2f} "
-                    f"({share.total[j]:.2f} ± {share.total_error[j]:.2f})"
-                    for j in order
-                )
-                lines.append(f"  variance alone (in all): {each}")
+                each = []
+                for j in np.argsort(-share.total, kind="stable"):
+                    alone = f"{share.first[j]:.2f} ± {share.first_error[j]:.2f}"
+                    total = f"{share.total[j]:.2f} ± {share.total_error[j]:.2f}"
+                    each.append(f"{self.parameters[j]} {alone} ({total})")
+                lines.append(f"  variance alone (in all): {', '.join(each)}")
         for each in self.multipliers:
             per = f"{self.goal_units[0]} per {each.unit or 'unit'}"
             lines.append(f"decides: {each.name}, {each.value:.4g} {per}")

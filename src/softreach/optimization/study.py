@@ -47,8 +47,8 @@ class Study:
         self._kept: dict[str, Candidate] = {}  # in the storage, by what was asked
         self._asked: set[str] = set()
         self._seen = 0  # trials of the storage that were read
-        self._lock = Lock()
-        self._optuna = _library()
+        self._lock, self._optuna = Lock(), _library()
+        self._number = max(1, len(problem.goals))  # of values of a trial
         with _quiet():
             self._study = self._created(None)
             self._storage = None if place is None else self._opened(place)
@@ -131,13 +131,9 @@ class Study:
             "sobol": (samplers.QMCSampler, {"scramble": True, **quiet}),
             "random": (samplers.RandomSampler, {}),
         }[self.kind]
-        return self._optuna.create_study(
-            study_name=_NAME,
-            storage=storage,
-            directions=["minimize"] * max(1, len(self.problem.goals)),
-            sampler=make(seed=self.seed, **options),
-            load_if_exists=True,
-        )
+        sampler, directions = make(seed=self.seed, **options), ["minimize"] * self._number
+        known = {"storage": storage, "sampler": sampler, "directions": directions}
+        return self._optuna.create_study(study_name=_NAME, load_if_exists=True, **known)
 
     def _opened(self, place: str) -> Any:
         digest = self.problem.digest
@@ -185,7 +181,7 @@ class Study:
         missed = min(_MISSED * (1.0 + candidate.excess), _NEVER)
         if candidate.fidelity == "bounds":  # what is missed is no less: worse than all judged
             missed += 0.5 * _NEVER
-        return [missed] * max(1, len(self.problem.goals))
+        return [missed] * self._number
 
 
 def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:

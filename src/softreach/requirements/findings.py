@@ -141,11 +141,10 @@ def limit_finding(name: str, value: float, most: float, arm: Manipulator, where:
 def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
     """Limits that follow from the design alone."""
     heaviest = max(needs.payloads, default=None)
-    numbers: dict[str, Callable[[], float]] = {
-        "actuators": lambda: int(np.less(*arm.input_bounds.T).sum()),
-        "mass": lambda: mass(arm),
-        "load_number": lambda: load_number(with_payload(arm, heaviest)),
-    }
+    movable = int(np.less(*arm.input_bounds.T).sum())
+    numbers: dict[str, Callable[[], float]] = {"actuators": lambda: movable}
+    numbers["mass"] = lambda: mass(arm)
+    numbers["load_number"] = lambda: load_number(with_payload(arm, heaviest))
     for name, value in numbers.items():
         if name in needs.limits.given:
             yield limit_finding(name, value(), needs.limits.given[name], arm, "")

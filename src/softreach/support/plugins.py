@@ -8,7 +8,7 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -54,8 +54,6 @@ def imported() -> tuple[ModuleType, ...]:
 
 def declared(group: str) -> dict[str, EntryPoint]:
     """Entry points of installed packages in a group, by name; none is imported."""
-    from importlib.metadata import entry_points
-
     return {entry.name: entry for entry in entry_points(group=group)}
 
 

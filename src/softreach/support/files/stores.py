@@ -4,8 +4,6 @@ The root lists the sha256 of the `zarr.json` of each array, and ends with its ow
 bit and a missing chunk are noticed; a whole chunk of another place, or an older store, is not.
 """
 
-from __future__ import annotations
-
 import asyncio
 import copy
 import hashlib
@@ -49,6 +47,21 @@ class StoreFailed(SoftreachError):
     """The store cannot be written to, for instance because the disk is full; it can be resumed."""
 
 
+class Chunk(NamedTuple):
+    """A file of a store: a chunk of an array, or what describes an array or the store."""
+
+    array: str  # Empty for the store itself
+    place: tuple[int, ...] | None  # None for what describes the array
+
+    @classmethod
+    def of_key(cls, key: str) -> Self | None:
+        """The file with this key, from the root of the store on; None for any other."""
+        if key == ROOT or key.endswith(f"/{ROOT}"):
+            return cls(key.removesuffix(ROOT).rstrip("/"), None)
+        found = _KEY.fullmatch(key)
+        return cls(found[1], tuple(map(int, found[2].split("/")[1:]))) if found else None
+
+
 class DamagedStore(InvalidInput):
     """A store that holds something else than softreach wrote.
 
@@ -64,21 +77,6 @@ class DamagedStore(InvalidInput):
         what = f"chunk {place} of array {chunk.array}" if place else f"array {chunk.array}"
         where = f"{what} in {location}" if chunk.array else f"{ROOT} of {location}"
         super().__init__(where, found, "as softreach wrote it", remedy)
-
-
-class Chunk(NamedTuple):
-    """A file of a store: a chunk of an array, or what describes an array or the store."""
-
-    array: str  # Empty for the store itself
-    place: tuple[int, ...] | None  # None for what describes the array
-
-    @classmethod
-    def of_key(cls, key: str) -> Self | None:
-        """The file with this key, from the root of the store on; None for any other."""
-        if key == ROOT or key.endswith(f"/{ROOT}"):
-            return cls(key.removesuffix(ROOT).rstrip("/"), None)
-        found = _KEY.fullmatch(key)
-        return cls(found[1], tuple(map(int, found[2].split("/")[1:]))) if found else None
 
 
 @dataclass(eq=False)
