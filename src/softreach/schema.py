@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import as_numbers
+from softreach.geometry.lattice import CellGrid
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -20,8 +21,6 @@ from softreach.support.versions import SCHEMA_VERSION, versions
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.geometry.lattice import CellGrid
 
 AXES = ("x", "y", "z")
 
@@ -317,8 +316,6 @@ def stored_names(dataset: xr.Dataset) -> xr.Dataset:
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     """The tips of a cloud sorted into cubes of an edge [m], by default L/20; unstable in none."""
-    from softreach.geometry.lattice import CellGrid
-
     tip = check_cloud(cloud)["tip"]
     points = tip.values
     if "status" in cloud.coords:

@@ -166,7 +166,7 @@ def begin_design(store: AtlasStore, index: int) -> Callable[[], Outcome]:
         needed = Intermediates(command.space.design(index), store.cube, command)
         threaded = [metric for metric in command.metrics if Need.REACHABLE_SET in metric.needs]
         values = _values(threaded, needed, command)  # none but NaN where nothing is stable
-        needed.forget(Need.REACHABLE_SET)
+        needed.computed.pop(Need.REACHABLE_SET, None)  # frees memory
     except StoreFailed:
         raise
     except Exception as error:

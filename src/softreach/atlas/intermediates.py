@@ -44,7 +44,7 @@ class Intermediates:
     cube: Array  # Unit activations that all designs share, shape (n, bundles)
     command: Command | Settings
     known_set: Callable[[], Any] | None = None  # Source of the reachable set, if it is known
-    _cache: dict[Need, Any] = field(default_factory=dict)
+    computed: dict[Need, Any] = field(default_factory=dict)
 
     @classmethod
     def of_one(cls, arm: Manipulator, n: int, accuracy: float, sets: Callable[[], Any]) -> Self:
@@ -75,13 +75,9 @@ class Intermediates:
         return with_unstable(self.rod).tips_and_status(activations_of(self.rod, self.cube))
 
     def __getitem__(self, need: Need) -> Any:
-        if need not in self._cache:
-            self._cache[need] = _COMPUTE[need](self)
-        return self._cache[need]
-
-    def forget(self, need: Need) -> None:
-        """Free memory."""
-        self._cache.pop(need, None)
+        if need not in self.computed:
+            self.computed[need] = _COMPUTE[need](self)
+        return self.computed[need]
 
 
 def activations_of(rod: TipMap, cube: Array) -> Array:

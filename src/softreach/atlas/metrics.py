@@ -7,7 +7,7 @@ from enum import Enum
 from functools import partial
 from itertools import chain
 from operator import attrgetter
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -36,12 +36,6 @@ class Need(Enum):
     CONVEX_VOLUME = "volume of the convex hull of the tips [m³]"
     REACHABLE_SET = "the exact ReachableSet; it is computed with all threads"
     STRAIN_STATISTICS = "dataset of bending, torsion and extension, as of curvature_statistics"
-
-
-class SupportsNeeds(Protocol):
-    """Source of what metrics need, such as a dictionary."""
-
-    def __getitem__(self, need: Need, /) -> Any: ...
 
 
 class MetricFailed(SoftreachError):
@@ -85,11 +79,11 @@ class Metric:
         if self.over not in ((), PROFILE):
             raise InvalidInput(f"over of metric {self.name}", self.over, f"() or {PROFILE}")
 
-    def value(self, found: SupportsNeeds, sizes: Mapping[str, int]) -> Array:
+    def value(self, found: Any, sizes: Mapping[str, int]) -> Array:
         """The metric of one design, shape () or that of a profile.
 
         Args:
-            found: Gives what the metric needs.
+            found: What the metric needs by `Need`, such as a dictionary.
             sizes: Number of stations and quantiles.
 
         Raises:

@@ -85,11 +85,6 @@ class DesignCase:
         reached = partial(self.set_of, self.arm)
         return Intermediates.of_one(self.arm, self.samples, self.accuracy, reached)
 
-    @no_warnings()
-    def metric(self, metric: Metric) -> float:
-        """A metric of the atlas."""
-        return float(metric.value(self.intermediates, {}))
-
 
 @dataclass(frozen=True)
 class Objective:
@@ -153,7 +148,8 @@ def known_objective(word: str, given: str | Metric) -> Objective:
         raise InvalidInput(word, as_given(given), allowed, hint)
     if metric.over:
         raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
-    return _rough(metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)))
+    compute = no_warnings()(lambda case: Estimate(float(metric.value(case.intermediates, {}))))
+    return _rough(metric.name, metric.unit, metric.meaning, compute)
 
 
 _rough = partial(Objective, smooth=False)
