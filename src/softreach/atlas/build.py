@@ -24,17 +24,9 @@ from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
 from softreach.rod.tip_map import check_tol, no_equilibrium_message
 from softreach.sampling import check_sampler
-from softreach.support import parallel
+from softreach.support import errors, parallel
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number, plain
 from softreach.support.arrays import Array
-from softreach.support.errors import (
-    InvalidInput,
-    NotPossible,
-    SoftreachError,
-    counted,
-    no_warnings,
-    warn,
-)
 from softreach.support.files.stores import StoreFailed
 from softreach.support.interruption import check_stopped
 from softreach.support.memory import check_memory
@@ -84,7 +76,7 @@ def run_designs(
             allowed = "a function of a module where worker processes compute it"
             hint = "lambdas and functions inside of functions cannot be sent to them"
             name = f"compute of metric {metric.name}"
-            raise InvalidInput(name, metric.compute, allowed, hint) from None
+            raise errors.InvalidInput(name, metric.compute, allowed, hint) from None
     pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
     _run_pool(pool, store, indices, on_outcome)
 
@@ -116,7 +108,7 @@ def _run_pool(
                 on_outcome(outcome)
     except BrokenExecutor as error:
         then = "finished designs are safe: the same call with a new executor continues"
-        raise NotPossible(f"a worker died and broke its executor; {then}") from error
+        raise errors.NotPossible(f"a worker died and broke its executor; {then}") from error
     finally:
         for future in pending:
             future.cancel()
@@ -145,16 +137,16 @@ def _run_remotely(remote: _Remote, index: int) -> Outcome:
                 os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
                 if isinstance(remote.location, dict | MemoryStore):
                     where = "in the memory of another process"
-                    raise NotPossible(f"the store is {where}; use a path or a URL")
+                    raise errors.NotPossible(f"the store is {where}; use a path or a URL")
             _opened.clear()
             store = AtlasStore.open(remote.location, durable=remote.durable)
             _opened[key] = replace(store, command=remote.command)  # which has all functions
         return begin_design(_opened[key], index)()
-    except SoftreachError as error:
+    except errors.SoftreachError as error:
         raise StoreFailed(str(error)) from None  # this one can be sent back
 
 
-@no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
+@errors.no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
 def begin_design(store: AtlasStore, index: int) -> Callable[[], Outcome]:
     """Do the part of a design that uses all threads; return the rest as a function to call.
 
@@ -174,7 +166,7 @@ def begin_design(store: AtlasStore, index: int) -> Callable[[], Outcome]:
     return partial(_finish, store, index, needed, values)
 
 
-@no_warnings()
+@errors.no_warnings()
 def _finish(store: AtlasStore, index: int, needed: Intermediates, values: Values) -> Outcome:
     command, stable = store.command, needed.stable
     try:
@@ -293,7 +285,7 @@ def build_atlas(
         index, reason = next(iter(space.gaps.items()))
         stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
         lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
-        warn(f"{lost}, first {space.values(index)}: {reason}")
+        errors.warn(f"{lost}, first {space.values(index)}: {reason}")
     atlas = AtlasStore.begin(store, command, durable=durable)
     numbers = range(first, space.size, count)
     content = contents(atlas, tips_of=numbers)
@@ -310,21 +302,21 @@ def _shard_of(name: str, value: Any) -> tuple[int, int]:
     if len(pair) == 2 and {*map(type, pair)} == {int} and 0 <= pair[0] < pair[1]:
         return pair
     shown = "/".join(map(str, pair)) if len(pair) == 2 else as_given(value)
-    raise InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
+    raise errors.InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
 
 
 def _warn_of_metrics(built: xr.Dataset) -> None:
     if len(unstable := np.flatnonzero(built["status"].values == UNSTABLE)):
         first = built[["number", "message"]].stack(all=built["status"].dims, create_index=False)
         first = first.isel(all=unstable[0])
-        without = f"{counted(len(unstable), 'design')} without metrics"
-        warn(f"{without}, first number {first['number'].item()}: {first['message'].item()}")
+        without = f"{errors.counted(len(unstable), 'design')} without metrics"
+        errors.warn(f"{without}, first number {first['number'].item()}: {first['message'].item()}")
     radius = built.volume.attrs["alpha_over_length"] if "spacing" in built else 0.0
     if radius and (sparse := int((radius < 3.0 * over_length(built, "spacing")).sum())):
         whose = "its volume is" if sparse == 1 else "their volumes are"
         few = f"alpha = {radius:.4g} L is below three mean spacings of the points of"
         remedy = "use more points or a larger alpha"
-        warn(f"{few} {counted(sparse, 'design')} and {whose} too small; {remedy}")
+        errors.warn(f"{few} {errors.counted(sparse, 'design')} and {whose} too small; {remedy}")
 
 
 def _run(
@@ -342,4 +334,5 @@ def _run(
         run_designs(atlas, indices, executor, on_outcome)
     if failures:
         index, message = next(iter(failures.items()))
-        warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")
+        failed = f"{errors.counted(len(failures), 'design')} failed"
+        errors.warn(f"{failed}, first number {index}: {message}")

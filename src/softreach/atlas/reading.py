@@ -22,16 +22,7 @@ from softreach.atlas.metrics import Need
 from softreach.atlas.store import ABOUT, DAMAGED, EXPLAINED, KNOWN, OF, PER_DESIGN, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, stored_names, with_status
-from softreach.support.arguments import (
-    as_dataset,
-    as_flag,
-    as_instance,
-    as_integer,
-    as_names,
-    as_number,
-    as_path,
-    as_text,
-)
+from softreach.support import arguments
 from softreach.support.errors import InvalidInput, counted, did_you_mean, warn
 from softreach.support.files.stores import ARRAYS, DIGEST, READING, Chunk, storage_errors
 from softreach.support.quantity import columns, numbers_in
@@ -82,8 +73,8 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     Raises:
         InvalidInput: No atlas, or a metric that it does not have.
     """
-    atlas = as_dataset("atlas", atlas, "length", what="an atlas")
-    if as_text("metric", metric) not in atlas:
+    atlas = arguments.as_dataset("atlas", atlas, "length", what="an atlas")
+    if arguments.as_text("metric", metric) not in atlas:
         raise InvalidInput("metric", metric, f"one of {', '.join(map(str, atlas.data_vars))}")
     values = atlas[metric]
     power = _POWERS.get(values.attrs.get("units", "1"), 0)
@@ -230,9 +221,9 @@ def best_designs(
     Raises:
         InvalidInput: No such metric or parameter, or an argument of another kind.
     """
-    metric, smallest = as_text("metric", metric), as_flag("smallest", smallest)
-    count, opened = as_integer("count", count, 1), opened_atlas(atlas)
-    limits = list(_limits(as_names("where", where), opened))
+    metric, smallest = arguments.as_text("metric", metric), arguments.as_flag("smallest", smallest)
+    count, opened = arguments.as_integer("count", count, 1), opened_atlas(atlas)
+    limits = list(_limits(arguments.as_names("where", where), opened))
     dims = opened["status"].dims
     numbers = [name for name in opened.data_vars if opened[name].dims == dims]
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
@@ -307,10 +298,10 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
 def a_store(name: str, value: Any, allowed: str = "a path, a URL or a Zarr store") -> Any:
     """A place where an atlas may be."""
     if isinstance(value, str | os.PathLike):
-        return as_path(name, value)
+        return arguments.as_path(name, value)
     if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):
         return value  # a store in memory
-    return as_instance(name, value, (Store, StorePath), allowed)
+    return arguments.as_instance(name, value, (Store, StorePath), allowed)
 
 
 def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
@@ -363,8 +354,8 @@ def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
         raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
     if "design" in at:
         last = atlas.sizes["design"] - 1
-        return atlas.isel(design=as_integer("design", at["design"], 0, last))
-    place = {name: as_number(name, value) for name, value in at.items()}
+        return atlas.isel(design=arguments.as_integer("design", at["design"], 0, last))
+    place = {name: arguments.as_number(name, value) for name, value in at.items()}
     return atlas.sel(place, method="nearest")
 
 

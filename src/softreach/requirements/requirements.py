@@ -19,15 +19,8 @@ from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
+from softreach.support.files import toml
 from softreach.support.files.text import read_text, write_text
-from softreach.support.files.toml import (
-    WRONG,
-    FaultReader,
-    document_of,
-    inline_table,
-    key_text,
-    value_text,
-)
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
 
@@ -152,7 +145,7 @@ class Requirements:
         place = None if folder is None else Path(as_path("folder", folder))
         size = None if length is None else as_number("length", length, POSITIVE)
         reader = _Reader(place, size)
-        parts = reader.parts(document_of(text, LONGEST, as_text("source", source)))
+        parts = reader.parts(toml.document_of(text, LONGEST, as_text("source", source)))
         if reader.faults:
             raise InvalidDesign(reader.faults, source)
         try:
@@ -170,7 +163,7 @@ class Requirements:
         for target in self.targets:
             lines = ["[[reach]]", *_lines({"name": target.name})]
             if target.places is not None:
-                rows = (f"  {value_text(row)}," for row in target.points.tolist())
+                rows = (f"  {toml.value_text(row)}," for row in target.points.tolist())
                 lines += ["places_m = [", *rows, "]"]
             elif target.region is not None:
                 lines += [_region_line(target.region), *_lines({"share": target.share})]
@@ -185,8 +178,8 @@ class Requirements:
         blocks += [["[measures]"]] if self.measures else []
         for name, ends in self.measures.items():
             pairs = zip(("at_least", "at_most"), ends, strict=True)
-            table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
-            blocks[-1].append(f"{key_text(name)} = {table}")
+            known = ((key, toml.value_text(end)) for key, end in pairs if end is not None)
+            blocks[-1].append(f"{toml.key_text(name)} = {toml.inline_table(known)}")
         return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -264,7 +257,7 @@ def _contradictions(needs: Requirements) -> Iterator[Fault]:
                 yield Fault(f"{target.name}, place {wrong[0] + 1}", place, allowed)
 
 
-class _Reader(FaultReader):
+class _Reader(toml.FaultReader):
     def __init__(self, folder: Path | None, length: float | None) -> None:
         super().__init__()
         self.folder, self.length = folder, length
@@ -356,7 +349,7 @@ class _Reader(FaultReader):
     def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
         measures = {}
         for name, table in raw.items():
-            path = f"measures.{key_text(name)}"
+            path = f"measures.{toml.key_text(name)}"
             metric = known_metric(name)
             if metric is None or metric.over:
                 self._refuse(path, None, "is no metric: softreach list metrics names them")
@@ -371,15 +364,15 @@ class _Reader(FaultReader):
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `WRONG` and a fault where it refuses them."""
-        right = {name: value for name, value in values.items() if value is not WRONG}
+        right = {name: value for name, value in values.items() if value is not toml.WRONG}
         wrong = values.keys() - right.keys()
         if wrong and kind not in _INSTEAD:
-            return WRONG
+            return toml.WRONG
         if wrong & {"region", "places"}:
             right = _INSTEAD[kind] | right
         try:
             made = kind(**right)
-            return WRONG if wrong else made
+            return toml.WRONG if wrong else made
         except InvalidInput as error:
             field = error.name.partition(" ")[0].partition("[")[0]
             key = next((key for key in raw if key.startswith(field)), "")
@@ -456,7 +449,7 @@ def _keys(name: str, unit: str) -> dict[str, str]:
 
 
 def _lines(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {value_text(x)}" for key, x in values.items() if x is not None]
+    return [f"{key} = {toml.value_text(x)}" for key, x in values.items() if x is not None]
 
 
 def _region_line(region: Region) -> str:
@@ -466,5 +459,5 @@ def _region_line(region: Region) -> str:
     shapes = _SHAPES.items()
     shape, numbers = next((name, own) for name, (kind, own) in shapes if isinstance(region, kind))
     keys = (f"{name}_{unit}".rstrip("_") for name, unit in numbers.items())
-    values = (value_text(np.asarray(getattr(region, name)).tolist()) for name in numbers)
-    return f"{shape} = {inline_table(zip(keys, values, strict=True))}"
+    values = (toml.value_text(np.asarray(getattr(region, name)).tolist()) for name in numbers)
+    return f"{shape} = {toml.inline_table(zip(keys, values, strict=True))}"
