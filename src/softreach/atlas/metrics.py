@@ -264,8 +264,7 @@ _ROWS: dict[str, list[tuple[Any, ...]]] = {
          _reach_radius, _BASE_TIPS),
     ],
     "convex": [
-        ("convex_volume", "m3", "volume of the cloud's convex hull",
-         float, (Need.CONVEX_VOLUME,)),
+        ("convex_volume", "m3", "volume of the cloud's convex hull", float, (Need.CONVEX_VOLUME,)),
     ],
     "concave": [
         ("volume", "m3", "volume of the cloud's alpha shape",
