@@ -42,9 +42,8 @@ def deadly_length(arm):
     return arm.length
 
 
-DEADLY_LENGTH = Metric(
-    name="deadly", unit="m", meaning="length", needs=(Need.ARM,), compute=deadly_length
-)
+ABOUT = {"name": "deadly", "unit": "m", "meaning": "length", "needs": (Need.ARM,)}
+DEADLY_LENGTH = Metric(**ABOUT, compute=deadly_length)
 
 
 def test_a_pool_that_loses_a_worker_ends_with_one_line_and_another_one_continues(
