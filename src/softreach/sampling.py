@@ -26,7 +26,11 @@ class Sampler(NamedTuple):
 
 
 def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
-    """All n points at once [-], shape (n, dim); the sampler is one of `SAMPLERS`."""
+    """All n points at once [-], shape (n, dim).
+
+    Samplers are `uniform` (the paper's), `boundary` (uniform, a fifth of the points on the faces),
+    `sobol` (scrambled, n a power of two) and `grid` (n a dim-th power, ends included).
+    """
     n, seed = check_sampler(sampler, n, dim, seed)
     return next(cube_blocks(sampler, n, dim, seed, size=n))
 
