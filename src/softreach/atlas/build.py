@@ -226,8 +226,8 @@ def build_atlas(
     Under loads, only samples with a stable equilibrium count; `lost_share` is the share of the
     others. Without any, a design has no other metric, but a message, and is not tried again.
 
-    Stored clouds are rounded to 1e-5 of the shortest length, which halves their size; metrics are
-    computed before.
+    Stored clouds are rounded to 1e-5 of the shortest length, off by half of that at most in each
+    coordinate, which halves their size; metrics are computed before.
 
     Args:
         space: The designs.

@@ -114,7 +114,7 @@ class AtlasStatus:
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """Number of designs of an atlas that are done, and faults of the others.
 
-    Metrics are verified, and tips only if they are few and on disk; `verify_atlas` reads all.
+    Metrics are verified, and tips on disk that take a second at most; `verify_atlas` reads all.
 
     Args:
         atlas: A store; or a dataset from `open_atlas`, which has the status of when it was opened.
