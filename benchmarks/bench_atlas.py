@@ -22,8 +22,7 @@ from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metric import Need
-from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
+from softreach.atlas.metrics import METRIC_GROUPS, Need, chosen_metrics
 from softreach.atlas.store import AtlasStore
 from softreach.support.errors import SoftreachWarning
 

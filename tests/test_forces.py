@@ -148,9 +148,8 @@ def test_no_optimizer_finds_a_larger_force(arm, start):
 def test_it_is_the_largest_over_all_activations_that_reach_the_place():
     place = sr.tip_positions(LOADED, START[1:])
     solution = sr.solve_inverse(LOADED, place)[0]
-    every = blocked_force(
-        LOADED, np.repeat(place, len(solution), 0), UP, start=solution.activations
-    )
+    places = np.repeat(place, len(solution), 0)
+    every = blocked_force(LOADED, places, UP, start=solution.activations)
     best = blocked_force(LOADED, place, UP)
     assert float(best.force[0]) == pytest.approx(float(every.force.max()), rel=1e-6)
 
@@ -197,9 +196,8 @@ def test_a_curve_has_the_exact_volumes_and_begins_without_payload(curve):
 
 def test_the_payload_of_the_design_itself_does_not_count(curve):
     laden = HANGING.replace(loads=HANGING.loads.replace(payload=0.001))
-    np.testing.assert_array_equal(
-        payload_curve(laden, [0.002], accuracy=0.02).volumes, curve.volumes[[0, 2]]
-    )
+    other = payload_curve(laden, [0.002], accuracy=0.02)
+    np.testing.assert_array_equal(other.volumes, curve.volumes[[0, 2]])
 
 
 def test_the_largest_payload_keeps_just_the_share(curve):

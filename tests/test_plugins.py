@@ -147,12 +147,8 @@ def package(tmp_path, monkeypatch):
 
 
 def test_entry_points_are_loaded_when_they_are_met_and_not_before(package, tmp_path, printed):
-    package(
-        "own_declared",
-        WIRE.format(kind="DeclaredWire", metric="declared_tip"),
-        "DeclaredWire",
-        "declared_tip",
-    )
+    wire = WIRE.format(kind="DeclaredWire", metric="declared_tip")
+    package("own_declared", wire, "DeclaredWire", "declared_tip")
     for words in (["--help"], ["list", "designs"], ["design", "minimal_trunk"]):
         assert run(words) == 0
     assert "own_declared" not in sys.modules

@@ -23,12 +23,7 @@ from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import tip_jacobian, tip_positions
 from softreach.rod.rods import as_tip_map, free_bundles
 from softreach.rod.tip_map import TipStatus
-from softreach.stiffness import (
-    cloud_compliance,
-    principal_compliances,
-    stiffness_along,
-    tip_compliance,
-)
+from softreach.stiffness import principal_compliances, stiffness_along, tip_compliance
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
 from softreach.workspace import reachable_set
@@ -110,9 +105,8 @@ def test_an_arm_without_loads_yields_as_one_under_loads_of_zero():
     zero = rubber(TRUNK, Loads(gravity=(0.0, 0.0, 0.0)))
     free = rubber(TRUNK, None)
     np.testing.assert_array_equal(tip_compliance(free, GAMMA), tip_compliance(zero, GAMMA))
-    np.testing.assert_array_equal(
-        tip_compliance(as_tip_map(free), GAMMA), tip_compliance(zero, GAMMA)
-    )
+    of_map = tip_compliance(as_tip_map(free), GAMMA)
+    np.testing.assert_array_equal(of_map, tip_compliance(zero, GAMMA))
 
 
 def test_an_arm_without_modulus_is_refused_by_the_name_of_the_material():
@@ -149,7 +143,7 @@ def test_stiffness_along_a_principal_direction_is_one_over_its_compliance():
 def test_a_cloud_has_the_compliance_of_each_sample_and_none_where_nothing_rests():
     arm = sr.designs.lce_arm().replace(loads=Loads(gravity=SIDE, payload=0.005))
     cloud = sr.compute_cloud(arm, n=3000)
-    found = cloud_compliance(cloud)
+    found = sr.stiffness.cloud_compliance(cloud)
     expected = tip_compliance(arm, cloud.activation.values)
     np.testing.assert_array_equal(found.compliance.values, expected)
     lost = cloud.status.values == TipStatus.SNAPS
@@ -163,7 +157,7 @@ def test_a_cloud_has_the_compliance_of_each_sample_and_none_where_nothing_rests(
 def test_a_cloud_is_colored_by_compliance_in_ratios_where_these_are_large():
     coloring = pytest.importorskip("softreach.plot.coloring")
     cloud = sr.compute_cloud(rubber(TRUNK, None), n=500)
-    soft = cloud_compliance(cloud).largest_compliance
+    soft = sr.stiffness.cloud_compliance(cloud).largest_compliance
     values = soft.values.copy()
     values[:] = np.geomspace(0.01, 1.0, 500)
     wide = coloring.color_samples(cloud, soft.copy(data=values))
@@ -249,9 +243,8 @@ def test_manipulability_and_families_have_the_units_of_their_inputs(trunk):
 
     robot = designs.three_tendon_robot()
     tendons = robot.actuators[0]
-    mixed = robot.replace(
-        actuators=(tendons, Chamber(distance=0.001, radius=1e-3, activation_bounds=(0, 1e3)))
-    )
+    chamber = Chamber(distance=0.001, radius=1e-3, activation_bounds=(0, 1e3))
+    mixed = robot.replace(actuators=(tendons, chamber))
     assert units(trunk) == ["m3", "1"]
     assert units(robot) == ["m3/N3", "1"]
     assert units(robot.replace(actuators=(replace(tendons, bundles=2),))) == ["m2/N2"]
@@ -328,11 +321,8 @@ def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
 def test_measures_of_many_clouds_scatter_by_their_standard_error(trunk):
     clouds = [compute_cloud(trunk, n=4096, seed=seed, tol=1e-4) for seed in range(60)]
     inner = {"x": 0.1, "y": 0.3, "z": 0.5}
-    found = [
-        solution_measure(cloud, cell=0.2).sel(inner, method="nearest").to_array()
-        for cloud in clouds
-    ]
-    values, errors = np.array(found).T
+    measures = [solution_measure(cloud, cell=0.2) for cloud in clouds]
+    values, errors = np.array([x.sel(inner, method="nearest").to_array() for x in measures]).T
     assert errors.mean() == pytest.approx(values.std(), rel=0.25)
 
 

@@ -1,63 +1,31 @@
-from . import arm as arm
-from . import atlas as atlas
-from . import calibration as calibration
-from . import cloud as cloud
-from . import exchange as exchange
-from . import export as export
-from . import forces as forces
-from . import inverse as inverse
-from . import optimization as optimization
-from . import plot as plot
-from . import requirements as requirements
-from . import rest as rest
-from . import rod as rod
-from . import stiffness as stiffness
-from . import workspace as workspace
-from .arm import Base as Base
-from .arm import Chamber as Chamber
-from .arm import FiberArchitecture as FiberArchitecture
-from .arm import LinearTaper as LinearTaper
-from .arm import Loads as Loads
-from .arm import Manipulator as Manipulator
-from .arm import Material as Material
-from .arm import PiecewiseTaper as PiecewiseTaper
-from .arm import Ring as Ring
-from .arm import SampledTaper as SampledTaper
-from .arm import Section as Section
-from .arm import Tendon as Tendon
+# ruff: noqa: I001  (several names a line)
+from . import arm as arm, atlas as atlas, calibration as calibration, cloud as cloud
+from . import exchange as exchange, export as export, forces as forces, inverse as inverse
+from . import optimization as optimization, plot as plot, requirements as requirements, rest as rest
+from . import rod as rod, stiffness as stiffness, workspace as workspace
+from .arm import Base as Base, Chamber as Chamber, FiberArchitecture as FiberArchitecture
+from .arm import LinearTaper as LinearTaper, Loads as Loads, Manipulator as Manipulator
+from .arm import Material as Material, PiecewiseTaper as PiecewiseTaper, Ring as Ring
+from .arm import SampledTaper as SampledTaper, Section as Section, Tendon as Tendon
 from .arm import designs as designs
-from .atlas import DesignSpace as DesignSpace
-from .atlas import build_atlas as build_atlas
-from .atlas import open_atlas as open_atlas
+from .atlas import DesignSpace as DesignSpace, build_atlas as build_atlas, open_atlas as open_atlas
 from .calibration import calibrate as calibrate
-from .cloud import compute_cloud as compute_cloud
-from .cloud import curvature as curvature
-from .cloud import dexterity as dexterity
-from .cloud import open_cloud as open_cloud
-from .cloud import redundancy as redundancy
-from .cloud import save_cloud as save_cloud
+from .cloud import compute_cloud as compute_cloud, curvature as curvature, dexterity as dexterity
+from .cloud import open_cloud as open_cloud, redundancy as redundancy, save_cloud as save_cloud
 from .cloud import volume as volume
 from .cloud.redundancy import activation_distance as activation_distance
-from .cloud.volume import concave_hull as concave_hull
-from .cloud.volume import convex_hull as convex_hull
+from .cloud.volume import concave_hull as concave_hull, convex_hull as convex_hull
 from .export import cloud_table as cloud_table
-from .inverse import path as path
-from .inverse import solve_inverse as solve_inverse
+from .inverse import path as path, solve_inverse as solve_inverse
 from .inverse.path import track_path as track_path
 from .optimization import search as search
-from .requirements import Requirements as Requirements
-from .requirements import check as check
-from .rod import configuration as configuration
-from .rod import describe as describe
-from .rod import equilibria as equilibria
-from .rod import tip_jacobian as tip_jacobian
-from .rod import tip_positions as tip_positions
+from .requirements import Requirements as Requirements, check as check
+from .rod import configuration as configuration, describe as describe, equilibria as equilibria
+from .rod import tip_jacobian as tip_jacobian, tip_positions as tip_positions
 from .support import errors as errors
-from .support.errors import InvalidDesign as InvalidDesign
-from .support.errors import InvalidInput as InvalidInput
+from .support.errors import InvalidDesign as InvalidDesign, InvalidInput as InvalidInput
 from .support.errors import NotPossible as NotPossible
-from .workspace import payload as payload
-from .workspace import reachable_set as reachable_set
+from .workspace import payload as payload, reachable_set as reachable_set
 from .workspace import volume_gradient as volume_gradient
 from .workspace.payload import payload_curve as payload_curve
 

@@ -1,13 +1,9 @@
 """Growth of a force while the tip stays where it is: linear programs, each corrected by Newton.
 
-The bundles move so that the force with which the tip pushes grows most: a linear program in the
-change of activations, of which none may be large, and of the force, under ∂r/∂γ δγ + ∂r/∂F δF = 0
-and the bounds. Newton's method then puts the tip back to its place. A step counts only if the force
-grew about as foreseen and the rod rests stably; otherwise it is tried at half its length. So the
-bundles follow a path of stable equilibria along which the force grows.
+A linear program in small changes of activations and of the force, under ∂r/∂γ δγ + ∂r/∂F δF = 0 and
+the bounds, has the most growth. A step counts only if the force grew about as foreseen and the rod
+rests stably; otherwise it is tried at half its length.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -57,10 +53,8 @@ class Stop(IntEnum):
 class FixedTip(NamedTuple):
     """A tip at its place, pushing."""
 
-    gamma: Array
-    """Activations [unit of each], shape (bundles,)."""
-    force: float
-    """[N]"""
+    gamma: Array  # Activations [unit of each], shape (bundles,)
+    force: float  # [N]
     response: TipResponse
 
 
@@ -69,36 +63,24 @@ class Grown(NamedTuple):
 
     fixed: FixedTip
     stop: Stop
-    limits: Mask
-    """Mask of the bundles at a bound that keeps the force from growing, shape (bundles,)."""
-    slope: float
-    """By how much the force would change if the place moved [N/m]."""
-    before: list[FixedTip]
-    """The tip on the way there, up to nearly as large a force."""
+    limits: Mask  # Of the bundles at a bound that keeps the force from growing, shape (bundles,)
+    slope: float  # By how much the force would change if the place moved [N/m]
+    before: list[FixedTip]  # The tip on the way there, up to nearly as large a force
 
 
 class _Program(NamedTuple):
-    gamma: Array
-    """Change of the activations [unit of each], shape (bundles,)."""
-    force: float
-    """Change of the force [N]."""
-    rate: float
-    """The same in units of force per range of activation."""
-    multipliers: Array
-    """Lagrange multiplier of each bundle's bounds, shape (bundles,)."""
-    slope: float
-    """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
+    gamma: Array  # Change of the activations [unit of each], shape (bundles,)
+    force: float  # Change of the force [N]
+    rate: float  # The same in units of force per range of activation
+    multipliers: Array  # Lagrange multiplier of each bundle's bounds, shape (bundles,)
+    slope: float  # Change of the force if the place moved [N/m]; NaN if it was not solved
 
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """The growth of the force at one place from one start.
+    """The growth of the force at one place [m] from a start near its activations without force.
 
-    Args:
-        pushing: The tip that pushes.
-        place: Its fixed position [m], shape (3,).
-        start: Activations near those that put it there without force, shape (bundles,).
-        allowed: Largest error of the tip [m], of which its distance from the place takes a part.
+    `allowed` is the largest error of the tip [m], of which its distance from the place is a part.
     """
 
     pushing: PushingTip
@@ -125,7 +107,7 @@ class Growth:
         """The tip at its place without force; None if it is not there or not stable."""
         if not np.isfinite(self._begun.tip).all():
             return None
-        fixed = self._corrected(self.box.clip(self.start), 0.0, 0.0, self._begun)
+        fixed = self._fixed(self.box.clip(self.start), 0.0, 0.0, self._begun)
         return fixed if fixed and self._is_stable(fixed) else None
 
     @lazy
@@ -134,14 +116,10 @@ class Growth:
         return _UNIT * self.pushing.rod.length / float(np.linalg.norm(self._begun.retreat))
 
     def grown(self, begun: list[FixedTip] | None = None) -> Grown | None:
-        """The end of the growth; None without a start.
-
-        Args:
-            begun: The tip on the way there in other steps along the arm, to begin with the last.
-        """
+        """The end of the growth, from the last of those `begun` in other steps; None if none is."""
         if begun:  # in these steps, under the same force
             last = begun[-1]
-            fixed = self._corrected(last.gamma, last.force, 0.0, last.response)
+            fixed = self._fixed(last.gamma, last.force, 0.0, last.response)
         else:
             fixed = self.first
         if fixed is None or (begun and not self._is_stable(fixed)):
@@ -169,7 +147,9 @@ class Growth:
                 if reach < _OF_SHORTEST * self._shortest:
                     return None
             share, unstable = self._step(path, best)
-            if share > 0.0 and self._is_too_coarse(path[-1]):
+            near_loss = share > 0.0 and path[-1].response.margin <= _NEAR_LOSS
+            may_err = near_loss and not self.pushing.is_finest
+            if may_err and self.pushing.error(*path[-1]) > 0.5 * self.allowed:
                 break
             reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
             reach = min(reach, _LONGEST)
@@ -183,7 +163,7 @@ class Growth:
         """Try a step: its share of the growth foreseen, 0 if not taken; was it for stability?"""
         fixed = path[-1]
         gamma, force = self.box.clip(fixed.gamma + best.gamma), fixed.force + best.force
-        tried = self._corrected(gamma, force, self.unit, _ahead(path, force))
+        tried = self._fixed(gamma, force, self.unit, _ahead(path, force))
         if tried is None:
             return 0.0, fixed.response.margin <= _NEAR_LOSS
         share, stable = (tried.force - fixed.force) / best.force, self._is_stable(tried)
@@ -191,11 +171,6 @@ class Growth:
             return 0.0, not stable
         path.append(tried)
         return share, False
-
-    def _is_too_coarse(self, fixed: FixedTip) -> bool:
-        if fixed.response.margin > _NEAR_LOSS or self.pushing.is_finest:
-            return False
-        return self.pushing.error(*fixed) > 0.5 * self.allowed
 
     @property
     def _shortest(self) -> float:
@@ -237,13 +212,9 @@ class Growth:
             return _Program(np.zeros(box.bundles), 0.0, 0.0, np.zeros(box.bundles), np.nan)
         change = reach * solution.x
         price = solution.lower.marginals + solution.upper.marginals
-        return _Program(
-            change[:-1] * box.scales,
-            float(change[-1]) * self.unit,
-            float(solution.x[-1]),
-            price[:-1],
-            float(np.linalg.norm(solution.eqlin.marginals)) * self.unit / length,
-        )
+        slope = float(np.linalg.norm(solution.eqlin.marginals)) * self.unit / length
+        gamma, force = change[:-1] * box.scales, float(change[-1]) * self.unit
+        return _Program(gamma, force, float(solution.x[-1]), price[:-1], slope)
 
     def _columns(self, response: TipResponse, unit: float) -> Array:
         """Motion of the tip [L] by each activation over its range and by the unit of force."""
@@ -257,9 +228,7 @@ class Growth:
         room = np.minimum(gamma - box.low, box.high - gamma) / box.scales
         return box.is_free & (room <= _AT_BOUND)
 
-    def _corrected(
-        self, gamma: Array, force: float, unit: float, near: TipResponse
-    ) -> FixedTip | None:
+    def _fixed(self, gamma: Array, force: float, unit: float, near: TipResponse) -> FixedTip | None:
         """The tip put to its place by Newton's method; None if it does not come there.
 
         Bundles that begin at a bound stay there, if enough others are left. The force [N] yields
@@ -315,22 +284,15 @@ class Growth:
             return respond(x.tobytes())
 
         gradient = np.append(np.zeros(box.bundles), -1.0)
-        solution: Any = minimize(
-            lambda x: -x[-1],
-            x,
-            jac=lambda x: gradient,
-            method="SLSQP",
-            bounds=[*((0.0, 1.0 if free else 0.0) for free in box.is_free), (0.0, None)],
-            constraints={
-                "type": "eq",
-                "fun": lambda x: (at(x).tip - self.place) / length,
-                "jac": lambda x: self._columns(at(x), self.unit),
-            },
-            options={"ftol": 1e-10, "maxiter": 25},
-        )
+        held: Any = {"type": "eq", "fun": lambda x: (at(x).tip - self.place) / length}
+        held["jac"] = lambda x: self._columns(at(x), self.unit)
+        ends = [*((0.0, 1.0 if free else 0.0) for free in box.is_free), (0.0, None)]
+        known: Any = {"constraints": held, "bounds": ends}
+        known["options"] = {"ftol": 1e-10, "maxiter": 25}
+        solution = minimize(lambda x: -x[-1], x, jac=lambda x: gradient, method="SLSQP", **known)
         gamma = box.clip(box.low + solution.x[:-1] * box.scales)
         force = float(solution.x[-1]) * self.unit
-        better = self._corrected(gamma, force, self.unit, fixed.response)
+        better = self._fixed(gamma, force, self.unit, fixed.response)
         if better is None or better.force < fixed.force:
             return fixed
         return better if self._is_stable(better) else fixed

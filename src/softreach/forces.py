@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Stop", "blocked_force"]
 
-
+_Best = tuple[Array, Grown, float, bool]  # Start, end, error of the tip, whether it settles
 _MEANINGS = " ".join(f"{stop.value}={stop.name.lower()}" for stop in Stop)
 
 
@@ -89,16 +89,9 @@ def blocked_force(
         push, place = rod.pose.directions_to_base(along), rod.pose.to_base(target)
         choice = rod.inputs.activations(choice)
         results = [each for gamma in choice if (each := _grown(yielding, push, place, gamma))]
-        best.append(max(results, key=lambda each: each.end.fixed.force, default=None))
+        best.append(max(results, key=lambda each: each[1].fixed.force, default=None))
         progress(1)
     return _dataset(rod, targets, directions, best)
-
-
-class _Best(NamedTuple):
-    start: Array
-    end: Grown
-    tip_error: float
-    settles: bool
 
 
 def _starts(
@@ -126,7 +119,7 @@ def _grown(rod: LoadedRod, direction: Array, place: Array, start: Array) -> _Bes
     while first is not None and end is not None:
         error = pushing.error(*end.fixed)
         if error <= 0.5 * allowed or pushing.is_finest:
-            return _Best(first.gamma, end, error + growth.residual, pushing.settles(*end.fixed))
+            return first.gamma, end, error + growth.residual, pushing.settles(*end.fixed)
         pushing = pushing.finer()
         growth = replace(growth, pushing=pushing)
         end = growth.grown(end.before) or growth.grown()

@@ -1,7 +1,5 @@
 """The arm at rest under its loads: how far its tip sags, and whether it stays there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

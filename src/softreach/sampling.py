@@ -3,8 +3,6 @@
 A sequence depends on its four arguments alone: blocks only cut it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -17,31 +15,21 @@ from softreach.support.errors import InvalidInput
 Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 
-
 _LARGEST_SEED = 2**63 - 1  # what stores hold as a number
 
 
 class Sampler(NamedTuple):
     """One way to spread points."""
 
-    begin: Callable[[int, int, int], Draw]
-    """(n, dim, seed) -> a source of points."""
-    refusal: Callable[[int, int], str | None]
-    """(n, dim) -> which n to use instead, or None when n will do."""
+    begin: Callable[[int, int, int], Draw]  # (n, dim, seed) -> a source of points
+    refusal: Callable[[int, int], str | None]  # (n, dim) -> which n will do; None if n does
 
 
 def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
     """All n points at once [-], shape (n, dim).
 
-    Args:
-        sampler: `uniform` (the paper's), `boundary` (uniform, a fifth of the points on the faces),
-            `sobol` (scrambled, n a power of two) or `grid` (n a dim-th power, ends included).
-        n: Number of points.
-        dim: Dimension of the cube.
-        seed: Seed of random samplers.
-
-    Raises:
-        InvalidInput: An unknown sampler, or an n that the sampler cannot spread.
+    Samplers are `uniform` (the paper's), `boundary` (uniform, a fifth of the points on the faces),
+    `sobol` (scrambled, n a power of two) and `grid` (n a dim-th power, ends included).
     """
     n, seed = check_sampler(sampler, n, dim, seed)
     return next(cube_blocks(sampler, n, dim, seed, size=n))
@@ -49,27 +37,19 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
 
 def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterator[Array]:
     """The points of `sample_cube`, of checked arguments, in consecutive blocks up to `size`."""
-    draw = SAMPLERS[sampler].begin(n, dim, seed) if dim else _nothing
+    draw = (SAMPLERS[sampler].begin if dim else _uniform)(n, dim, seed)
     for first in range(0, n, size):
         yield draw(first, min(size, n - first))
 
 
 def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
-    """The n and the seed of a sampler.
-
-    Raises:
-        InvalidInput: There is no such sampler, or it cannot spread n points.
-    """
+    """The n and the seed of a sampler, checked."""
     as_one_of("sampler", sampler, SAMPLERS)
     n = as_integer("n", n, 1)
     seed = as_integer("seed", seed, 0, _LARGEST_SEED)
     if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)
     return n, seed
-
-
-def _nothing(first: int, count: int) -> Array:
-    return np.empty((count, 0))
 
 
 def _uniform(n: int, dim: int, seed: int) -> Draw:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import as_numbers
+from softreach.geometry.lattice import CellGrid
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -21,10 +22,7 @@ from softreach.support.versions import SCHEMA_VERSION, versions
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.geometry.lattice import CellGrid
-
 AXES = ("x", "y", "z")
-
 
 _CELL = 1 / 20  # of the arm's length
 _EDGES = POSITIVE._replace(unit="m")
@@ -45,6 +43,16 @@ _OTHERS = {  # where they are asked for
     "bundle_activation": (("sample", "line"), None, "activation that drives and lengths lead to"),
     "marker_position": (("sample", "marker", "axis"), "m", "place of each marker"),
 }
+_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided 4=snaps"
+_KINDS = {"tip": np.float64, "activation": np.float64, "status": np.int8}
+_ATTRIBUTES = {
+    "design": (str, "the text of a design file"),
+    "softreach_version": (str, "a text"),
+    "sampler": (str, "the name of a sampler"),
+    "tol": ((int, float), "a number"),
+    "seed": (int, "a whole number"),  # a cloud of another program has none
+}
+_SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}
 
 
 def cloud_dataset(
@@ -65,9 +73,6 @@ def cloud_dataset(
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length
     return cloud
-
-
-_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided 4=snaps"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
@@ -94,8 +99,7 @@ def configuration_dataset(
 ) -> xr.Dataset:
     """Shapes of an arm at stations Z, and its markers, one for each row of `activation`.
 
-    `names` are those of the bundles with a column there; by default all. `frame` is that of the
-    arrays.
+    `names` are those of the bundles with a column there, all by default; `frame` is of the arrays.
     """
     import xarray as xr
 
@@ -134,41 +138,22 @@ def a_configuration(name: str, value: object) -> xr.Dataset:
 
 
 def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
-    """The dataset itself, if it is a cloud of this schema.
-
-    Raises:
-        InvalidInput: What is missing, or of another shape or version.
-    """
+    """The dataset itself, if it is a cloud of this schema."""
     a_cloud("cloud", cloud)
     for name, (dims, _, _) in _CLOUD.items():
         if cloud[name].dims != dims:
             raise InvalidInput(f"cloud.{name}", cloud[name].dims, f"a variable over {dims}")
-    version = cloud.attrs.get("schema_version")
-    if version != SCHEMA_VERSION:
+    if (version := cloud.attrs.get("schema_version")) != SCHEMA_VERSION:
         raise InvalidInput("cloud.attrs['schema_version']", version, str(SCHEMA_VERSION))
     return cloud
 
 
 def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
-    """The dataset itself, if it is a cloud that agrees with its own design.
-
-    Raises:
-        InvalidInput: What is missing, of another type, or does not agree.
-    """
+    """The dataset itself, if it is a cloud that agrees with its own design."""
     check_cloud(cloud)
     for what, given, allowed in _faults(cloud):
         raise InvalidInput(f"cloud.{what}", given, allowed)
     return cloud
-
-
-_KINDS = {"tip": np.float64, "activation": np.float64, "status": np.int8}
-_ATTRIBUTES = {
-    "design": (str, "the text of a design file"),
-    "softreach_version": (str, "a text"),
-    "sampler": (str, "the name of a sampler"),
-    "tol": ((int, float), "a number"),
-    "seed": (int, "a whole number"),  # a cloud of another program has none
-}
 
 
 def _faults(cloud: xr.Dataset) -> Iterator[tuple[str, Any, Any]]:
@@ -218,9 +203,8 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[tuple[str, A
 def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, Any]:
     """Names of the bundles, of all or of some; units if they differ, symbols if units tell none."""
     names = list(arm.input_names if names is None else names)
-    units = _units(arm, names)
     of_name = dict(zip(arm.input_names, input_symbols(arm), strict=True))
-    symbols = tuple(of_name[name] for name in names)
+    units, symbols = _units(arm, names), tuple(of_name[name] for name in names)
     coordinates: dict[str, Any] = {"bundle": names}
     if len(set(units)) > 1:
         coordinates["unit"] = ("bundle", list(units))
@@ -232,9 +216,6 @@ def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> 
 def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
     of_name = dict(zip(arm.input_names, arm.input_units, strict=True))
     return tuple(of_name[name] for name in (of_name if names is None else names))
-
-
-_SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P", "m": "q"}
 
 
 def _symbols_of(units: Iterable[str]) -> tuple[str, ...]:
@@ -307,15 +288,10 @@ def _pose(arm: Manipulator) -> dict[str, list[float]]:
 
 
 def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
-    """The frame of the places in a dataset.
-
-    Raises:
-        InvalidInput: It says none, or there is no such frame.
-    """
-    frame = data.attrs.get("frame")
-    if frame not in ("world", "base"):
-        raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
-    return frame
+    """The frame of the places in a dataset, which it must name."""
+    if (frame := data.attrs.get("frame")) in ("world", "base"):
+        return frame
+    raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
 
 
 def base_of(data: xr.Dataset) -> Array:
@@ -333,26 +309,13 @@ def storable(dataset: xr.Dataset) -> xr.Dataset:
 
 def stored_names(dataset: xr.Dataset) -> xr.Dataset:
     """The inverse of `storable`: names that xarray can fill, join and pickle."""
-    names = {
-        name: (each.dims, np.array(each.values.tolist(), dtype=str), each.attrs)
-        for name, each in dataset.coords.items()
-        if each.dtype.kind == "T"
-    }
-    return dataset.assign_coords(names)
+    named = {name: x for name, x in dataset.coords.items() if x.dtype.kind == "T"}
+    texts = {name: np.array(x.values.tolist(), dtype=str) for name, x in named.items()}
+    return dataset.assign_coords({k: (x.dims, texts[k], x.attrs) for k, x in named.items()})
 
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
-    """The tips of a cloud sorted into cubes; those that are no stable equilibria in none.
-
-    Args:
-        cloud: tip(sample, axis) [m].
-        edge: Of the cubes [m]; None for L/20.
-
-    Raises:
-        InvalidInput: No cloud, or an edge that is not positive or gives too many cubes.
-    """
-    from softreach.geometry.lattice import CellGrid
-
+    """The tips of a cloud sorted into cubes of an edge [m], by default L/20; unstable in none."""
     tip = check_cloud(cloud)["tip"]
     points = tip.values
     if "status" in cloud.coords:
@@ -361,9 +324,7 @@ def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     return CellGrid.around(points, default if edge is None else as_number("cell", edge, _EDGES))
 
 
-def cell_dataset(
-    grid: CellGrid, **variables: tuple[NDArray[np.generic], dict[str, str]]
-) -> xr.Dataset:
+def cell_dataset(grid: CellGrid, **variables: tuple[NDArray[Any], dict[str, str]]) -> xr.Dataset:
     """Variables, each with its attributes, over the centers x, y, z [m] of cubes."""
     import xarray as xr
 

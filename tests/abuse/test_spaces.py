@@ -6,7 +6,7 @@ import pytest
 
 import softreach as sr
 from softreach.atlas import DesignSpace, Metric, Need
-from softreach.atlas.space_file import parse_space
+from softreach.atlas.space import parse_space
 from tests.abuse.refusals import raised_by
 
 NUMBERS = "must be numbers: a list, or start:stop:count"

@@ -10,11 +10,8 @@ from softreach.atlas import DesignSpace
 from softreach.atlas.command import Command
 from softreach.atlas.metrics import chosen_metrics
 
-SMALL = {
-    "n": 2_000,
-    "alpha_over_length": 0.5,
-    "metrics": ("extent", "convex", "concave", "curvature"),
-}
+_METRICS = ("extent", "convex", "concave", "curvature")
+SMALL = {"n": 2_000, "alpha_over_length": 0.5, "metrics": _METRICS}
 
 
 def small_space(**more) -> DesignSpace:

@@ -15,7 +15,7 @@ SCRIPT = """
     import numpy as np
     from softreach import describe, designs
     from softreach.atlas import DesignSpace, build_atlas
-    from softreach.atlas import executor
+    from softreach.atlas import build as building
 
     def build(store, n=3_000, alpha_over_length=0.3, accuracy=0.2, **options):
         turns, tapers = np.radians([0, 36, 72, 108]), np.radians([0, 1, 2, 3])

@@ -42,9 +42,8 @@ def deadly_length(arm):
     return arm.length
 
 
-DEADLY_LENGTH = Metric(
-    name="deadly", unit="m", meaning="length", needs=(Need.ARM,), compute=deadly_length
-)
+ABOUT = {"name": "deadly", "unit": "m", "meaning": "length", "needs": (Need.ARM,)}
+DEADLY_LENGTH = Metric(**ABOUT, compute=deadly_length)
 
 
 def test_a_pool_that_loses_a_worker_ends_with_one_line_and_another_one_continues(
@@ -86,7 +85,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
 
 
 DEADLY = """
-    right = executor.Intermediates
+    right = building.Intermediates
 
     def deadly(arm, *rest):
         guilty = arm.profile.taper > 0.05 and abs(describe(arm).revolutions[0]) < 1e-9
@@ -96,7 +95,7 @@ DEADLY = """
             die()
         return right(arm, *rest)
 
-    executor.Intermediates = deadly
+    building.Intermediates = deadly
 """
 
 

@@ -52,12 +52,9 @@ def test_unreachability_falls_with_revolution_and_taper(paper):
     for dim in ("revolution", "taper"):
         assert (paper.exact_unreachability.diff(dim) < 0).all()
         assert (paper.unreachability.diff(dim) < 0.02).all()  # sampled, with a coarse radius
-    np.testing.assert_allclose(
-        paper.exact_unreachability.isel(revolution=0, taper=0), 0.69, atol=0.01
-    )
-    np.testing.assert_allclose(
-        paper.exact_unreachability.isel(revolution=3, taper=3), 0.29, atol=0.01
-    )
+    for place, expected in ((0, 0.69), (3, 0.29)):
+        corner = paper.exact_unreachability.isel(revolution=place, taper=place)
+        np.testing.assert_allclose(corner, expected, atol=0.01)
 
 
 def test_metrics_agree_with_those_of_the_cloud_alone(paper):
@@ -67,9 +64,8 @@ def test_metrics_agree_with_those_of_the_cloud_alone(paper):
     np.testing.assert_allclose(row.convex_volume, sr.convex_hull(alone.tip).volume, rtol=1e-9)
     np.testing.assert_allclose(row.volume, sr.concave_hull(alone.tip, 0.1).volume, rtol=1e-12)
     np.testing.assert_allclose(row.reach_height, alone.tip[:, 2].max())
-    np.testing.assert_allclose(
-        row.reach_radius, np.hypot(alone.tip[:, 0], alone.tip[:, 1]).max(), rtol=1e-12
-    )
+    radius = np.hypot(alone.tip[:, 0], alone.tip[:, 1]).max()
+    np.testing.assert_allclose(row.reach_radius, radius, rtol=1e-12)
 
 
 # Laws of scale
@@ -77,16 +73,14 @@ def test_metrics_agree_with_those_of_the_cloud_alone(paper):
 
 def test_metrics_of_similar_designs_scale_as_their_units_say(tmp_path):
     lengths = [1.0, 2.0, 0.5]
-    atlas = build_atlas(
-        similar_designs(*lengths), tmp_path / "a.zarr", 2_000, alpha_over_length=0.3, accuracy=0.1
-    )
+    options = {"alpha_over_length": 0.3, "accuracy": 0.1}
+    atlas = build_atlas(similar_designs(*lengths), tmp_path / "a.zarr", 2_000, **options)
     power = {"m": 1, "m2": 2, "m3": 3, "1": 0, "1/m": -1}
     for metric in chosen_metrics(tuple(METRIC_GROUPS)):
         found = atlas[metric.name].values
         for length, value in zip(lengths, found, strict=True):
-            np.testing.assert_allclose(
-                value, found[0] * length ** power[metric.unit], 1e-9, err_msg=metric.name
-            )
+            expected = found[0] * length ** power[metric.unit]
+            np.testing.assert_allclose(value, expected, 1e-9, err_msg=metric.name)
         relative = over_length(atlas, metric.name)
         np.testing.assert_allclose(relative, np.broadcast_to(found[:1], found.shape), 1e-9)
         assert relative.dims == atlas[metric.name].dims
@@ -95,12 +89,9 @@ def test_metrics_of_similar_designs_scale_as_their_units_say(tmp_path):
 def test_sparse_clouds_are_counted_by_the_length_of_each_design(tmp_path):
     """Beside a long design a radius of 0.05 m would be too small for it alone."""
     for k, lengths in enumerate([(1.0, 2.0), (1.0,)]):
+        options = SMALL | {"alpha_over_length": 0.05}
         with pytest.warns(SoftreachWarning, match=rf"of {len(lengths)} designs? and") as told:
-            build_atlas(
-                similar_designs(*lengths),
-                tmp_path / f"{k}.zarr",
-                **SMALL | {"alpha_over_length": 0.05},
-            )
+            build_atlas(similar_designs(*lengths), tmp_path / f"{k}.zarr", **options)
         assert "alpha = 0.05 L" in str(told[0].message)
 
 
@@ -160,9 +151,8 @@ def test_every_need_can_be_met(tmp_path):
     arm = similar_designs(2.0).design(0)
     assert found[Need.ARM] == arm
     assert (found[Need.LENGTH], found[Need.ALPHA]) == (2.0, 1.0)
-    np.testing.assert_array_equal(
-        found[Need.TIPS], sr.tip_positions(arm, found[Need.ACTIVATIONS], tol=1e-6)
-    )
+    tips = sr.tip_positions(arm, found[Need.ACTIVATIONS], tol=1e-6)
+    np.testing.assert_array_equal(found[Need.TIPS], tips)
     hull = sr.convex_hull(found[Need.TIPS])
     np.testing.assert_allclose(found[Need.CONVEX_VOLUME], hull.volume, rtol=1e-9)
     assert found[Need.CONVEX_VOLUME] == found[Need.ALPHA_COMPLEX].volumes.sum()
@@ -222,10 +212,7 @@ def test_nan_is_an_answer_where_the_metric_says_when(tmp_path):
         ((), "metrics = none: must be some of extent"),
         ((MEAN_HEIGHT, replace(MEAN_HEIGHT, unit="1")), "name of a metric = mean_height"),
         ((replace(MEAN_HEIGHT, name="volume"),), "name of a metric = volume: must be the name of"),
-        (
-            (replace(MEAN_HEIGHT, name="status"),),
-            "= status: must be a name that the atlas does not",
-        ),
+        ((replace(MEAN_HEIGHT, name="status"),), "= status: must be a name that the atlas does n"),
         ((replace(MEAN_HEIGHT, name="taper"),), "= taper: must be a name that the atlas does not"),
     ],
 )

@@ -14,17 +14,8 @@ import xarray as xr
 
 import softreach as sr
 from softreach.arm.parameters import changed
-from softreach.atlas import (
-    DesignSpace,
-    atlas_cloud,
-    atlas_design,
-    atlas_status,
-    best_designs,
-    build_atlas,
-    open_atlas,
-    over_length,
-)
-from softreach.atlas.executor import begin_design
+from softreach.atlas import atlas_cloud, atlas_design, atlas_status, best_designs, build_atlas
+from softreach.atlas.build import begin_design
 from softreach.atlas.metrics import METRIC_GROUPS
 from softreach.atlas.store import AtlasStore
 from softreach.cli import atlas as atlas_command
@@ -59,12 +50,8 @@ EVERYDAY = {
     "where drop": lambda data, dim: data.where(data[dim] > data[dim][0], drop=True),
     "reindex": lambda data, dim: data.reindex({dim: [*data[dim].values, 1e3]}),
     "merge": lambda data, dim: xr.merge([data, data], compat="override", join="outer"),
-    "fillna": lambda data, dim: data.fillna(0.0),
     "max": lambda data, dim: data.max(),
-    "mean": lambda data, dim: data.mean(dim),
     "diff": lambda data, dim: data.diff(dim),
-    "sel": lambda data, dim: data.sel({dim: data[dim][-1]}),
-    "sortby": lambda data, dim: data.sortby(dim, ascending=False),
     "concat": lambda data, dim: xr.concat([data, data], "again"),
     "to_dataframe": lambda data, dim: data.drop_dims("sample").to_dataframe(),
     "pickle": lambda data, dim: pickle.loads(pickle.dumps(data.load())),
@@ -121,7 +108,7 @@ def test_so_does_an_atlas(tmp_path, monkeypatch):
         return known(text.replace('kind = "fiber"', 'kind = "Magnets"'), source)
 
     monkeypatch.setattr(sr.Manipulator, "from_toml", unknown)
-    found = open_atlas(place)
+    found = sr.open_atlas(place)
     assert_same(found.load(), built)
     assert best_designs(found, "volume").volume == built.volume.max()
     assert atlas_status(place).done == 4
@@ -149,7 +136,7 @@ def test_any_reader_of_zarr_and_cf_understands_the_store(tmp_path):
 
 
 def test_designs_with_more_bundles_share_the_activations_of_the_others(tmp_path):
-    space = DesignSpace.listed(sr.designs.minimal_trunk(), **{"left.bundles": [1, 2]})
+    space = sr.DesignSpace.listed(sr.designs.minimal_trunk(), **{"left.bundles": [1, 2]})
     atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
     few, more = atlas_cloud(atlas, design=0), atlas_cloud(atlas, design=1)
     assert (few.activation.shape[1], more.activation.shape[1]) == (3, 4)
@@ -174,7 +161,7 @@ def test_best_designs_are_the_best_that_meet_the_constraints(paper):
 
 def test_what_is_not_there_is_not_opened(tmp_path):
     with pytest.raises(InvalidInput, match="by build_atlas; it does not exist"):
-        open_atlas(tmp_path / "nothing.zarr")
+        sr.open_atlas(tmp_path / "nothing.zarr")
     assert not (tmp_path / "nothing.zarr").exists()
 
 
@@ -213,7 +200,7 @@ def test_every_question_takes_a_store_or_what_was_opened_of_it(some):
         partial(atlas_design, **at),
         partial(atlas_cloud, **at),
     ):
-        answers = [ask(place) for place in (some, str(some), open_atlas(some))]
+        answers = [ask(place) for place in (some, str(some), sr.open_atlas(some))]
         for answer in answers[1:]:
             if isinstance(answer, xr.Dataset):
                 assert_same(answer, answers[0])
@@ -227,15 +214,15 @@ def test_reading_an_atlas_makes_none_of_its_designs(tmp_path, monkeypatch):
     def made(*_):
         raise AssertionError("a design was made")
 
-    monkeypatch.setattr(DesignSpace, "design", made)
+    monkeypatch.setattr(sr.DesignSpace, "design", made)
     assert atlas_status(tmp_path / "a.zarr").done == 4
     assert len(best_designs(tmp_path / "a.zarr", "volume", count=4).volume) == 4
 
 
 def test_building_an_atlas_makes_each_design_once_before_any_is_computed(tmp_path, monkeypatch):
     made = []
-    plain = DesignSpace.design
-    monkeypatch.setattr(DesignSpace, "design", lambda *a: made.append(a[1]) or plain(*a))
+    plain = sr.DesignSpace.design
+    monkeypatch.setattr(sr.DesignSpace, "design", lambda *a: made.append(a[1]) or plain(*a))
     build_atlas(small_space(), tmp_path / "a.zarr", shard=(3, 4), **SMALL)
     assert made == [0, 1, 2, 3, 3]
 
@@ -257,7 +244,7 @@ def test_the_status_counts_every_design_once(some):
 
 
 def test_a_part_of_an_atlas_keeps_the_numbers_of_its_designs(some):
-    part = open_atlas(some).isel(outer_radius=[1])
+    part = sr.open_atlas(some).isel(outer_radius=[1])
     assert part.number.values.tolist() == [[1], [3]]
     assert atlas_status(part).messages == {3: "no luck"}
     assert atlas_design(part, taper=np.radians(4), outer_radius=0.1).profile.taper == np.radians(4)
@@ -288,13 +275,13 @@ def test_figures_show_each_design_in_lengths_of_its_own(tmp_path):
 def test_maps_and_hulls_of_an_atlas_over_length_are_relative_to_each_length(tmp_path):
     pytest.importorskip("matplotlib")
     base = sr.designs.minimal_trunk(taper=0.0)
-    space = DesignSpace.grid(base, revolution=[0.5, 1.5], length=[0.5, 2.0])
+    space = sr.DesignSpace.grid(base, revolution=[0.5, 1.5], length=[0.5, 2.0])
     atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
     best = float((atlas.volume / np.array([0.5, 2.0]) ** 3).max())
     marked = plot_metric_map(atlas, "volume").texts[-1].get_text()
     assert marked == f"{best:.3f}"
     for place in np.ndindex(2, 2):
-        volume = over_length(atlas, "volume")[place]
+        volume = sr.atlas.over_length(atlas, "volume")[place]
         cloud = atlas_cloud(atlas, revolution=volume.revolution, length=volume["length"])
         np.testing.assert_allclose(hull_over_length(cloud, 0.5).volume, volume, rtol=1e-3)
 
@@ -318,7 +305,7 @@ def test_a_built_atlas_is_that_of_the_library(tmp_path, capsys):
     store = str(tmp_path / "a.zarr")
     assert run(["atlas", "build", store, *BUILD, "--alpha", "0.8L", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["done"] == 2
-    atlas = open_atlas(store)
+    atlas = sr.open_atlas(store)
     assert atlas.volume.attrs["alpha_over_length"] == 0.8
     alone = sr.compute_cloud(sr.designs.minimal_trunk(taper=np.radians(2)), n=500)
     volume = atlas.volume.sel(taper=np.radians(2), method="nearest")
@@ -334,7 +321,7 @@ def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
     assert found["taper_deg"] == [0.0]
     design = tmp_path / "best.toml"
     assert run(["atlas", "best", store, "volume", "--out", str(design)]) == 0
-    best = best_designs(open_atlas(store), "volume")
+    best = best_designs(sr.open_atlas(store), "volume")
     taper = float(best.taper[0])
     assert sr.Manipulator.load(design) == sr.designs.minimal_trunk(taper=taper)
     assert run(["atlas", "best", store, "volume", "--where", "volume>=9", "--out", "a.toml"]) == 2
@@ -348,8 +335,8 @@ VALUES = {MODULUS: [1e5, 2e5], END: [0.5, 1.0]}
 VARIED = ("--vary", f"{MODULUS}_pa=1e5,2e5", "--vary", f"{END}=0.5,1", "--n", "10")
 
 
-def space() -> DesignSpace:
-    return DesignSpace.grid(sr.designs.minimal_trunk(), **VALUES)
+def space() -> sr.DesignSpace:
+    return sr.DesignSpace.grid(sr.designs.minimal_trunk(), **VALUES)
 
 
 def varied(store):
@@ -373,7 +360,7 @@ def test_the_dimensions_of_an_atlas_are_the_paths(tmp_path):
 def test_the_command_line_writes_the_unit_behind_the_path(tmp_path, capsys):
     store = str(tmp_path / "a.zarr")
     assert run(["atlas", "build", store, *VARIED, "--metrics", "extent"]) == 0
-    assert open_atlas(store)["status"].dims == (MODULUS, END)
+    assert sr.open_atlas(store)["status"].dims == (MODULUS, END)
     capsys.readouterr()
     where = ("--where", f"{MODULUS}_pa>=1.5e5", "--where", f"{END}<=0.6")
     assert run(["atlas", "best", store, "reach_height", *where, "--json"]) == 0
@@ -398,4 +385,4 @@ def test_one_number_is_not_varied_under_two_names():
     arm = base.replace(section=base.section.replace(rings=(ring,)))
     names = {"rings[skin].inner_ratio": [0.5], "rings[0].inner_ratio": [0.6]}
     with pytest.raises(InvalidInput, match="given once"):
-        DesignSpace.grid(arm, **names)
+        sr.DesignSpace.grid(arm, **names)

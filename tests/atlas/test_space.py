@@ -8,7 +8,7 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.atlas import DesignSpace
-from softreach.atlas.space_file import parse_space
+from softreach.atlas.space import parse_space
 from softreach.support.errors import InvalidInput
 from tests.atlas.families import small_space
 
@@ -25,9 +25,8 @@ def test_a_grid_has_every_combination_in_c_order():
 
 
 def test_a_list_takes_values_together():
-    space = DesignSpace.listed(
-        sr.designs.minimal_trunk(), taper=[0.0, 0.01], **{"left.offset": [1, 2]}
-    )
+    values = {"taper": [0.0, 0.01], "left.offset": [1, 2]}
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), **values)
     assert (space.dims, space.size) == (("design",), 2)
     assert space.design(1).fibers[0].offset == 2
 
@@ -117,20 +116,11 @@ def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (
-            'layout = "circle"\n[parameters]\ntaper_deg = [0]',
-            "layout = circle: must be one of grid",
-        ),
-        (
-            "[parameters]\ntaper = [1]",
-            r"taper = \[1\]: must be a finite number with its unit \(deg, °, rad\)",
-        ),
+        ('layout = "circle"\n[parameters]\ntaper_deg = [0]', "layout = circle: must be one of g"),
+        ("[parameters]\ntaper = [1]", r"taper = \[1\]: must be a .* its unit \(deg, °, rad\)"),
         ('[parameters]\ntaper_deg = "0:3"', "taper_deg = 0:3: must be numbers"),
         ('layout = "sobol"\n[parameters]\ntaper_deg = [0]', "taper = .*: must be two ends"),
-        (
-            "[parameters]\n'left.lower' = [-1]\nleft.lower = [-2]",
-            "left.lower = .*: must be given once",
-        ),
+        ("[parameters]\n'left.lower' = [-1]\nleft.lower = [-2]", "left.lower = .* given once"),
         ("lay_out = 1", "key = lay_out: must be one of design"),
         ("=", "must be valid TOML"),
     ],

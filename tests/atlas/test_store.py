@@ -16,14 +16,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.atlas import (
-    DesignSpace,
-    StoreFailed,
-    atlas_cloud,
-    atlas_status,
-    build_atlas,
-    open_atlas,
-)
+from softreach.atlas import DesignSpace, StoreFailed, atlas_cloud, atlas_status, build_atlas
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.store import AtlasStore
@@ -89,7 +82,7 @@ def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(beg
             AtlasStore.begin(store, command(gapped_space(), **TINY))
         assert isinstance(caught.value.__cause__, Interrupted)
         with suppress(InvalidInput):  # else all arrays are there, and the gap is still to do
-            assert not open_atlas(place).status.any()
+            assert not sr.open_atlas(place).status.any()
         (place / "zarr.0123.partial").touch()  # what a write leaves that is killed itself
         AtlasStore.begin(place, command(gapped_space(), **TINY))
         assert stored_files(place) == begun.files
@@ -167,7 +160,7 @@ def test_an_atlas_elsewhere_is_built_resumed_and_asked_as_one_on_disk(elsewhere,
     assert_same(build_atlas(small_space(), elsewhere, **SMALL).load(), here.load())
     assert atlas_status(elsewhere).done == 4
     at = {"revolution": 1.5, "taper": 0.0}
-    assert_same(atlas_cloud(open_atlas(elsewhere), **at), atlas_cloud(here, **at))
+    assert_same(atlas_cloud(sr.open_atlas(elsewhere), **at), atlas_cloud(here, **at))
     with pytest.raises(InvalidInput, match="n: 2000 there, 3000 here"):
         build_atlas(small_space(), elsewhere, **SMALL | {"n": 3_000})
 
@@ -176,7 +169,7 @@ def test_what_cannot_be_reached_is_said_in_one_line(tmp_path):
     pytest.importorskip("fsspec")
     (tmp_path / "file").touch()
     for place in ("nothing://a.zarr", str(tmp_path / "file")):
-        for ask in (open_atlas, lambda at: build_atlas(small_space(), at, **SMALL)):
+        for ask in (sr.open_atlas, lambda at: build_atlas(small_space(), at, **SMALL)):
             with pytest.raises(SoftreachError, match="an atlas") as caught:
                 ask(place)
             assert "\n" not in str(caught.value)
@@ -211,9 +204,7 @@ def test_designs_of_the_same_atlas_built_in_two_folders_may_be_copied_together(t
 
 def test_only_public_names_of_zarr_are_used():
     """Private ones would tie softreach to one release of Zarr."""
-    private = re.compile(
-        r"^ *(from|import) zarr([\w.]*\._|\.core|[\w.]* import \(?\s*_)", re.MULTILINE
-    )
+    private = re.compile(r"(?m)^ *(from|import) zarr([\w.]*\._|\.core|[\w.]* import \(?\s*_)")
     files = Path(sr.__file__).parent.rglob("*.py")
     assert [file.name for file in files if private.search(file.read_text())] == []
 
@@ -309,26 +300,21 @@ def test_another_command_is_refused_with_what_differs(tmp_path, change, message)
 def test_another_space_is_refused_with_what_differs(tmp_path):
     AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
     base = sr.designs.minimal_trunk()
+    longer = DesignSpace.grid(of_length(base, 1.5), revolution=[0.5, 1.5])
     for space, message in [
         (DesignSpace.grid(base, revolution=[0.5, 1.0], taper=[0.0, np.radians(2)]), "revolution: "),
         (DesignSpace.grid(base, revolution=[0.5, 1.5]), "taper: .* there, none here"),
-        (
-            DesignSpace.grid(of_length(base, 1.5), revolution=[0.5, 1.5]),
-            "length_m = 1.0 there, length_m = 1.5 here",
-        ),
+        (longer, "length_m = 1.0 there, length_m = 1.5 here"),
     ]:
         with pytest.raises(InvalidInput, match=message):
             build_atlas(space, tmp_path / "a.zarr", **SMALL)
 
 
 def test_gaps_are_told_before_anything_runs_and_stay_gaps(tmp_path):
-    base = sr.designs.minimal_trunk()
-    space = DesignSpace.grid(base, taper=np.radians([2.0, 4.0]), outer_radius=[1 / 16, 0.1])
-    assert list(space.gaps) == [2]
-    with pytest.warns(
-        SoftreachWarning, match="1 of 4 designs cannot exist and stays a gap, .*leaves no tip"
-    ):
-        atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    assert list(gapped_space().gaps) == [2]
+    said = "1 of 4 designs cannot exist and stays a gap, .*leaves no tip"
+    with pytest.warns(SoftreachWarning, match=said):
+        atlas = build_atlas(gapped_space(), tmp_path / "a.zarr", **SMALL)
     assert np.isfinite(atlas.volume.values).tolist() == [[True, True], [False, True]]
     status = atlas_status(tmp_path / "a.zarr")
     assert (status.done, status.gaps) == (3, 1)
@@ -350,7 +336,7 @@ def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatc
         return Intermediates(arm, *rest)
 
     with monkeypatch.context() as patch:
-        patch.setattr("softreach.atlas.executor.Intermediates", fails_for_taper)
+        patch.setattr("softreach.atlas.build.Intermediates", fails_for_taper)
         with pytest.warns(SoftreachWarning, match="1 design failed, .*no hull today"):
             atlas = build_atlas(small_space(), store, **SMALL)
     assert np.isfinite(atlas.volume.values).tolist() == [[True, True], [True, False]]

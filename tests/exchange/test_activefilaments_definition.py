@@ -11,16 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import softreach as sr
-from softreach.arm import (
-    Chamber,
-    LinearTaper,
-    Material,
-    Pieces,
-    PiecewiseTaper,
-    Samples,
-    Section,
-    designs,
-)
+from softreach.arm import LinearTaper, Material, Pieces, PiecewiseTaper, Samples, Section, designs
 from softreach.arm.parameters import changed
 from softreach.cli.app import run
 from softreach.exchange.activefilaments import (
@@ -129,9 +120,8 @@ def test_layers_survive_with_their_stiffness_and_the_mass(tmp_path):
 def test_families_that_share_a_ring_share_its_modulus_and_multiply_their_activations():
     filament = filament_of(designs.redundant_trunk(material=Material(young_modulus=1e6)))
     assert [ring.young_modulus for ring in filament.rings] == [2.5e5] * 4
-    assert filament.to_columns(np.array([[-1.0, -0.5, 0.0, -0.25]])).tolist() == [
-        [-4.0, -2.0, 0.0, -1.0]
-    ]
+    columns = filament.to_columns(np.array([[-1.0, -0.5, 0.0, -0.25]]))
+    assert columns.tolist() == [[-4.0, -2.0, 0.0, -1.0]]
 
 
 def test_a_helical_angle_in_pieces_survives(tmp_path):
@@ -147,7 +137,7 @@ LINEAR = Samples(stations_over_length=(0, 1), values=(0.1, 0.2))
 STIFF = sr.Ring(inner_ratio=0.5, material=Material(young_modulus=1e6))
 
 
-AIR = Chamber(distance=0.01, radius=0.002, activation_bounds=(0, 1), name="air")
+AIR = sr.Chamber(distance=0.01, radius=0.002, activation_bounds=(0, 1), name="air")
 ROUND = PiecewiseTaper(length=1, stations_over_length=(0, 1), radii=(0.1, 0.1))
 INSIDE = STIFF.replace(inner_ratio=0.7, outer_ratio=0.8)
 
@@ -307,10 +297,7 @@ def test_what_is_no_table_of_numbers_is_refused_in_one_short_line(name, tips, fi
 
 @pytest.mark.parametrize(
     ("rows", "told"),
-    [
-        ("0,0\n" * ROWS, "2 columns: must be 3: the sectors of"),
-        ("0,0,0\n", f"1 row: must be {ROWS}"),
-    ],
+    [("0,0\n" * ROWS, "2 columns: must be 3: the sectors"), ("0,0,0\n", f"1 row: must be {ROWS}")],
 )
 def test_activations_of_another_shape_are_refused_with_both_numbers(rows, told, tips, filament):
     gamma_path(tips).write_text(rows)
@@ -351,6 +338,5 @@ def test_the_command_line_goes_there_and_back(folder, filament, capsys):
     assert run(["export", "cloud.zarr", "tips.csv", "--format", "activefilaments"]) == 0
     assert run(["import", "tips.csv", "back.zarr", "--design", "filament.toml"]) == 0
     assert "largest difference of tips" in capsys.readouterr().out
-    np.testing.assert_array_equal(
-        sr.open_cloud("back.zarr").activation, sr.open_cloud("cloud.zarr").activation
-    )
+    back, cloud = (sr.open_cloud(name) for name in ("back.zarr", "cloud.zarr"))
+    np.testing.assert_array_equal(back.activation, cloud.activation)

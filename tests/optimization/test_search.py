@@ -198,9 +198,8 @@ def test_ties_follow_what_they_are_tied_to():
 
 def test_choices_and_integers_are_among_those_allowed():
     choices = {"bundles": [2, 3], "material": ["ecoflex_00_30", "spring_steel"]}
-    search = sr.search(
-        ARM, {"taper": (0.0, 0.02)}, minimize="mass", choices=choices, designs=16, accuracy=0.1
-    )
+    options = {"minimize": "mass", "designs": 16, "accuracy": 0.1}
+    search = sr.search(ARM, {"taper": (0.0, 0.02)}, choices=choices, **options)
     assert {each.values["bundles"] for each in search.candidates} == {2, 3}
     assert search.best.values["material"] == "ecoflex_00_30"
     assert len(search.arm.actuators) == search.best.values["bundles"]
@@ -218,9 +217,8 @@ def test_designs_by_name_are_chosen_among():
 
 
 def test_an_objective_that_no_design_has_is_said_in_one_line():
-    nothing = Metric(
-        name="hope", unit="1", meaning="no number", needs=(), compute=lambda: float("nan")
-    )
+    about = {"name": "hope", "unit": "1", "meaning": "no number", "needs": ()}
+    nothing = Metric(**about, compute=lambda: float("nan"))
     search = sr.search(ARM, FREE, maximize=nothing, polish=False, **FAST)
     assert not search.met
     assert "hope = nan: must be finite" in repr(search)

@@ -155,14 +155,10 @@ def test_all_faults_of_a_file_are_told_at_once_in_its_own_words():
 
 def test_requirements_that_contradict_each_other_are_named():
     box = Box((-1, -1, 0), (1, 1, 2))
+    shelf = Target([[0, 0, 1], [0, 0, 3], [0, 0, -1]], name="shelf")
+    ball = Keep(Sphere((0, 0, 1), 0.1), False, name="lamp", of="tip")
     with pytest.raises(InvalidDesign) as caught:
-        Requirements(
-            targets=[Target([[0, 0, 1], [0, 0, 3], [0, 0, -1]], name="shelf")],
-            keeps=[
-                Keep(box, True, name="cell"),
-                Keep(Sphere((0, 0, 1), 0.1), False, name="lamp", of="tip"),
-            ],
-        )
+        Requirements(targets=[shelf], keeps=[Keep(box, True, name="cell"), ball])
     cell, lamp = map(str, caught.value.faults)
     assert cell.startswith("shelf, place 2 = (0.0, 0.0, 3.0): lies outside cell by 1 m")
     assert "1 more places" in cell

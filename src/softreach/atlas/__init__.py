@@ -1,8 +1,7 @@
 """Reachability clouds of whole families of designs: build, resume, open, query."""
 
 from softreach.atlas.build import build_atlas
-from softreach.atlas.metric import Metric, MetricFailed, Need
-from softreach.atlas.metrics import METRIC_GROUPS
+from softreach.atlas.metrics import METRIC_GROUPS, Metric, MetricFailed, Need
 from softreach.atlas.reading import (
     AtlasStatus,
     atlas_cloud,

@@ -2,43 +2,201 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import Executor
+import os
+import pickle
+import secrets
+from collections.abc import Callable, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from dataclasses import replace
+from functools import partial
+from itertools import chain, islice
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from zarr.storage import MemoryStore, StoreLike  # noqa: TID253  (imported where stores are)
 
 from softreach.atlas.command import Command
-from softreach.atlas.executor import DaskClient, ExecutorLike, run_designs
-from softreach.atlas.metric import Metric
-from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
+from softreach.atlas.intermediates import Intermediates
+from softreach.atlas.metrics import METRIC_GROUPS, Metric, Need, chosen_metrics
 from softreach.atlas.reading import a_store, contents, open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
-from softreach.rod.tip_map import check_tol
+from softreach.rod.tip_map import check_tol, no_equilibrium_message
 from softreach.sampling import check_sampler
-from softreach.support.arguments import (
-    POSITIVE,
-    as_flag,
-    as_function,
-    as_given,
-    as_instance,
-    as_number,
-    plain,
-)
-from softreach.support.errors import InvalidInput, counted, warn
+from softreach.support import errors, parallel
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number, plain
+from softreach.support.arrays import Array
+from softreach.support.files.stores import StoreFailed
+from softreach.support.interruption import check_stopped
 from softreach.support.memory import check_memory
-from softreach.support.progress import Progress, bar
+from softreach.support.progress import Progress, as_progress, bar
 from softreach.workspace.reach import ACCURACIES
 
 if TYPE_CHECKING:
     import xarray as xr
-    from zarr.storage import StoreLike
 
+Values = dict[str, Array]
+Outcome = tuple[int, str]  # Number of a design, and why it failed; empty if it did not
+OnOutcome = Callable[[Outcome], None]
 
+_AHEAD = 512  # tasks that an executor has at a time
 _EXECUTORS = "a concurrent.futures executor, or a Dask client"
 _SAMPLE_MEMORY = 700  # bytes of memory of a sample and its share of the triangulation
+_opened: dict[tuple[str, int], AtlasStore] = {}  # Stores by the token of a call and the process
+
+
+@runtime_checkable
+class DaskClient(Protocol):
+    """A `dask.distributed.Client`."""
+
+    def get_executor(self, *, pure: bool) -> Executor:
+        """An executor on its cluster; those that are pure compute equal tasks once."""
+        ...
+
+
+ExecutorLike = Executor | DaskClient | None
+
+
+def run_designs(
+    store: AtlasStore, indices: Sequence[int], executor: ExecutorLike, on_outcome: OnOutcome
+) -> None:
+    """Compute and store designs, one a task; each outcome is reported as it comes."""
+    if executor is None:
+        # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
+        begun = (begin_design(store, index) for index in indices)
+        tasks = (partial(lambda task: on_outcome(task()), task) for task in begun)
+        # Threads start with the second task: with one before all they get the first design at once.
+        parallel.run(chain([lambda: None], tasks))
+        return
+    for metric in store.command.metrics if isinstance(executor, ProcessPoolExecutor) else ():
+        try:
+            pickle.dumps(metric.compute)
+        except Exception:
+            allowed = "a function of a module where worker processes compute it"
+            hint = "lambdas and functions inside of functions cannot be sent to them"
+            name = f"compute of metric {metric.name}"
+            raise errors.InvalidInput(name, metric.compute, allowed, hint) from None
+    pool = executor if isinstance(executor, Executor) else executor.get_executor(pure=False)
+    _run_pool(pool, store, indices, on_outcome)
+
+
+def _run_pool(
+    pool: Executor, store: AtlasStore, indices: Sequence[int], on_outcome: OnOutcome
+) -> None:
+    key = token, origin = secrets.token_hex(8), os.getpid()
+    remote = _Remote(store.command, store.location, store.opened.durable, token, origin)
+    _opened[key] = store  # for workers that are threads of this process
+    waiting = iter(indices)
+    pending: dict[Future[Outcome], int] = {}
+    try:
+        while True:
+            check_stopped()
+            for index in islice(waiting, _AHEAD - len(pending)):
+                pending[pool.submit(_run_remotely, remote, index)] = index
+            if not pending:
+                return
+            for future in wait(pending, return_when="FIRST_COMPLETED").done:
+                index = pending.pop(future)
+                try:
+                    outcome = future.result()
+                except Exception as error:
+                    if type(error).__name__ != "KilledWorker":
+                        raise
+                    outcome = index, "its worker died repeatedly"  # Dask has tried it again by then
+                    store.write_status(*outcome)
+                on_outcome(outcome)
+    except BrokenExecutor as error:
+        then = "finished designs are safe: the same call with a new executor continues"
+        raise errors.NotPossible(f"a worker died and broke its executor; {then}") from error
+    finally:
+        for future in pending:
+            future.cancel()
+        _opened.pop(key, None)
+
+
+class _Remote(NamedTuple):
+    """A store as it travels to a worker, with the functions of metrics, which are in no store.
+
+    Unpickling it imports the modules that these and the kinds of the design's parts are in.
+    """
+
+    command: Command
+    location: Any
+    durable: bool
+    token: str
+    origin: int  # Process that began the store
+
+
+def _run_remotely(remote: _Remote, index: int) -> Outcome:
+    """Compute and store a design in a worker, which opens the store once and uses one thread."""
+    key = remote.token, os.getpid()  # a forked process has what its parent opened
+    try:
+        if key not in _opened:
+            if key[1] != remote.origin:
+                os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
+                if isinstance(remote.location, dict | MemoryStore):
+                    where = "in the memory of another process"
+                    raise errors.NotPossible(f"the store is {where}; use a path or a URL")
+            _opened.clear()
+            store = AtlasStore.open(remote.location, durable=remote.durable)
+            _opened[key] = replace(store, command=remote.command)  # which has all functions
+        return begin_design(_opened[key], index)()
+    except errors.SoftreachError as error:
+        raise StoreFailed(str(error)) from None  # this one can be sent back
+
+
+@errors.no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
+def begin_design(store: AtlasStore, index: int) -> Callable[[], Outcome]:
+    """Do the part of a design that uses all threads; return the rest as a function to call.
+
+    All threads compute the tips of one design while the hulls of others are computed, one on each
+    thread. A failure of the design is stored and returned, one of the store is raised.
+    """
+    command = store.command
+    try:
+        needed = Intermediates(command.space.design(index), store.cube, command)
+        threaded = [metric for metric in command.metrics if Need.REACHABLE_SET in metric.needs]
+        values = _values(threaded, needed, command)  # none but NaN where nothing is stable
+        needed.computed.pop(Need.REACHABLE_SET, None)  # frees memory
+    except StoreFailed:
+        raise
+    except Exception as error:
+        return partial(_fail, store, index, error)
+    return partial(_finish, store, index, needed, values)
+
+
+@errors.no_warnings()
+def _finish(store: AtlasStore, index: int, needed: Intermediates, values: Values) -> Outcome:
+    command, stable = store.command, needed.stable
+    try:
+        rest = [metric for metric in command.metrics if metric.name not in values]
+        values |= _values(rest, needed, command)
+        tips = needed.tips if command.keep_clouds else None
+    except Exception as error:
+        return _fail(store, index, error)
+    if stable.any():
+        store.write(index, values, tips)
+    else:
+        store.write(index, values, tips, UNSTABLE, no_equilibrium_message(len(stable)))
+    return index, ""
+
+
+def _values(metrics: Sequence[Metric], needed: Intermediates, command: Command) -> Values:
+    """Metrics by name; where no sample is stable there is none but the share that is lost."""
+    sizes, is_stable = command.profile_sizes, needed.stable.any()
+    return {
+        metric.name: metric.value(needed, sizes)
+        if is_stable or metric.needs == (Need.LOST_SHARE,)
+        else np.full([sizes[dim] for dim in metric.over], np.nan)
+        for metric in metrics
+    }
+
+
+def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:
+    message = f"{type(error).__name__}: {error}"
+    store.write_status(index, message)
+    return index, message
 
 
 def build_atlas(
@@ -62,16 +220,14 @@ def build_atlas(
 
     All designs share one set of unit activations, scaled to each one's bounds. Every design is
     stored when it is done: after an interruption, even by kill -9, the same call continues and ends
-    with the same numbers. What is stored is verified first: damaged designs are computed again. A
-    design that fails is recorded with its error, the rest goes on, and the
-    next call tries it again. Combinations that no arm can have stay gaps.
+    with the same numbers. Damaged designs are computed again, and so are those that failed, which
+    are recorded with their errors. Combinations that no arm can have stay gaps.
 
-    Under loads, only samples with a stable equilibrium count, and `lost_share` tells the share of
-    the others. A design of which no sample is stable has no other metric: the rest is NaN, with a
-    message, and it is not tried again.
+    Under loads, only samples with a stable equilibrium count; `lost_share` is the share of the
+    others. Without any, a design has no other metric, but a message, and is not tried again.
 
-    Stored clouds are rounded to 1e-5 of the shortest length, an error of half of that at most in
-    each coordinate, which halves their size; metrics are computed before.
+    Stored clouds are rounded to 1e-5 of the shortest length, off by half of that at most in each
+    coordinate, which halves their size; metrics are computed before.
 
     Args:
         space: The designs.
@@ -89,33 +245,29 @@ def build_atlas(
             per thread in memory; a `concurrent.futures` executor; or a Dask client. Workers write
             to the store, which they must see at the same place, and use one thread each unless
             ``SOFTREACH_NUM_THREADS`` says otherwise.
-        shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
-            store without knowing of each other.
-        durable: Whether a design counts as done only when not even a power cut can lose it.
-            Without, it can damage designs of the last seconds, which the next call notices.
-        progress: Called with the number of designs done since its last call; by default a bar is
-            shown on a terminal.
+        shard: (i, k) computes every k-th design from the i-th on, i from 0, so that k processes
+            share a store.
+        durable: Whether a design counts as done only when not even a power cut can lose it; else
+            it can damage designs of the last seconds, which the next call notices.
+        progress: Called with the number of designs done since its last call; None for a bar.
 
     Returns:
         The atlas as `open_atlas` has it.
 
     Raises:
-        InvalidInput: An argument out of range, no valid design, or a store that another command
-            began; the message says what differs.
+        InvalidInput: An argument out of range, no valid design, or a store of another command.
         DamagedStore: The root of the store is damaged, and another command began it.
         StoreFailed: The store cannot be written, for instance because the disk is full.
-        SoftreachError: A worker died and broke its executor; the same call with a new one
-            continues.
+        SoftreachError: A worker died and broke its executor; a new one continues.
 
     Warns:
-        SoftreachWarning: There are gaps, failed or damaged designs, or designs whose points are too
-            sparse for the radius.
+        SoftreachWarning: Gaps, failed or damaged designs, or points too sparse for the radius.
     """
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)
     durable = as_flag("durable", durable)
     as_instance("executor", executor, (type(None), Executor, DaskClient), _EXECUTORS)
-    progress = None if progress is None else as_function("progress", progress)
+    progress = None if progress is None else as_progress(progress)
     check_sampler(sampler, n, 0, seed)
     check_memory("n", n, _SAMPLE_MEMORY * n)
     command = Command(
@@ -130,11 +282,12 @@ def build_atlas(
         keep_clouds=as_flag("keep_clouds", keep_clouds),
     )
     if space.gaps:
-        _warn_of_gaps(space)
-    atlas, numbers = (
-        AtlasStore.begin(store, command, durable=durable),
-        range(first, space.size, count),
-    )
+        index, reason = next(iter(space.gaps.items()))
+        stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
+        lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
+        errors.warn(f"{lost}, first {space.values(index)}: {reason}")
+    atlas = AtlasStore.begin(store, command, durable=durable)
+    numbers = range(first, space.size, count)
     content = contents(atlas, tips_of=numbers)
     content.warn_of_damage("; damaged designs are computed again")
     ended = np.isin(content.status, (DONE, GAP, UNSTABLE))
@@ -149,29 +302,21 @@ def _shard_of(name: str, value: Any) -> tuple[int, int]:
     if len(pair) == 2 and {*map(type, pair)} == {int} and 0 <= pair[0] < pair[1]:
         return pair
     shown = "/".join(map(str, pair)) if len(pair) == 2 else as_given(value)
-    raise InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
-
-
-def _warn_of_gaps(space: DesignSpace) -> None:
-    index, reason = next(iter(space.gaps.items()))
-    stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
-    lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
-    warn(f"{lost}, first {space.values(index)}: {reason}")
+    raise errors.InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
 
 
 def _warn_of_metrics(built: xr.Dataset) -> None:
     if len(unstable := np.flatnonzero(built["status"].values == UNSTABLE)):
         first = built[["number", "message"]].stack(all=built["status"].dims, create_index=False)
         first = first.isel(all=unstable[0])
-        without = f"{counted(len(unstable), 'design')} without metrics"
-        warn(f"{without}, first number {first['number'].item()}: {first['message'].item()}")
+        without = f"{errors.counted(len(unstable), 'design')} without metrics"
+        errors.warn(f"{without}, first number {first['number'].item()}: {first['message'].item()}")
     radius = built.volume.attrs["alpha_over_length"] if "spacing" in built else 0.0
     if radius and (sparse := int((radius < 3.0 * over_length(built, "spacing")).sum())):
         whose = "its volume is" if sparse == 1 else "their volumes are"
-        warn(
-            f"alpha = {radius:.4g} L is below three mean spacings of the points of "
-            f"{counted(sparse, 'design')} and {whose} too small; use more points or a larger alpha"
-        )
+        few = f"alpha = {radius:.4g} L is below three mean spacings of the points of"
+        remedy = "use more points or a larger alpha"
+        errors.warn(f"{few} {errors.counted(sparse, 'design')} and {whose} too small; {remedy}")
 
 
 def _run(
@@ -189,4 +334,5 @@ def _run(
         run_designs(atlas, indices, executor, on_outcome)
     if failures:
         index, message = next(iter(failures.items()))
-        warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")
+        failed = f"{errors.counted(len(failures), 'design')} failed"
+        errors.warn(f"{failed}, first number {index}: {message}")

@@ -1,7 +1,5 @@
 """Command that builds an atlas: the same one resumes, another one is refused."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -10,8 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from softreach.atlas.metric import Metric
-from softreach.atlas.metrics import known_metric
+from softreach.atlas.metrics import Metric, known_metric
 from softreach.atlas.space import DesignSpace
 from softreach.cloud.curvature import QUANTILES
 from softreach.sampling import check_sampler
@@ -30,24 +27,16 @@ _LONGEST = 1e3  # ratio of the lengths of designs whose tips share one fixed-poi
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """Everything that decides the numbers of an atlas, and nothing else.
-
-    Raises:
-        InvalidInput: A metric of a name that the atlas uses itself, a space without a single valid
-            design, or lengths of designs that are too far apart to keep clouds.
-    """
+    """Everything that decides the numbers of an atlas, and nothing else."""
 
     space: DesignSpace
     n: int
     seed: int
     sampler: str
     tol: float
-    alpha_over_length: float
-    """Radius of the alpha shapes over the length of each design."""
-    accuracy: float
-    """Relative error asked of the exact volumes."""
-    metrics: tuple[Metric, ...]
-    """As `chosen_metrics` has them."""
+    alpha_over_length: float  # Radius of the alpha shapes over the length of each design
+    accuracy: float  # Relative error asked of the exact volumes
+    metrics: tuple[Metric, ...]  # As `chosen_metrics` has them
     keep_clouds: bool
     stations: tuple[float, ...] = STATIONS
     """Places at which curvature is measured, over the length of each design."""
@@ -95,11 +84,7 @@ class Command:
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The command that `to_json` wrote; metrics that are not softreach's lack their function.
-
-        Raises:
-            InvalidInput: The store has another version.
-        """
+        """The command that `to_json` wrote; metrics that are not softreach's lack a function."""
         values = json.loads(text)  # the root of a store is sealed
         if (version := values.get("atlas_version")) != ATLAS_VERSION:
             hint = "build the atlas again in a new folder"
@@ -112,13 +97,13 @@ class Command:
             metrics.append(own if own and same else Metric.from_dict(metric))
         return cls(**{**values, "space": space, "metrics": tuple(metrics)})
 
-    def continuing(self, begun: Command) -> Self:
+    def continuing(self, begun: Self) -> Self:
         """This command for a store that another version began: without metrics added since."""
         names = {metric.name for metric in begun.metrics}
         kept = (m for m in self.metrics if m.name in names or not known_metric(m.name))
         return replace(self, metrics=tuple(kept), softreach_version=begun.softreach_version)
 
-    def differences(self, other: Command) -> list[str]:
+    def differences(self, other: Self) -> list[str]:
         """Differences between this command and another, one line each."""
         own, its = ({m.name: m.to_dict() for m in each.metrics} for each in (self, other))
         lines = [*_differences(_flat(self), _flat(other))]

@@ -1,8 +1,7 @@
 """Intermediate results behind the metrics of a design, each computed once, at its first use."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.command import Command
-from softreach.atlas.metric import Metric, Need
+from softreach.atlas.metrics import Metric, Need
 from softreach.cloud.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
@@ -37,33 +36,21 @@ class Settings(NamedTuple):
     metrics: tuple[Metric, ...] = ()  # That will be computed
 
 
+@dataclass(eq=False)
 class Intermediates:
-    """Need -> its value for one design, computed at first use.
+    """Need -> its value for one design, computed at first use."""
 
-    Args:
-        arm: The design.
-        cube: Unit activations that all designs share, shape (n, bundles).
-        command: Metrics, radius, accuracy, tolerance, stations and quantiles.
-        sets: Source of the reachable set, if it is known elsewhere.
-    """
-
-    def __init__(
-        self,
-        arm: Manipulator,
-        cube: Array,
-        command: Command | Settings,
-        sets: Callable[[], Any] | None = None,
-    ) -> None:
-        self.arm, self.cube, self.command, self.known_set = arm, cube, command, sets
-        self._cache: dict[Need, Any] = {}
+    arm: Manipulator
+    cube: Array  # Unit activations that all designs share, shape (n, bundles)
+    command: Command | Settings
+    known_set: Callable[[], Any] | None = None  # Source of the reachable set, if it is known
+    computed: dict[Need, Any] = field(default_factory=dict)
 
     @classmethod
-    def of_one(
-        cls, arm: Manipulator, samples: int, accuracy: float, sets: Callable[[], Any]
-    ) -> Self:
+    def of_one(cls, arm: Manipulator, n: int, accuracy: float, sets: Callable[[], Any]) -> Self:
         """Of one design, with a radius of alpha shapes that its samples, a power of 2, allow."""
-        cube = sample_cube("sobol", samples, max(arm.inputs, 1))
-        alpha = _SPACINGS / float(np.cbrt(samples))
+        cube = sample_cube("sobol", n, max(arm.inputs, 1))
+        alpha = _SPACINGS / float(np.cbrt(n))
         return cls(arm, cube, Settings(_TOL, accuracy, alpha), sets)
 
     @cached_property
@@ -88,13 +75,9 @@ class Intermediates:
         return with_unstable(self.rod).tips_and_status(activations_of(self.rod, self.cube))
 
     def __getitem__(self, need: Need) -> Any:
-        if need not in self._cache:
-            self._cache[need] = _COMPUTE[need](self)
-        return self._cache[need]
-
-    def forget(self, need: Need) -> None:
-        """Free memory."""
-        self._cache.pop(need, None)
+        if need not in self.computed:
+            self.computed[need] = _COMPUTE[need](self)
+        return self.computed[need]
 
 
 def activations_of(rod: TipMap, cube: Array) -> Array:

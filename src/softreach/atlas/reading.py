@@ -11,38 +11,26 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from zarr.abc.store import Store  # noqa: TID253  (imported where stores are)
+from zarr.storage import StoreLike, StorePath  # noqa: TID253
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.written import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
-from softreach.atlas.layout import MESSAGE, OF, PER_DESIGN, STATUS
-from softreach.atlas.metric import Metric, Need
-from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, UNSTABLE, AtlasStore
+from softreach.atlas.metrics import Need
+from softreach.atlas.store import ABOUT, DAMAGED, EXPLAINED, KNOWN, OF, PER_DESIGN, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, stored_names, with_status
-from softreach.support.arguments import (
-    as_dataset,
-    as_flag,
-    as_instance,
-    as_integer,
-    as_names,
-    as_number,
-    as_path,
-    as_text,
-)
+from softreach.support import arguments
 from softreach.support.errors import InvalidInput, counted, did_you_mean, warn
 from softreach.support.files.stores import ARRAYS, DIGEST, READING, Chunk, storage_errors
 from softreach.support.quantity import columns, numbers_in
 
 if TYPE_CHECKING:
     import xarray as xr
-    from zarr.storage import StoreLike
 
     AtlasLike = StoreLike | xr.Dataset
-
-
-EXPLAINED = (FAILED, GAP, UNSTABLE)  # The status of designs that have a message
 
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
@@ -53,8 +41,8 @@ _MOST_MESSAGES = 10
 def open_atlas(store: StoreLike) -> xr.Dataset:
     """An atlas with a dimension for each parameter, so that ``atlas.volume.sel(taper=...)`` works.
 
-    Clouds are read when they are used. Designs that are not done are NaN, and
-    so are those of which no activation is stable, but for their `lost_share`.
+    Clouds are read when they are used. Designs that are not done are NaN, and so are those of which
+    no activation is stable, but for their `lost_share`.
 
     Args:
         store: Path, URL or Zarr store.
@@ -85,8 +73,8 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     Raises:
         InvalidInput: No atlas, or a metric that it does not have.
     """
-    atlas = as_dataset("atlas", atlas, "length", what="an atlas")
-    if as_text("metric", metric) not in atlas:
+    atlas = arguments.as_dataset("atlas", atlas, "length", what="an atlas")
+    if arguments.as_text("metric", metric) not in atlas:
         raise InvalidInput("metric", metric, f"one of {', '.join(map(str, atlas.data_vars))}")
     values = atlas[metric]
     power = _POWERS.get(values.attrs.get("units", "1"), 0)
@@ -126,8 +114,7 @@ class AtlasStatus:
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """Number of designs of an atlas that are done, and faults of the others.
 
-    Metrics are verified, and so are tips if they are on disk and take no more than a second;
-    `verify_atlas` verifies all of them.
+    Metrics are verified, and tips on disk that take a second at most; `verify_atlas` reads all.
 
     Args:
         atlas: A store; or a dataset from `open_atlas`, which has the status of when it was opened.
@@ -152,9 +139,7 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
 
 
 def verify_atlas(store: StoreLike) -> AtlasStatus:
-    """Read all of an atlas and check it: what is damaged, and how much is done.
-
-    The command that built the atlas computes again what is damaged.
+    """Read all of an atlas: what is damaged, which its command repairs, and how much is done.
 
     Args:
         store: Path, URL or Zarr store.
@@ -184,8 +169,8 @@ def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
 def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
 
-    Stored tips are rounded to 1e-5 of the shortest length; without them the cloud is computed
-    again, exactly as it was, and so are those of loaded designs, whose samples have a status.
+    Stored tips are rounded to 1e-5 of the shortest length; without them, and of loaded designs,
+    whose samples have a status, the cloud is computed again, exactly as it was.
 
     Args:
         atlas: A store, or a dataset from `open_atlas`.
@@ -207,10 +192,8 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     if rod.supports_unstable:
         tip, stability = with_unstable(rod).tips_and_status(activation)
         return with_status(cloud_dataset(arm, activation, tip, **drawn), stability)
-    if "tip" in opened:
-        tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)
-    else:
-        tip = rod.tips(activation)
+    kept = "tip" in opened
+    tip = np.ascontiguousarray(row["tip"].values.T, float) if kept else rod.tips(activation)
     return cloud_dataset(arm, activation, tip, **drawn)
 
 
@@ -228,8 +211,8 @@ def best_designs(
         atlas: A store, or a dataset from `open_atlas`.
         metric: What to compare.
         smallest: Whether smaller values are better.
-        where: Constraints that all hold, such as `unreachability<=0.4`; parameters are called by
-            their names, or with the units of the command line, as in `taper_deg<=1`.
+        where: Constraints that all hold, such as `unreachability<=0.4`, or `taper_deg<=1` in the
+            units of the command line.
         count: How many designs at most.
 
     Returns:
@@ -238,9 +221,9 @@ def best_designs(
     Raises:
         InvalidInput: No such metric or parameter, or an argument of another kind.
     """
-    metric, smallest = as_text("metric", metric), as_flag("smallest", smallest)
-    count, opened = as_integer("count", count, 1), opened_atlas(atlas)
-    limits = list(_limits(as_names("where", where), opened))
+    metric, smallest = arguments.as_text("metric", metric), arguments.as_flag("smallest", smallest)
+    count, opened = arguments.as_integer("count", count, 1), opened_atlas(atlas)
+    limits = list(_limits(arguments.as_names("where", where), opened))
     dims = opened["status"].dims
     numbers = [name for name in opened.data_vars if opened[name].dims == dims]
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
@@ -258,20 +241,17 @@ def best_designs(
 class Contents(NamedTuple):
     """Contents of an atlas but its tips, each chunk checked."""
 
-    status: NDArray[np.uint8]
-    """DAMAGED for designs of which a chunk is, shape (designs,)."""
+    status: NDArray[np.uint8]  # DAMAGED for designs of which a chunk is, shape (designs,)
     messages: dict[int, str]
     """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
-    tables: dict[str, Any]
-    """Arrays `metrics` and `curvature`; fill values where they are damaged."""
+    tables: dict[str, Any]  # Arrays `metrics` and `curvature`; fill values where they are damaged
 
     def warn_of_damage(self, then: str) -> None:
         """Say how many designs are damaged, and what is wrong with the first of them."""
         if damaged := np.flatnonzero(self.status == DAMAGED).tolist():
-            what = (
-                f"{counted(len(damaged), 'design')} {'is' if len(damaged) == 1 else 'are'} damaged"
-            )
-            warn(f"{what}, first number {damaged[0]}: {self.messages[damaged[0]]}{then}")
+            first = f"first number {damaged[0]}: {self.messages[damaged[0]]}"
+            are = "is" if len(damaged) == 1 else "are"
+            warn(f"{counted(len(damaged), 'design')} {are} damaged, {first}{then}")
 
 
 def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] = ()) -> Contents:
@@ -317,14 +297,11 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
 
 def a_store(name: str, value: Any, allowed: str = "a path, a URL or a Zarr store") -> Any:
     """A place where an atlas may be."""
-    from zarr.abc.store import Store
-    from zarr.storage import StorePath
-
     if isinstance(value, str | os.PathLike):
-        return as_path(name, value)
+        return arguments.as_path(name, value)
     if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):
         return value  # a store in memory
-    return as_instance(name, value, (Store, StorePath), allowed)
+    return arguments.as_instance(name, value, (Store, StorePath), allowed)
 
 
 def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
@@ -346,11 +323,8 @@ def command_of(atlas: xr.Dataset) -> Command:
 
 def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, float, float]]:
     """Variable, lowest and highest value allowed, in SI units."""
-    written = {
-        written_name(str(name), unit): (str(name), unit)
-        for name, values in atlas.variables.items()
-        if (unit := values.attrs.get("units", "1"))
-    }
+    units = {str(name): x.attrs.get("units", "1") for name, x in atlas.variables.items()}
+    written = {written_name(name, unit): (name, unit) for name, unit in units.items() if unit}
     for text in where:
         given, sign, number = (*re.split("([<>]=?)", text, maxsplit=1), "", "")[:3]
         if (values := numbers_in(number, 1)) is None:
@@ -363,16 +337,15 @@ def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, floa
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
     for name in store.opened.digests.keys() - {*PER_DESIGN}:
         _ = store.array(name)[...]
-    numbers = range(store.command.space.size) if tips else ()
-    content = contents(store, tips_of=numbers)
+    content = contents(store, tips_of=range(store.command.space.size) if tips else ())
     return _counted(content.status, content.messages, tips)
 
 
 def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
     names = ("todo", "done", "failed", "gaps", "unstable", "damaged")  # in the order of the status
-    counts = dict(zip(names, np.bincount(status, minlength=len(names)).tolist(), strict=True))
-    verified = {"tips_verified": tips_verified, "messages": messages}
-    return AtlasStatus(designs=status.size, **counts, **verified)
+    counts: Any = zip(names, np.bincount(status, minlength=len(names)).tolist(), strict=True)
+    told = {"tips_verified": tips_verified, "messages": messages}
+    return AtlasStatus(designs=status.size, **dict(counts), **told)
 
 
 def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
@@ -381,8 +354,8 @@ def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
         raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
     if "design" in at:
         last = atlas.sizes["design"] - 1
-        return atlas.isel(design=as_integer("design", at["design"], 0, last))
-    place = {name: as_number(name, value) for name, value in at.items()}
+        return atlas.isel(design=arguments.as_integer("design", at["design"], 0, last))
+    place = {name: arguments.as_number(name, value) for name, value in at.items()}
     return atlas.sel(place, method="nearest")
 
 
@@ -401,10 +374,8 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
     content.warn_of_damage(f" ({then})")
     with storage_errors(f"{store.location} cannot be read"):
         raw = xr.open_zarr(store.opened.place, drop_variables=_READ_HERE, **READING)
-        coordinates: dict[str, Any] = {
-            "length": ((), space.length_range[0], {"units": "m"}),
-            **{name: raw[name] for name in space.names},
-        }
+        length = ((), space.length_range[0], {"units": "m"})
+        coordinates: dict[str, Any] = {"length": length} | {x: raw[x] for x in space.names}
     for variable in (raw, *raw.variables.values()):
         for name in (ARRAYS, DIGEST, OF):
             variable.attrs.pop(name, None)
@@ -423,8 +394,8 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     for index, message in content.messages.items():
         texts[index] = message
     variables: dict[str, Any] = {
-        "status": (dims, content.status.reshape(shape), STATUS),
-        "message": (dims, texts.reshape(shape), MESSAGE),
+        "status": (dims, content.status.reshape(shape), ABOUT["status"]),
+        "message": (dims, texts.reshape(shape), ABOUT["message"]),
     }
     done = np.isin(content.status, KNOWN).reshape(shape)
     for name, metrics in (("metrics", command.numbers), ("curvature", command.profiles)):
@@ -432,12 +403,8 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
             table = np.moveaxis(content.tables[name], len(dims), 0)[k]
             known = np.expand_dims(done, (*range(done.ndim, table.ndim),))
             values = np.where(known, table, np.nan)
-            variables[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
+            about: dict[str, Any] = {"units": metric.unit, "long_name": metric.meaning}
+            if Need.ALPHA in metric.needs:
+                about["alpha_over_length"] = command.alpha_over_length
+            variables[metric.name] = (*dims, *metric.over), values, about
     return variables
-
-
-def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
-    attrs: dict[str, Any] = {"units": metric.unit, "long_name": metric.meaning}
-    if Need.ALPHA in metric.needs:
-        attrs["alpha_over_length"] = command.alpha_over_length
-    return attrs

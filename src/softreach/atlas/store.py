@@ -1,60 +1,131 @@
 """The Zarr v3 store of an atlas: one chunk is one design, and its status is written last.
 
-No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
-and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
-is computed again, even if some of its chunks exist.
-
-The tasks of a job array may all create a store at once and be killed anywhere: its root, which
-holds the command and lists what describes the arrays, appears whole, and of several the first
-stays; then come the arrays, whose bytes do not depend on the writer. Stores are read and
-designs added only when all of them are there. Each array carries the digest of the command, so that
-the same command, and no other, writes a lost root again.
+The tasks of a job array may all create a store at once and be killed anywhere: chunks and the root,
+which holds the command and lists what describes the arrays, are whole or absent, and of several
+roots the first stays; then come the arrays, whose bytes do not depend on the writer. Each carries
+the digest of the command, so that the same command, and no other, writes a lost root again.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
+import zarr  # noqa: TID253  (imported where stores are)
 from numpy.typing import ArrayLike, NDArray
+from zarr.codecs import BloscCodec, Crc32cCodec  # noqa: TID253
+from zarr.errors import ContainsArrayError  # noqa: TID253
+from zarr.storage import LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
 
 from softreach.atlas.command import Command
-from softreach.atlas.layout import CUBE, MISSING, OF, PER_DESIGN, array_plans
+from softreach.atlas.metrics import Metric
 from softreach.sampling import sample_cube
+from softreach.schema import AXES
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, warn
+from softreach.support.files import stores
 from softreach.support.files.atomic import sync
-from softreach.support.files.stores import (
-    ARRAYS,
-    BLANK,
-    DIGEST,
-    ROOT,
-    Chunk,
-    DamagedStore,
-    Opened,
-    StoreFailed,
-    absolute,
-    opened_store,
-    place_of,
-    sealed,
-    sha256,
-    storage_errors,
-    writing,
-)
 
-if TYPE_CHECKING:
-    from zarr.storage import StoreLike, StorePath
-
-
+CUBE = "unit_activation"  # The array of activations that all designs share
+PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")  # Arrays whose chunks are designs
+OF = "command_sha256"  # Attribute of each array: digest of the command
+CUBE_DIGEST = "unit_activation_sha256"  # Attribute of the root: digest of the activations
 TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
 KNOWN = (DONE, UNSTABLE)  # The status of designs of which metrics are stored
+EXPLAINED = (FAILED, GAP, UNSTABLE)  # The status of designs that have a message
+_RESOLUTION = 1e-5  # step of stored tips over the shortest length: off by no more than half of it
+_MISSING = int(np.iinfo(np.int32).min)  # in place of a tip that is NaN, or not stored
+_CHUNK = 1 << 20  # numbers of a chunk that all designs share
+_OF_BOX = "place in the activation box of each design: 0 is its lower bound, 1 its upper"
+_CUBE = {"units": "1", "long_name": _OF_BOX}
+_STATION = {"units": "1", "long_name": "station Z before activation, over the design's length"}
+_FLAGS = "to_do done failed gap unstable damaged"
+_NUMBERS = {"flag_values": [0, 1, 2, 3, 4, 5], "flag_meanings": _FLAGS}
+ABOUT: dict[str, dict[str, Any]] = {
+    "status": {"long_name": "status of the design", **_NUMBERS},
+    "message": {"long_name": "why a design has no numbers"},
+}
 
-CUBE_DIGEST = "unit_activation_sha256"  # Attribute of the root: digest of the activations
+
+Plan = tuple[str, dict[str, Any], Any]
+"""Name of an array, options of Zarr's `create_array`, and values to write at once, if any."""
+
+
+def array_plans(command: Command) -> Iterator[Plan]:
+    """Every array of an atlas; activations are drawn, and others brought by designs."""
+
+    def labels(name: str, texts: Sequence[str]) -> Plan:
+        data = np.array(texts, dtype=np.dtypes.StringDType())
+        return plan(name, str, {name: len(data)}, {}, "", data)
+
+    space, numbers, profiles = command.space, command.numbers, command.profiles
+    plan, varied = partial(_plan, command), space.varied()
+    designs = dict(zip(space.dims, space.shape, strict=True))
+    for name, entries in space.parameters:
+        parameter, values = varied[name], np.array(entries)
+        about: dict[str, Any] = {"units": parameter.unit, "long_name": parameter.meaning}
+        about |= {"symbol": parameter.symbol, "part": parameter.owner}
+        dim = name if space.layout == "grid" else "design"
+        fill = 0 if values.dtype == int else np.nan
+        yield plan(name, values.dtype, {dim: len(values)}, about, fill, values)
+    yield labels("metric", [metric.name for metric in numbers])
+    yield labels("axis", AXES)
+    yield plan(CUBE, float, {"sample": command.n, "bundle": space.bundles}, _CUBE)
+    yield plan("status", np.uint8, designs, ABOUT["status"], 0)
+    yield plan("message", str, designs, ABOUT["message"], "")
+    if profiles:
+        yield labels("quantity", [metric.name for metric in profiles])
+        for name, values in (("station", command.stations), ("quantile", command.quantiles)):
+            about = _STATION if name == "station" else {"units": "1"}
+            yield plan(name, float, {name: len(values)}, about, data=np.array(values))
+        about = {"long_name": "metrics over stations and quantiles", "metrics": _meanings(profiles)}
+        sizes = designs | {"quantity": len(profiles)} | command.profile_sizes
+        yield plan("curvature", float, sizes, about)
+    if command.keep_clouds:  # as fixed-point numbers: half the size, and the same error everywhere
+        step = _RESOLUTION * space.length_range[0]
+        about = {"units": "m", "long_name": "tip position", "scale_factor": step}
+        about["_FillValue"] = _MISSING
+        sizes = designs | {"axis": len(AXES), "sample": command.n}
+        yield plan("tip", np.int32, sizes, about, _MISSING)
+    about = {"long_name": "metrics of the designs", "metrics": _meanings(numbers)}
+    about["alpha_over_length"] = command.alpha_over_length
+    yield plan("metrics", float, designs | {"metric": len(numbers)}, about)
+
+
+def _plan(
+    command: Command,
+    name: str,
+    dtype: Any,
+    sizes: dict[str, int],
+    attrs: dict[str, Any],
+    fill: Any = np.nan,
+    data: Any = None,
+) -> Plan:
+    """With codecs of the Zarr v3 core, which every reader has; a checksum comes last."""
+    if name in PER_DESIGN:
+        chunks = [1 if dim in command.space.dims else size for dim, size in sizes.items()]
+    else:
+        chunks = [min(size, _CHUNK) for size in sizes.values()]
+    options = {
+        "shape": tuple(sizes.values()),
+        "dtype": dtype,
+        "chunks": tuple(max(size, 1) for size in chunks),
+        "fill_value": fill,
+        "compressors": (Crc32cCodec(),),
+        "dimension_names": tuple(sizes),
+        "attributes": attrs | {OF: stores.sha256(command.to_json().encode())},
+    }
+    if name == "tip":  # activations are random bits, and the same bytes anywhere
+        blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
+        options["compressors"] = blosc, Crc32cCodec()
+    return name, options, data
+
+
+def _meanings(metrics: Sequence[Metric]) -> str:
+    return "; ".join(f"{metric.name} [{metric.unit}]: {metric.meaning}" for metric in metrics)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +134,7 @@ class AtlasStore:
 
     location: StoreLike
     command: Command
-    opened: Opened = field(repr=False)
+    opened: stores.Opened = field(repr=False)
     _arrays: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -71,21 +142,15 @@ class AtlasStore:
         """Create the store, or open one that the same command began, and mend what is damaged.
 
         Where it is durable, a power cut loses nothing that was written.
-
-        Raises:
-            InvalidInput: The place holds something else, or an atlas of another command, and how
-                that differs.
-            DamagedStore: Its root is damaged, and no array in it is of this command.
-            StoreFailed: It cannot be written to.
         """
-        location = absolute(location)
+        location = stores.absolute(location)
         opened = None
-        with writing(location):
-            with suppress(DamagedStore):
-                opened = opened_store(location, "atlas", "r+", durable=durable)
+        with stores.writing(location):
+            with suppress(stores.DamagedStore):
+                opened = stores.opened_store(location, "atlas", "r+", durable=durable)
             if opened is None:
                 _write_root(location, command, durable)
-                opened = opened_store(location, "atlas", "r+", durable=durable)
+                opened = stores.opened_store(location, "atlas", "r+", durable=durable)
         allowed = "a new folder, or an atlas; this one holds other files"
         opened, stored = _with_command(opened, location, allowed)
         if (begun := stored.softreach_version) != (now := command.softreach_version):
@@ -95,23 +160,17 @@ class AtlasStore:
             hint = f"this one differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
         store = cls(location, command, opened)  # this command has all functions
-        with writing(location), opened.noting():  # what is damaged counts as missing
+        with stores.writing(location), opened.noting():  # what is damaged counts as missing
             _complete(store)
         return store
 
     @classmethod
-    def open(
-        cls, location: StoreLike, mode: Literal["r", "r+"] = "r+", *, durable: bool = False
-    ) -> Self:
-        """Open an atlas, in mode "r" at a place that cannot be written to.
-
-        Raises:
-            InvalidInput: There is none, or of another version.
-            DamagedStore: Its root, or what describes an array, is damaged or missing.
-        """
-        location = absolute(location)
-        opened = opened_store(location, "atlas", mode, durable=durable)
-        why = f"it does not exist, or has no {ROOT}" if opened is None else "this is no atlas"
+    def open(cls, location: StoreLike, mode: stores.Mode = "r+", *, durable: bool = False) -> Self:
+        """Open an atlas, in mode "r" at a place that cannot be written to."""
+        location = stores.absolute(location)
+        opened = stores.opened_store(location, "atlas", mode, durable=durable)
+        lacks = f"it does not exist, or has no {stores.ROOT}"
+        why = lacks if opened is None else "this is no atlas"
         allowed = f"an atlas written by build_atlas; {why}"
         opened, command = _with_command(opened, location, allowed)
         opened.check_arrays()
@@ -133,7 +192,7 @@ class AtlasStore:
         status[[self.number(chunk) for chunk in noted]] = DAMAGED
         return status
 
-    def number(self, chunk: Chunk) -> int:
+    def number(self, chunk: stores.Chunk) -> int:
         """The design that a chunk belongs to."""
         shape = self.command.space.shape
         return int(np.ravel_multi_index((chunk.place or ())[: len(shape)], shape))
@@ -145,7 +204,7 @@ class AtlasStore:
     @cached_property
     def cube(self) -> Array:
         """Unit activations that all designs share, shape (n, bundles)."""
-        with storage_errors(f"{self.location} cannot be read"):
+        with stores.storage_errors(f"{self.location} cannot be read"):
             return np.asarray(self.array(CUBE)[...])
 
     def write(
@@ -161,7 +220,7 @@ class AtlasStore:
         Tips are NaN without equilibrium, and None if clouds are not kept.
         """
         place, command = self.command.space.place(index), self.command
-        with writing(self.location):
+        with stores.writing(self.location):
             self.array("metrics")[place] = np.array([metrics[m.name] for m in command.numbers])
             if command.profiles:
                 self.array("curvature")[place] = [metrics[m.name] for m in command.profiles]
@@ -173,7 +232,7 @@ class AtlasStore:
     def write_status(self, index: int, message: str, status: int = FAILED) -> None:
         """Store how a design ended, and why."""
         place = self.command.space.place(index)
-        with writing(self.location):
+        with stores.writing(self.location):
             self.array("message")[place] = np.array(message, dtype=np.dtypes.StringDType())
             self.array("status")[place] = status
 
@@ -181,12 +240,12 @@ class AtlasStore:
 def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     """Tips as whole multiples of the scale, shape (3, n); NaN as what fills missing ones."""
     steps = np.rint(tips.T / scale)
-    return np.where(np.isnan(steps), MISSING, steps).astype(np.int32)
+    return np.where(np.isnan(steps), _MISSING, steps).astype(np.int32)
 
 
 def _with_command(
-    opened: Opened | None, location: StoreLike, allowed: str
-) -> tuple[Opened, Command]:
+    opened: stores.Opened | None, location: StoreLike, allowed: str
+) -> tuple[stores.Opened, Command]:
     """A store and its command; what all designs share must be there from now on."""
     text = None if opened is None else opened.group.attrs.get("command")
     if opened is None or not isinstance(text, str):
@@ -196,10 +255,7 @@ def _with_command(
 
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
-    import zarr
-    from zarr.storage import LocalStore, WrapperStore
-
-    place = place_of(location, "r+")
+    place = stores.place_of(location, "r+")
     lost = _holds_arrays_of(command, place)
 
     class Root(WrapperStore):
@@ -209,7 +265,7 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
             return None
 
         async def set(self, key: str, value: Any) -> None:
-            value = type(value).from_bytes(sealed(value.to_bytes()))
+            value = type(value).from_bytes(stores.sealed(value.to_bytes()))
             if lost:
                 return await super().set(key, value)
             names = [name async for name in self.list_dir(key.rpartition("/")[0])]
@@ -221,30 +277,26 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
     attributes = _attributes(command)
     zarr.create_group(Root(place.store), path=place.path, zarr_format=3, attributes=attributes)
     if durable and isinstance(place.store, LocalStore):
-        sync(place.store.root / place.path / ROOT)
+        sync(place.store.root / place.path / stores.ROOT)
 
 
 def _holds_arrays_of(command: Command, place: StorePath) -> bool:
     """True if a store whose root is damaged or lost was begun by this command."""
-    import zarr
-
-    for plan in array_plans(command):
+    for name, _, _ in array_plans(command):
         with suppress(Exception):  # each kind of store has its own for what is missing or damaged
-            array = zarr.open_array(place / plan.name, mode="r", zarr_format=3)
-            return array.attrs[OF] == sha256(command.to_json().encode())
+            array = zarr.open_array(place / name, mode="r", zarr_format=3)
+            return array.attrs[OF] == stores.sha256(command.to_json().encode())
     return False
 
 
 def _attributes(command: Command) -> dict[str, Any]:
     """Attributes of the root, in which what describes the arrays is listed before it is written."""
-    import zarr
-    from zarr.storage import MemoryStore
-
     memory: dict[str, Any] = {}
     group = zarr.create_group(MemoryStore(memory), zarr_format=3)
-    plans = list(array_plans(command))
-    for plan in plans:
-        group.create_array(plan.name, **plan.options)
+    digests: dict[str, str] = {}
+    for name, options, _ in array_plans(command):
+        group.create_array(name, **options)
+        digests[name] = stores.sha256(memory[f"{name}/{stores.ROOT}"].to_bytes())
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
     return {
         "title": "reachability cloud atlas",
@@ -252,32 +304,29 @@ def _attributes(command: Command) -> dict[str, Any]:
         CUBE_DIGEST: drawn_cube(command)[1],
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),
-        ARRAYS: {p.name: sha256(memory[f"{p.name}/{ROOT}"].to_bytes()) for p in plans},
-        DIGEST: BLANK,
+        stores.ARRAYS: digests,
+        stores.DIGEST: stores.BLANK,
     }
 
 
 def _complete(store: AtlasStore) -> None:
     """Write what all designs share, and the gaps, where they lack or err."""
-    from zarr.errors import ContainsArrayError
-
-    for plan in array_plans(store.command):
+    for name, options, data in array_plans(store.command):
         with store.opened.noting() as noted:
-            there = plan.name in store.opened.group
-            if there and plan.name not in PER_DESIGN:
-                _ = store.array(plan.name)[...]
+            there = name in store.opened.group
+            if there and name not in PER_DESIGN:
+                _ = store.array(name)[...]
         if there and not noted:
             continue
         with suppress(ContainsArrayError):  # begun by another task, or only its values are lost
-            store.opened.group.create_array(plan.name, **plan.options)
-        data = plan.data
-        if plan.name == CUBE:
+            store.opened.group.create_array(name, **options)
+        if name == CUBE:
             data, drawn = drawn_cube(store.command)
             if drawn != store.opened.group.attrs[CUBE_DIGEST]:
                 other = "this machine draws other activations than the one that began it"
-                raise StoreFailed(f"{store.location}: {other}")
+                raise stores.StoreFailed(f"{store.location}: {other}")
         if data is not None:
-            store.array(plan.name)[...] = data
+            store.array(name)[...] = data
     gaps = store.command.space.gaps
     status = store.status() if gaps else np.empty(0)
     for index, reason in gaps.items():
@@ -288,4 +337,4 @@ def _complete(store: AtlasStore) -> None:
 def drawn_cube(command: Command) -> tuple[Array, str]:
     """The activations that the command draws on this machine, and their SHA-256."""
     cube = sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
-    return cube, sha256(np.ascontiguousarray(cube).tobytes())
+    return cube, stores.sha256(np.ascontiguousarray(cube).tobytes())

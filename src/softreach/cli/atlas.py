@@ -195,7 +195,7 @@ def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
 ) -> sr.DesignSpace:
     from softreach.arm.design_file import LONGEST
-    from softreach.atlas.space_file import parse_space
+    from softreach.atlas.space import parse_space
 
     if (path is None) == (vary is None):
         raise NotPossible("give either --vary or --space")
@@ -207,7 +207,7 @@ def _space_of(
 
 def grid_of(base: sr.Manipulator, vary: list[str]) -> sr.DesignSpace:
     """The grid that `--vary` asks for."""
-    from softreach.atlas.space_file import parse_parameter
+    from softreach.atlas.space import parse_parameter
 
     pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8")
     return sr.DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))

@@ -1,7 +1,5 @@
 """Definitions and clouds of other programs of the field, read and written."""
 
-from __future__ import annotations
-
 from softreach.exchange import activefilaments
 
 __all__ = ["activefilaments"]

@@ -1,7 +1,5 @@
 """Deviations of arms as they are made, and their effect to first order: theory (99)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -39,8 +37,7 @@ class Deviations:
 
     arm: Manipulator
     parameters: tuple[Parameter, ...]
-    sigmas: Array
-    """Standard deviation of each [its unit], shape (parameters,)."""
+    sigmas: Array  # Standard deviation of each [its unit], shape (parameters,)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -48,11 +45,7 @@ class Deviations:
         return tuple(parameter.name for parameter in self.parameters)
 
     def made(self, change: Array) -> Manipulator:
-        """The arm with changes of its parameters; parts that share one change alike.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """The arm with changes of its parameters; parts that share one change alike."""
         made = self.arm
         for parameter, amount in zip(self.parameters, change.tolist(), strict=True):
             if amount:
@@ -63,11 +56,7 @@ class Deviations:
 
 
 def deviations_of(arm: Manipulator, sigmas: Mapping[str, Any]) -> Deviations:
-    """Deviations of a design from standard deviations [SI units] by parameter.
-
-    Raises:
-        InvalidInput: None, an unknown parameter or one without a single value, or no σ >= 0.
-    """
+    """Deviations of a design from standard deviations [SI units] by parameter."""
     arm = a_manipulator("arm", arm)
     given = as_mapping("sigmas", sigmas, lambda name, x: as_number(f"sigmas {name}", x, _SIGMA))
     if not given:

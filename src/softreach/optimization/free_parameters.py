@@ -1,7 +1,5 @@
 """Free parameters of a search: ranges, choices, ties, and the arm with given values of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,8 +18,7 @@ from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.lazy import lazy
 from softreach.support.quantity import read_quantity
 
-Values = Mapping[str, float | str]
-"""Free parameter -> its value [SI unit], or the chosen name."""
+Values = Mapping[str, float | str]  # Free parameter -> its value [SI unit], or the chosen name
 
 BUNDLES, DESIGN, MATERIAL = "bundles", "design", "material"
 """Choices that are no parameters: how many bundles, which of several designs, of what material."""
@@ -38,16 +35,11 @@ class FreeParameter:
     """A number in a range, or a choice."""
 
     name: str
-    unit: str
-    """SI unit; "1" for none."""
-    low: float = np.nan
-    """Least value of a range."""
-    high: float = np.nan
-    """Largest value of a range."""
-    choices: tuple[float | str, ...] = ()
-    """Values to choose from, instead of a range."""
-    whole: bool = False
-    """It counts something."""
+    unit: str  # SI unit; "1" for none
+    low: float = np.nan  # Least value of a range
+    high: float = np.nan  # Largest value of a range
+    choices: tuple[float | str, ...] = ()  # Values to choose from, instead of a range
+    whole: bool = False  # It counts something
 
     @property
     def is_real(self) -> bool:
@@ -116,11 +108,7 @@ class FreeParameters:
         return np.array([(p.low, p.high) for p in self.real], float).reshape(-1, 2)
 
     def arm(self, values: Values) -> Manipulator:
-        """The design with these values, and what is tied to them.
-
-        Raises:
-            InvalidDesign: No such arm can exist, or some activation would shorten it to nothing.
-        """
+        """The design with these values and ties, checked for inputs that shorten it to nothing."""
         arm = self.bases[str(values[DESIGN])] if DESIGN in values else self.base
         for name, make in _CHOICES.items():
             if name in values:
@@ -164,13 +152,7 @@ def free_parameters(
     free: Mapping[str, Any],
     choices: Mapping[str, Sequence[Any]] | None = None,
 ) -> FreeParameters:
-    """Free parameters from what a user gives to `search`.
-
-    Raises:
-        InvalidInput: An unknown parameter, a range that is reversed, empty or beyond what the
-            parameter may be, a choice without values, or a tie to what is not free.
-        NotPossible: Choices of bundles of an actuator without an offset.
-    """
+    """Free parameters from what a user gives to `search`."""
     bases = as_mapping("base", base, a_manipulator) if isinstance(base, Mapping) else {}
     bases = bases or {"": a_manipulator("base", base)}
     given = as_mapping("free", free, lambda _, value: value)
@@ -284,5 +266,4 @@ def _of_material(arm: Manipulator, name: Any) -> Manipulator:
 
 _CHOICES = {BUNDLES: _with_bundles, MATERIAL: _of_material}
 _WORDS = (*_CHOICES, DESIGN)
-NAMED_CHOICES = tuple(_CHOICES)
-"""Choices that are no parameters."""
+NAMED_CHOICES = tuple(_CHOICES)  # Choices that are no parameters

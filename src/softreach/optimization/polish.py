@@ -1,11 +1,10 @@
 """A design made better from where it stands: quadratic programs on exact derivatives (SLSQP)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,8 @@ from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, no_warnings
+
+Floors = Sequence[float]
 
 _MOST_POSES = 60  # that move with the design
 _ITERATIONS = 30
@@ -44,24 +45,18 @@ def can_polish(problem: Problem) -> bool:
 @parallel.undivided()
 @no_warnings()
 def polished(
-    problem: Problem,
-    start: Candidate,
-    designs: int,
-    goal: int,
-    floors: Sequence[float],
-    accuracy: float | None = None,
+    problem: Problem, start: Candidate, most: int, turn: tuple[int, Floors], accuracy: float
 ) -> Candidate:
     """The local optimum of one goal next to a design; poses at the targets move along with it.
 
-    The costs of the other goals do not exceed the `floors`; the relative error of volumes is that
-    of coarse sets unless another `accuracy` is given. Returned is the better of both ends, with the
-    number of designs that were made: none for a start that is too far from what is required.
+    In `turn` is a goal, by its number, and the largest costs of the others; `accuracy` is the
+    relative error of volumes. Returned is the better of both ends, with the number of designs that
+    were made: none for a start that is too far from what is required.
     """
     if start.excess > _HOPELESS:
         return replace(start, designs=0)
-    accuracy = accuracy or problem.coarse
-    kept = len(_BACK) * (start.is_feasible and designs >= _AMPLE)
-    program = _Program(problem, start, accuracy, goal, floors, designs - kept)
+    kept = len(_BACK) * (start.is_feasible and most >= _AMPLE)
+    program = _Program(problem, start, accuracy, *turn, most - kept)
     try:
         end = program.optimum()
         candidate = problem.judged(program.values_of(end), program.point(end).design.case)
@@ -69,7 +64,7 @@ def polished(
         if start.is_feasible and not candidate.is_feasible:
             # A program that was cut, or stalled, ends a little outside of what is required.
             low, high = (problem.parameters.reals(each.values) for each in (candidate, start))
-            for back in _BACK[: max(designs - spent, 0)]:
+            for back in _BACK[: max(most - spent, 0)]:
                 values = problem.parameters.moved(start.values, low + back * (high - low))
                 again = problem.judged(values, problem.case(values, accuracy))
                 spent += 1
@@ -101,10 +96,9 @@ class _Program:
     start: Candidate
     accuracy: float
     goal: int
-    floors: Sequence[float] = ()
+    floors: Floors = ()
     most: int = MOST_DESIGNS
-    designs: int = 0
-    """Designs made so far."""
+    designs: int = 0  # Designs made so far
     accepted: Array = field(default_factory=lambda: np.empty(0))
     """Unknowns at which the last quadratic program was set up."""
     _shape: tuple[int, ...] = (0, 0)  # of the poses
@@ -141,16 +135,10 @@ class _Program:
                 constraints.append({"type": kind, "fun": fun, "jac": jac})
         # A cost that changes by less, over that of the start, is that of the end.
         options = {"maxiter": _ITERATIONS, "ftol": _TOLERANCE * self.accuracy * _GENTLE}
+        ends: Any = {"bounds": [(0.0, 1.0)] * len(first), "constraints": constraints}
+        slsqp = partial(minimize, method="SLSQP", options=options, **ends)
         try:
-            end = minimize(
-                self._cost,
-                first,
-                jac=self._cost_slope,
-                bounds=[(0.0, 1.0)] * len(first),
-                constraints=constraints,
-                method="SLSQP",
-                options=options,
-            ).x
+            end = slsqp(self._cost, first, jac=self._cost_slope).x
         except _Spent:
             end, self.accepted = self.accepted, np.empty(0)
         return np.clip(end, 0.0, 1.0) if np.isfinite(end).all() else first

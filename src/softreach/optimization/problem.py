@@ -1,7 +1,5 @@
 """Problem of a search: goals and requirements, and how a design is judged by them."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math
@@ -9,43 +7,36 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 
 from softreach.arm.body import mass
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metric import Metric, MetricFailed
-from softreach.atlas.metrics import known_metric
+from softreach.atlas.metrics import Metric, MetricFailed, known_metric
+from softreach.cloud import compute_cloud
+from softreach.cloud.dexterity import dexterity
+from softreach.cloud.redundancy import activation_distance
 from softreach.optimization.free_parameters import FreeParameters, Values
 from softreach.requirements.checks import Check, Sets, checked, sets_to
 from softreach.requirements.findings import quick_excess
 from softreach.requirements.requirements import Requirements
+from softreach.stiffness import principal_compliances, tip_compliance
 from softreach.support.arguments import as_given, as_names
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean, no_warnings
 from softreach.support.lazy import lazy
+from softreach.workspace import ReachableSet
 from softreach.workspace.measure import Estimate
+from softreach.workspace.payload import payload_curve
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from softreach.workspace import ReachableSet
-
-SETS = {
-    "exact_volume": "volume",
-    "exact_convex_volume": "convex_volume",
-    "exact_unreachability": "unreachability",
-}
+SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachability")}
 """Goals and measures of the reachable set, and what they are called there."""
-
-NEAR = 0.1
-"""Relative distance within which objectives at the ends of polishes agree."""
-
+NEAR = 0.1  # Relative distance within which objectives at the ends of polishes agree
+Names = str | Metric | Sequence[str | Metric]
 Fidelity = Literal["bounds", "coarse", "full"]
 """A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
-
 _COARSE, _FINE = 1 << 12, 1 << 15  # samples of the cloud of coarse and of fine cases
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
@@ -57,10 +48,8 @@ class DesignCase:
 
     arm: Manipulator
     requirements: Requirements
-    accuracy: float
-    """Relative error of volumes."""
-    fine: bool = True
-    """Clouds have as many samples as numbers that are reported need."""
+    accuracy: float  # Relative error of volumes
+    fine: bool = True  # Clouds have as many samples as numbers that are reported need
 
     @lazy
     def reached(self) -> ReachableSet:
@@ -81,10 +70,8 @@ class DesignCase:
 
     @lazy
     @no_warnings()
-    def cloud(self) -> xr.Dataset:
+    def cloud(self) -> Any:
         """Samples of the activation box."""
-        from softreach.cloud import compute_cloud
-
         return compute_cloud(self.arm, self.samples, sampler="sobol")
 
     @property
@@ -97,11 +84,6 @@ class DesignCase:
         """Intermediate results behind metrics of the atlas."""
         reached = partial(self.set_of, self.arm)
         return Intermediates.of_one(self.arm, self.samples, self.accuracy, reached)
-
-    @no_warnings()
-    def metric(self, metric: Metric) -> float:
-        """A metric of the atlas."""
-        return float(metric.value(self.intermediates, {}))
 
 
 @dataclass(frozen=True)
@@ -122,8 +104,7 @@ class Goal(NamedTuple):
     """An objective, and whether it is to be large or small."""
 
     objective: Objective
-    sense: float
-    """1 to maximize, -1 to minimize."""
+    sense: float  # 1 to maximize, -1 to minimize
 
     @property
     def name(self) -> str:
@@ -136,11 +117,7 @@ class Goal(NamedTuple):
         return value if math.isfinite(value.value) else Estimate(math.nan)
 
 
-def goals(
-    maximize: str | Metric | Sequence[str | Metric],
-    minimize: str | Metric | Sequence[str | Metric],
-    requirements: Requirements,
-) -> tuple[Goal, ...]:
+def goals(maximize: Names, minimize: Names, requirements: Requirements) -> tuple[Goal, ...]:
     """Objectives with their senses, in the order in which names or metrics are given.
 
     Those about targets or regions are refused where the requirements have none.
@@ -171,13 +148,11 @@ def known_objective(word: str, given: str | Metric) -> Objective:
         raise InvalidInput(word, as_given(given), allowed, hint)
     if metric.over:
         raise InvalidInput(word, metric.name, "a single number, no profile along the arm")
-    return _rough(metric.name, metric.unit, metric.meaning, lambda c: Estimate(c.metric(metric)))
+    compute = no_warnings()(lambda case: Estimate(float(metric.value(case.intermediates, {}))))
+    return _rough(metric.name, metric.unit, metric.meaning, compute)
 
 
-def _rough(
-    name: str, unit: str, meaning: str, compute: Callable[[DesignCase], Estimate]
-) -> Objective:
-    return Objective(name, unit, meaning, compute, smooth=False)
+_rough = partial(Objective, smooth=False)
 
 
 def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
@@ -185,9 +160,8 @@ def _of_set(name: str) -> Callable[[DesignCase], Estimate]:
 
 
 def _coverage(case: DesignCase) -> Estimate:
-    covered = case.check.coverages
-    shares, errors = [each.share for each in covered], [each.error for each in covered]
-    return Estimate(float(np.mean(shares)), float(np.mean(errors)))
+    shares = [(each.share, each.error) for each in case.check.coverages]
+    return Estimate(*np.mean(shares, axis=0).tolist())
 
 
 def _effort(total: Callable[[Array], float]) -> Callable[[DesignCase], Estimate]:
@@ -197,35 +171,22 @@ def _effort(total: Callable[[Array], float]) -> Callable[[DesignCase], Estimate]
 def _sampled(values: Any) -> Estimate:
     """Mean of values over samples of the activation box, and its standard error."""
     known = np.asarray(values, float)
-    known = known[np.isfinite(known)]
-    if not len(known):
-        return Estimate(math.nan)
-    return Estimate(float(known.mean()), float(known.std() / math.sqrt(len(known))))
-
-
-def _dexterity(case: DesignCase) -> xr.Dataset:
-    from softreach.cloud.dexterity import dexterity
-
-    return dexterity(case.cloud)
+    if count := len(known := known[np.isfinite(known)]):
+        return Estimate(float(known.mean()), float(known.std() / math.sqrt(count)))
+    return Estimate(math.nan)
 
 
 def _activation_distance(case: DesignCase) -> Estimate:
-    from softreach.cloud.redundancy import activation_distance
-
     radius = _RADIUS * case.arm.length
     return _sampled(activation_distance(case.cloud, radius, queries=min(4096, case.samples)))
 
 
 def _compliance(case: DesignCase) -> Estimate:
-    from softreach.stiffness import principal_compliances, tip_compliance
-
     gamma = case.cloud.activation.values[:256]
     return _sampled(principal_compliances(tip_compliance(case.arm, gamma)).values[:, 0])
 
 
 def _payload(case: DesignCase) -> Estimate:
-    from softreach.workspace.payload import payload_curve
-
     accuracy = max(case.accuracy, 0.01)
     most = payload_curve(case.arm, [], accuracy=accuracy).largest_payload(_SHARE, accuracy=accuracy)
     return Estimate(most.payload, most.payload_error)
@@ -242,21 +203,19 @@ _OBJECTIVES = (
         "manipulability",
         "m3/input3",
         "mean √det(J Jᵀ) over the box",
-        lambda case: _sampled(_dexterity(case).manipulability),
+        lambda case: _sampled(dexterity(case.cloud).manipulability),
     ),
     _rough(
         "dexterity",
         "1",
         "mean of 1 / condition of J over the box",
-        lambda case: _sampled(1.0 / _dexterity(case).condition),
+        lambda case: _sampled(1.0 / dexterity(case.cloud).condition),
     ),
     _rough("activation_distance", "input", "mean D̄ within L/10", _activation_distance),
     _rough("payload", "kg", "payload under which 80 % of the volume is left", _payload),
     _rough("compliance", "m/N", "mean of the largest compliance of the tip", _compliance),
     Objective("mass", "kg", "mass of the arm", lambda case: Estimate(mass(case.arm), 0.0)),
-    Objective(
-        "actuators", "1", "number of inputs", lambda case: Estimate(float(case.arm.inputs), 0.0)
-    ),
+    Objective("actuators", "1", "number of inputs", lambda case: Estimate(case.arm.inputs, 0.0)),
 )
 OBJECTIVES = {each.name: each for each in _OBJECTIVES}
 """Objectives by name, beside the metrics of the atlas."""
@@ -307,10 +266,8 @@ class Problem:
     parameters: FreeParameters
     requirements: Requirements
     goals: tuple[Goal, ...]
-    accuracy: float
-    """Relative error of volumes that are reported."""
-    coarse: float
-    """Relative error of volumes on the way."""
+    accuracy: float  # Relative error of volumes that are reported
+    coarse: float  # Relative error of volumes on the way
 
     @cached_property
     def digest(self) -> str:
@@ -325,12 +282,6 @@ class Problem:
         }
         text = json.dumps(record, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
-
-    @property
-    def is_finer_on_finer_sets(self) -> bool:
-        """True if reachable sets decide, so that what is best depends on their accuracy."""
-        names = {goal.name for goal in self.goals} | {*self.requirements.measures}
-        return bool(self.requirements.regions) or not names.isdisjoint(SETS)
 
     def case(self, values: Values, accuracy: float) -> DesignCase:
         """The design with these values, to be asked to a relative error of volumes."""
@@ -395,11 +346,9 @@ class Problem:
         feasible = [each for each in every if each.is_feasible]
         if not feasible or len(self.goals) < 2:
             return [min(feasible or every, key=self.score)] if every else []
-        costs = np.array([self.costs(each) for each in feasible])
-
-        def is_beaten(k: int) -> bool:
-            no_worse, better = (costs <= costs[k]).all(axis=1), (costs < costs[k]).any(axis=1)
-            return bool((no_worse & better).any() or (costs[:k] == costs[k]).all(axis=1).any())
-
-        kept = (k for k in range(len(costs)) if not is_beaten(k))
+        costs, kept = np.array([self.costs(each) for each in feasible]), []
+        for k, own in enumerate(costs):
+            is_beaten = (costs <= own).all(axis=1) & (costs < own).any(axis=1)
+            if not (is_beaten.any() or (costs[:k] == own).all(axis=1).any()):
+                kept.append(k)
         return [feasible[k] for k in sorted(kept, key=lambda k: tuple(costs[k]))]

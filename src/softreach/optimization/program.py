@@ -1,7 +1,5 @@
 """Design and poses as one smooth program: values and derivatives at one place of the unknowns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -22,11 +20,8 @@ from softreach.support.lazy import lazy
 from softreach.workspace.gradient import VolumeGradient, boundary_samples, gradient_of
 from softreach.workspace.tip_derivatives import TipDerivatives
 
-OF_ARM: dict[str, Callable[[Manipulator], float]] = {
-    "mass": mass,
-    "load_number": load_number,
-    "actuators": lambda arm: float(arm.inputs),
-}
+OF_ARM: dict[str, Callable[[Manipulator], float]] = {"mass": mass, "load_number": load_number}
+OF_ARM["actuators"] = lambda arm: float(arm.inputs)
 _TOL = 1e-7  # of tips at the targets, in L
 STEP = 1e-4  # of a range, or of the unit cube, for what is differentiated by differences
 _PLACES = 8192  # of a region, whose share is covered
@@ -39,8 +34,7 @@ class DesignPoint:
     problem: Problem
     values: Values
     accuracy: float
-    like: Sequence[TipMap] = ()
-    """Tip maps of a design nearby, in as many steps."""
+    like: Sequence[TipMap] = ()  # Tip maps of a design nearby, in as many steps
 
     @lazy
     def case(self) -> DesignCase:
@@ -155,6 +149,18 @@ _POWER = 40  # of the mean that stands for the largest effort
 _NOWHERE = 10.0  # L: a tip without a stable equilibrium
 
 
+@dataclass(frozen=True)
+class Part:
+    """Equations or inequalities of one requirement, differentiated when they are used first."""
+
+    name: str  # Of the requirement
+    value: Array  # Shape (n,)
+    slope: Callable[[], Array]  # Makes the derivatives by all unknowns, shape (n, unknowns)
+    within: float = 0.0  # Distance to a place that is allowed, over L
+    scale: float = 1.0  # Of what the requirement allows, per unit of the value
+    unit: str = ""  # Unit of that; "" for that of the limit or measure
+
+
 @dataclass(eq=False)
 class Point:
     """A design with its poses: cost, equations and inequalities, each with all derivatives.
@@ -165,8 +171,7 @@ class Point:
 
     design: DesignPoint
     reals: Array
-    poses: Array
-    """Shape (payloads · places, free inputs)."""
+    poses: Array  # Shape (payloads · places, free inputs)
     goal: int
     floors: Sequence[float]
 
@@ -191,7 +196,7 @@ class Point:
     def inequalities(self) -> tuple[Part, ...]:
         """Quantities kept above 0: limits, measures, regions, other goals."""
         near = (_near_place(part) for part in self._tips if part.within > 0.0)
-        return (*near, *self._rules(), *self._shares(), *self._of_design(), *self._other_goals())
+        return (*near, *self._rules(), *self._of_design())
 
     @property
     def _size(self) -> int:
@@ -300,15 +305,14 @@ class Point:
                 slope[place, near, at] = ((ahead - behind) / apart)[place]
         return slope
 
-    def _shares(self) -> Iterator[Part]:
-        for target, region in self.design.problem.requirements.regions:
+    def _of_design(self) -> Iterator[Part]:
+        """Shares of regions, measures and limits of the design, and the costs of other goals."""
+        needs, goals = self.design.problem.requirements, self.design.problem.goals
+        for target, region in needs.regions:
             for number in range(len(self.design.rods)):
                 share = self.design.share(number, region)
                 slope = partial(self.design.share_slope, number, region)
                 yield self._limit(target.name, -1.0, share, target.share, slope)
-
-    def _of_design(self) -> Iterator[Part]:
-        needs = self.design.problem.requirements
         limits = [
             (name, sense, limit)
             for name, ends in needs.measures.items()
@@ -319,6 +323,12 @@ class Point:
         for name, sense, limit in limits + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
             slope = partial(self.design.slope, name)
             yield self._limit(name, sense, self.design.value(name), limit, slope)
+        for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
+            if k != self.goal:
+                scale = abs(floor) or 1.0
+                value = np.array([(floor - self._cost(goal)) / scale])
+                slope = partial(lambda g, s: -self._cost_slope(g)[None] / s, goal, scale)
+                yield Part(goal.name, value, slope, scale=scale)
 
     def _limit(
         self, name: str, sense: float, value: float, limit: float, derived: Callable[[], Array]
@@ -334,33 +344,6 @@ class Point:
         room = np.array([sense * (limit - value) / scale - _SPARE])
         return Part(name, room, slope, scale=scale)
 
-    def _other_goals(self) -> Iterator[Part]:
-        goals = self.design.problem.goals
-        for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
-            if k != self.goal:
-                scale = abs(floor) or 1.0
-                value = np.array([(floor - self._cost(goal)) / scale])
-                slope = partial(lambda g, s: -self._cost_slope(g)[None] / s, goal, scale)
-                yield Part(goal.name, value, slope, scale=scale)
-
-
-@dataclass(frozen=True)
-class Part:
-    """Equations or inequalities of one requirement, differentiated when they are used first."""
-
-    name: str
-    """Of the requirement."""
-    value: Array
-    """Shape (n,)."""
-    slope: Callable[[], Array]
-    """Makes the derivatives by all unknowns, shape (n, unknowns)."""
-    within: float = 0.0
-    """Distance to a place that is allowed, over L."""
-    scale: float = 1.0
-    """Of what the requirement allows, per unit of the value."""
-    unit: str = ""
-    """Unit of that; "" for that of the limit or measure."""
-
 
 def stacked(parts: Sequence[Part]) -> Array:
     """All values, shape (n,)."""
@@ -374,16 +357,10 @@ def stacked_slopes(parts: Sequence[Part]) -> Array:
 
 def _near_place(part: Part) -> Part:
     """Room on both sides along each axis in a cube within the distance that is allowed."""
-    half = _ROOM * part.within / np.sqrt(3.0)
+    half, scale = _ROOM * part.within / np.sqrt(3.0), part.scale * np.sqrt(3.0) / _ROOM
     value = np.concatenate([half - part.value, half + part.value])
-    scale = part.scale * np.sqrt(3.0) / _ROOM
-    return Part(
-        part.name,
-        value,
-        lambda: np.concatenate([-part.slope(), part.slope()]),
-        scale=scale,
-        unit=part.unit,
-    )
+    slope = partial(lambda of: np.concatenate([-of(), of()]), part.slope)
+    return Part(part.name, value, slope, scale=scale, unit=part.unit)
 
 
 def _room(rules: PoseRules, cube: Array) -> Array:

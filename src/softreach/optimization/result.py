@@ -38,10 +38,6 @@ if TYPE_CHECKING:
 _AT_END = 1e-3  # of a range
 _FOUND = "# Found by a search of softreach"
 _FILES = ("best.toml", "front.csv", "candidates.csv", "report.html")
-_PICTURE = (
-    "Designs that were judged, in their order or by their objectives, and the free parameters "
-    "of the best in their ranges."
-)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -241,9 +237,8 @@ class Search(Reported):
                 if path.name not in names and path.read_text("utf-8").startswith(_FOUND):
                     path.unlink()
         for name, every in (("front.csv", False), ("candidates.csv", True)):
-            write_table(
-                place / name, self.table(every=every, unit=unit or "m"), overwrite=overwrite
-            )
+            table = self.table(every=every, unit=unit or "m")
+            write_table(place / name, table, overwrite=overwrite)
         self.report(unit).save(place / "report.html", overwrite=overwrite)
 
     def _design_text(self, each: Candidate) -> str:
@@ -297,6 +292,8 @@ class Search(Reported):
         shown = arm.length_unit if unit is None else as_unit(unit, arm.length)
         missed = sorted((x for x in self.findings if not x.met), key=lambda each: -each.excess)
         fault = self.best.fault.splitlines()[:1] if self.best.fault else map(str, missed)
+        head = ("requirement", "", "of the best design")
+        rows = [(each.name, each.word, each.text) for each in self.findings]
         try:
             design = self.arm.to_toml()
         except SoftreachError as error:
@@ -305,19 +302,10 @@ class Search(Reported):
             title="Search of designs",
             verdict=_verdict(self),
             state=self.verdict,
-            facts=[
-                f"{counted(self.designs, 'design')}, {self.seconds:.1f} s",
-                *_remarks(self),
-                *fault,
-            ],
+            facts=[*_remarks(self), *fault],
             sections=[
                 _best(self, shown),
-                Section(
-                    title="Requirements",
-                    head=("requirement", "", "of the best design"),
-                    rows=[(each.name, each.word, each.text) for each in self.findings],
-                    printed=0,
-                ),
+                Section(title="Requirements", head=head, rows=rows, printed=0),
                 *_front(self, shown),
                 Section(title="Pictures", figures=lambda: _figures(self, shown)),
                 Section(title="Provenance", rows=[*self.provenance.items()], printed=0),
@@ -360,8 +348,20 @@ def check_folder(folder: Path, *, overwrite: bool) -> None:
 def _best(search: Search, unit: LengthUnit) -> Section:
     pairs = zip(search.goals, search.best.objectives, strict=bool(search.best.objectives))
     rows = [(_goal_text(goal), _value_text(goal, value, unit), "") for goal, value in pairs]
-    rows += _parameter_rows(search, unit)
-    ends = ", ".join(f"{name} at its {end} end" for name, end in search.at_ends.items())
+    values, at_ends, parameters = search.best.values, search.at_ends, search.problem.parameters
+    free = {parameter.name: parameter for parameter in parameters.free}
+    for name, each in free.items():
+        if each.choices:
+            reach = f"one of {', '.join(_number_text(each, x, unit) for x in each.choices)}"
+        else:
+            low = each.low / readable_unit(each.unit, each.high, unit)[1]
+            reach = f"{low:.5g} to {readable(each.high, each.unit, unit)}"
+        end = f", at its {at_ends[name]} end" if name in at_ends else ""
+        rows.append((name, _number_text(each, values[name], unit) + end, reach))
+    for tie in parameters.ties:
+        value = tie.factor * float(values[tie.of]) + tie.constant
+        rows.append((tie.name, _number_text(free[tie.of], value, unit), f"follows {tie.of}"))
+    ends = ", ".join(f"{name} at its {end} end" for name, end in at_ends.items())
     note = f"At an end of their range: {ends}. A wider range may be better." if ends else ""
     return Section(title="Best design", head=("number", "best", "range"), rows=rows, note=note)
 
@@ -402,28 +402,13 @@ def _value_text(goal: Goal, value: Estimate, unit: LengthUnit) -> str:
     return readable(value.value, goal.objective.unit, unit, value.error)
 
 
-def _parameter_rows(search: Search, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
-    values, ends, parameters = search.best.values, search.at_ends, search.problem.parameters
-    free = {parameter.name: parameter for parameter in parameters.free}
-    for name, each in free.items():
-        if each.choices:
-            reach = f"one of {', '.join(_number_text(each, x, unit) for x in each.choices)}"
-        else:
-            low = each.low / readable_unit(each.unit, each.high, unit)[1]
-            reach = f"{low:.5g} to {readable(each.high, each.unit, unit)}"
-        end = f", at its {ends[name]} end" if name in ends else ""
-        yield name, _number_text(each, values[name], unit) + end, reach
-    for tie in parameters.ties:
-        value = tie.factor * float(values[tie.of]) + tie.constant
-        yield tie.name, _number_text(free[tie.of], value, unit), f"follows {tie.of}"
-
-
 def _number_text(parameter: FreeParameter, value: float | str, unit: LengthUnit) -> str:
     return value if isinstance(value, str) else readable(value, parameter.unit, unit)
 
 
 def _remarks(search: Search) -> Iterator[str]:
     problem, judged = search.problem, search.judged
+    yield f"{counted(search.designs, 'design')}, {search.seconds:.1f} s"
     ways = [f"{judged['bounds']} by bounds alone"] if judged["bounds"] else []
     ways += [f"{judged['coarse']} on coarse sets (to {problem.coarse:g})"] * bool(judged["coarse"])
     ways.append(f"{judged['full']} to full accuracy ({problem.accuracy:g})")
@@ -441,7 +426,9 @@ def _figures(search: Search, unit: LengthUnit) -> Iterator[tuple[Any, str]]:
     from softreach.plot.arm import plot_check
     from softreach.plot.results import plot_search
 
-    yield plot_search(search, unit=unit), _PICTURE
+    judged = "Designs that were judged, in their order or by their objectives"
+    best = "the free parameters of the best in their ranges"
+    yield plot_search(search, unit=unit), f"{judged}, and {best}."
     if search.problem.requirements.targets or search.problem.requirements.keeps:
         with suppress(SoftreachError):  # nothing holds it under its loads
             caption = "The best design at the places that it must reach."

@@ -1,7 +1,5 @@
 """Searches as people write them: a file of requirements with a table `[search]`, units in keys."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import unknown_parameter
 from softreach.arm.written import Written
-from softreach.atlas.space_file import flat_keys
+from softreach.atlas.space import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.problem import goals, known_objective
 from softreach.optimization.study import SAMPLERS
@@ -55,16 +53,14 @@ def read_search(
     ```
 
     What is `given` by the same keys goes before the table; paths in the text start from `folder`.
-
-    Raises:
-        InvalidDesign: All faults, of the requirements too, in the words of the file.
+    All faults are named at once, of the requirements too, in the words of the file.
     """
     try:
         document = tables_of(text)
     except ValueError:
         document = {}  # for which the requirements are refused
-    reader = _Reader(document, given or {}, folder, design_from)
-    bases = reader.bases()
+    reader = _Reader(document, given or {})
+    bases = reader.bases(folder, design_from)
     if bases:
         reader.parameters(bases)
     lengths = {arm.length for arm in bases.values()}
@@ -86,22 +82,15 @@ def read_search(
 class _Reader(FaultReader):
     """Reads the table, and what was given beside it."""
 
-    def __init__(
-        self,
-        document: Mapping[str, Any],
-        given: Mapping[str, Any],
-        folder: Path,
-        design_from: Callable[[str], Manipulator],
-    ) -> None:
+    def __init__(self, document: Mapping[str, Any], given: Mapping[str, Any]) -> None:
         super().__init__()
         self.free: dict[str, Any] = {}
         self.choices: dict[str, Any] = {}
-        self._folder, self._design_from, self._given = folder, design_from, given
-        self._raw = self._table(document, "search")
+        self._given, self._raw = given, self._table(document, "search")
         self._check_keys(self._raw, "search", _KEYS)
         self._raw |= {key: self._table(self._raw, key, "search.") for key in _TABLES}
 
-    def bases(self) -> dict[str, Manipulator]:
+    def bases(self, folder: Path, load: Callable[[str], Manipulator]) -> dict[str, Manipulator]:
         """Designs to vary by what they are called; none where none can be read."""
         of_file = "design" not in self._given
         path, value = self._value("design")
@@ -113,9 +102,9 @@ class _Reader(FaultReader):
             self._refuse(path, value, "must be different designs, one or more")
         bases = {}
         for name in names:
-            file = self._folder / name
+            file = folder / name
             place = str(file) if of_file and file.is_file() else name
-            bases[name] = self._tried(path, name, partial(self._design_from, place))
+            bases[name] = self._tried(path, name, partial(load, place))
         return {name: arm for name, arm in bases.items() if arm is not WRONG}
 
     def parameters(self, bases: Mapping[str, Manipulator]) -> None:

@@ -1,7 +1,5 @@
 """Search for the best designs: spread, polish, sample where it pays, judge the best again."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,23 +10,15 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.metric import Metric
+from softreach.atlas.metrics import Metric
 from softreach.optimization.free_parameters import free_parameters
 from softreach.optimization.polish import MOST_DESIGNS, can_polish, polished
-from softreach.optimization.problem import Candidate, Problem, goals
+from softreach.optimization.problem import SETS, Candidate, Problem, goals
 from softreach.optimization.result import Search
-from softreach.optimization.study import SAMPLERS, Sampler, Study
+from softreach.optimization.study import Sampler, Study
 from softreach.requirements.requirements import Requirements
 from softreach.support import parallel
-from softreach.support.arguments import (
-    as_flag,
-    as_function,
-    as_instance,
-    as_integer,
-    as_number,
-    as_one_of,
-    as_path,
-)
+from softreach.support.arguments import as_flag, as_function, as_instance, as_integer, as_number
 from softreach.support.arrays import Array
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES
@@ -67,12 +57,11 @@ def search(
     """The designs that meet requirements and are best in one objective or in several.
 
     A design is judged by bounds first, which prove in a millisecond what it cannot do, then on
-    coarse sets. The first quarter of the designs is spread evenly over all ranges and choices; the
-    best of them are polished by quadratic programs on exact derivatives, in which the poses at the
-    targets move along with the design; then a sampler of Optuna (CMA-ES for numbers, TPE where
-    there are choices, NSGA-II for several objectives) looks where it pays, and the best of what it
-    finds are polished again. What is reported was computed again to full accuracy, the best
-    polished there once more.
+    coarse sets. The first quarter is spread evenly over all ranges and choices; the best are
+    polished by quadratic programs on exact derivatives, in which the poses at the targets move
+    along; then a sampler of Optuna (CMA-ES for numbers, TPE where there are choices, NSGA-II for
+    several objectives) looks where it pays, and the best of what it finds are polished again. What
+    is reported was computed again to full accuracy, the best polished there once more.
 
     Args:
         base: The design to vary, or several by name, one of which is chosen.
@@ -88,10 +77,8 @@ def search(
         designs: Number of designs that are looked at, with those of polishes.
         accuracy: Relative error of the volumes that are reported.
         polish: Whether designs are polished, where objectives have derivatives.
-        sampler: Sampler of Optuna: "cma", "tpe", "nsga2", "nsga3", "sobol", "random"; "auto"
-            chooses.
-        seed: Of the first designs and of the sampler: the same seed, the same result, whatever the
-            number of threads.
+        sampler: Of Optuna: "cma", "tpe", "nsga2", "nsga3", "sobol", "random"; "auto" chooses.
+        seed: Of the first designs and of the sampler; the number of threads changes no result.
         storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
             same call goes on where it was interrupted, and ends as if it had not been. Searches of
             other seeds may share it, and each ends with the best of all.
@@ -110,29 +97,21 @@ def search(
     as_instance("requirements", needs, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, ACCURACIES)
     targets = goals(maximize, minimize, needs)
-    problem = Problem(
-        parameters=free_parameters(base, free, choices),
-        requirements=needs,
-        goals=targets,
-        accuracy=accuracy,
-        coarse=min(_COARSER * accuracy, max(accuracy, _COARSEST)),
-    )
+    parameters = free_parameters(base, free, choices)
+    errors = {"accuracy": accuracy, "coarse": min(_COARSER * accuracy, max(accuracy, _COARSEST))}
+    problem = Problem(parameters=parameters, requirements=needs, goals=targets, **errors)
     seed = as_integer("seed", seed, 0, 2**31)
     designs = as_integer("designs", designs, 1, 1_000_000)
     first = max(min(designs, 4 * len(problem.parameters)), int(_FIRST_SHARE * designs))
     follow = (lambda _: None) if follow is None else as_function("follow", follow)
-    study = Study(
-        problem,
-        storage=None if storage is None else as_path("storage", storage),
-        sampler=as_one_of("sampler", sampler, SAMPLERS),
-        seed=seed,
-        first=first,
-    )
+    study = Study(problem, storage=storage, sampler=sampler, seed=seed, first=first)
     polishes = as_flag("polish", polish) and can_polish(problem)
-    progress = as_progress(progress)
-    last = polishes and (len(targets) > 1 or problem.is_finer_on_finer_sets)
+    asked = {*needs.measures, *(goal.name for goal in targets)}
+    by_sets = bool(needs.regions) or not asked.isdisjoint(SETS)  # what is best depends on accuracy
+    last = polishes and (len(targets) > 1 or by_sets)
     kept = min(_MOST_LAST, int(_LAST_SHARE * designs)) if last else 0
-    return _Run(problem, study, designs, kept, polishes, follow, progress).result(first)
+    run = _Run(problem, study, designs, kept, polishes, follow, as_progress(progress))
+    return run.result(first)
 
 
 @dataclass(eq=False)
@@ -205,9 +184,9 @@ class _Run:
         most = min(MOST_DESIGNS, self._left // max(1, len(starts)))
         tasks = []
         for k, start in enumerate(starts):
-            goal, floors = self._turn(start, k)
-            what = ["polish", dict(start.values), most, goal, floors]
-            make = partial(polished, self.problem, start, most, goal, floors)
+            turn = self._turn(start, k)
+            what = ["polish", dict(start.values), most, *turn]
+            make = partial(polished, self.problem, start, most, turn, self.problem.coarse)
             tasks.append(partial(self._study.judged, what, make))
         for candidate, is_new in parallel.in_order(tasks):
             if candidate.designs:
@@ -256,7 +235,18 @@ class _Run:
 
     def _at_full_accuracy(self, candidates: Sequence[Candidate]) -> list[Candidate]:
         """The best, polished on finer sets and judged as they are reported: none by bounds."""
-        problem, known = self.problem, self._beyond_bounds(candidates)
+        problem = self.problem
+        # What bounds prove of a design is less than it misses: where no design meets all, those of
+        # which they prove less than the best misses are judged as the others are.
+        known = [each for each in candidates if each.fidelity != "bounds"]
+        least = min((each.excess for each in known if not each.fault), default=np.inf)
+        bounds = [each for each in candidates if each.fidelity == "bounds" and not each.fault]
+        waiting = sorted(bounds, key=problem.score)
+        while waiting and waiting[0].excess < least:
+            values, waiting = [each.values for each in waiting[:_BATCH]], waiting[_BATCH:]
+            tasks = (partial(self._judged, each, bounds=False) for each in values)
+            known += (judged := list(parallel.in_order(tasks)))
+            least = min([least, *(each.excess for each in judged if not each.fault)])
         best = problem.front(known)
         if len(problem.goals) < 2 or not (best and best[0].is_feasible):
             finite = [each for each in known if np.isfinite(each.excess)]
@@ -264,23 +254,6 @@ class _Run:
         left = min(MOST_DESIGNS, self._designs - self._spent)
         if self._polishes and left >= _LEAST_OF_POLISH:
             turn = self._turn(best[0])
-            best.append(end := polished(problem, best[0], left, *turn, problem.accuracy))
+            best.append(end := polished(problem, best[0], left, turn, problem.accuracy))
             self._spent += end.designs
         return [problem.judge(each.values, fine=True) for each in best]
-
-    def _beyond_bounds(self, candidates: Sequence[Candidate]) -> list[Candidate]:
-        """Candidates without those that bounds discard.
-
-        What bounds prove of a design is less than it misses: where no design meets all, those of
-        which they prove less than the best misses are judged as the others are.
-        """
-        known = [each for each in candidates if each.fidelity != "bounds"]
-        least = min((each.excess for each in known if not each.fault), default=np.inf)
-        bounds = [each for each in candidates if each.fidelity == "bounds" and not each.fault]
-        waiting = sorted(bounds, key=self.problem.score)
-        while waiting and waiting[0].excess < least:
-            values, waiting = [each.values for each in waiting[:_BATCH]], waiting[_BATCH:]
-            tasks = (partial(self._judged, each, bounds=False) for each in values)
-            known += (judged := list(parallel.in_order(tasks)))
-            least = min([least, *(each.excess for each in judged if not each.fault)])
-        return known

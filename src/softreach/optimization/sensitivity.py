@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from softreach.atlas.metric import MetricFailed
+from softreach.atlas.metrics import MetricFailed
 from softreach.optimization.polish import point_of
 from softreach.optimization.problem import SETS, Candidate, Problem
 from softreach.optimization.program import Point, stacked_slopes
@@ -117,13 +117,12 @@ class Sensitivity:
                 if np.isfinite(value):
                     lines.append(f"  by {name}: {quantity(value, per, error)}")
             if (share := self.variance[k]) is not None:
-                order = np.argsort(-share.total, kind="stable")
-                each = ", ".join(
-                    f"{self.parameters[j]} {share.first[j]:.2f} ± {share.first_error[j]:.2f} "
-                    f"({share.total[j]:.2f} ± {share.total_error[j]:.2f})"
-                    for j in order
-                )
-                lines.append(f"  variance alone (in all): {each}")
+                each = []
+                for j in np.argsort(-share.total, kind="stable"):
+                    alone = f"{share.first[j]:.2f} ± {share.first_error[j]:.2f}"
+                    total = f"{share.total[j]:.2f} ± {share.total_error[j]:.2f}"
+                    each.append(f"{self.parameters[j]} {alone} ({total})")
+                lines.append(f"  variance alone (in all): {', '.join(each)}")
         for each in self.multipliers:
             per = f"{self.goal_units[0]} per {each.unit or 'unit'}"
             lines.append(f"decides: {each.name}, {each.value:.4g} {per}")
@@ -201,21 +200,15 @@ def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
     for k, goal in enumerate(problem.goals):
         if goal.objective.smooth and len(widths):
             point = point_of(problem, candidate, problem.accuracy, k)
-            values[k], errors[k] = -goal.sense * _with_poses(point) / widths, 0.0
+            slope, of_poses = np.split(point.cost_slope, [len(widths)])
+            equations, moves = np.split(_equations(point), [len(widths)], axis=1)
+            if len(equations) and np.any(of_poses):  # poses keep the tips where they are
+                slope = slope + np.linalg.lstsq(moves.T, -of_poses, rcond=None)[0] @ equations
+            values[k], errors[k] = -goal.sense * slope / widths, 0.0
             if goal.name in SETS:
                 error = getattr(point.design.sets, f"{SETS[goal.name]}_error")
                 errors[k] = error @ np.abs(point.design.chain) / widths
     return values, errors
-
-
-def _with_poses(point: Point) -> Array:
-    """Slope of the cost by the reals, while poses keep the tips where they are."""
-    count, slope = len(point.reals), point.cost_slope
-    equations = _equations(point)
-    if not len(equations) or not np.any(slope[count:]):
-        return slope[:count]
-    forces = np.linalg.lstsq(equations[:, count:].T, -slope[count:], rcond=None)[0]
-    return slope[:count] + forces @ equations[:, :count]
 
 
 def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multiplier, ...], float]:

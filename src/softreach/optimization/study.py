@@ -1,7 +1,5 @@
 """Study of a search: designs from Optuna's samplers, in a storage from which it resumes."""
 
-from __future__ import annotations
-
 import json
 import math
 import warnings
@@ -9,25 +7,22 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import Candidate, Problem
+from softreach.support.arguments import as_one_of, as_path
 from softreach.support.errors import InvalidInput, check_installed, in_short
+from softreach.support.files.atomic import StrPath
 from softreach.support.lazy import lazy
-
-if TYPE_CHECKING:
-    import optuna
 
 Sampler = Literal["auto", "cma", "tpe", "nsga2", "nsga3", "sobol", "random"]
 SAMPLERS: tuple[str, ...] = get_args(Sampler)
 
 _NAME = "softreach"
-_MISSED = 1e12
-"""Cost of a design that misses requirements by 1: more than any objective has, as only the order
-matters to the samplers."""
+_MISSED = 1e12  # cost of a design that misses requirements by 1: more than any objective has
 _NEVER = 1e15  # cost of what cannot exist
 _WARM = 10  # designs that CMA-ES begins from at least: the best tenth of them must be one or more
 _JUDGED, _KEY, _PROBLEM = "judged", "asked", "problem"
@@ -41,21 +36,22 @@ class Study:
     """
 
     def __init__(
-        self, problem: Problem, *, storage: str | None, sampler: str, seed: int, first: int
+        self, problem: Problem, *, storage: StrPath | None, sampler: str, seed: int, first: int
     ) -> None:
         """Open the storage, if there is one; the first designs are spread evenly."""
+        place = None if storage is None else as_path("storage", storage)
         self.problem, self._first = problem, first
-        self._sampler, self.seed = sampler, seed
+        self._sampler, self.seed = as_one_of("sampler", sampler, SAMPLERS), seed
         self.candidates: list[Candidate] = []
         """All designs that were judged, in their order."""
         self._kept: dict[str, Candidate] = {}  # in the storage, by what was asked
         self._asked: set[str] = set()
         self._seen = 0  # trials of the storage that were read
-        self._lock = Lock()
-        self._optuna = _library()
+        self._lock, self._optuna = Lock(), _library()
+        self._number = max(1, len(problem.goals))  # of values of a trial
         with _quiet():
             self._study = self._created(None)
-            self._storage = None if storage is None else self._opened(storage)
+            self._storage = None if place is None else self._opened(place)
             for values in first_designs(problem, first, seed):
                 self._study.enqueue_trial(dict(values))
 
@@ -109,36 +105,37 @@ class Study:
         params = dict(candidate.values)
         for each in self.problem.parameters.real:
             params[each.name] = float(np.clip(float(params[each.name]), each.low, each.high))
-        return self._optuna.trial.create_trial(
-            params=params,
-            distributions=self._space,
-            values=self._costs(candidate),
-            user_attrs=attributes,
-        )
+        known = {"values": self._costs(candidate), "user_attrs": attributes}
+        return self._optuna.trial.create_trial(params=params, distributions=self._space, **known)
 
     def focus(self) -> None:
         """Let a sampler that begins at one place begin where the best of the known designs are."""
         if self.kind != "cma" or len(self.candidates) < _WARM:
             return
         complete = (self._optuna.trial.TrialState.COMPLETE,)
+        options = {"n_startup_trials": 0, "warn_independent_sampling": False}
+        make = self._optuna.samplers.CmaEsSampler
         with _quiet():
-            self._study.sampler = self._optuna.samplers.CmaEsSampler(
-                source_trials=self._study.get_trials(states=complete),
-                n_startup_trials=0,
-                seed=self.seed + 1,
-                warn_independent_sampling=False,
-            )
+            trials = self._study.get_trials(states=complete)
+            self._study.sampler = make(source_trials=trials, seed=self.seed + 1, **options)
 
-    def _created(self, storage: Any) -> optuna.Study:
-        return self._optuna.create_study(
-            study_name=_NAME,
-            storage=storage,
-            directions=["minimize"] * max(1, len(self.problem.goals)),
-            sampler=self._made_sampler(),
-            load_if_exists=True,
-        )
+    def _created(self, storage: Any) -> Any:
+        samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
+        population = {"population_size": max(8, min(self._first, 48))}
+        after = {"multivariate": True, "constant_liar": True, "n_startup_trials": self._first}
+        make, options = {
+            "cma": (samplers.CmaEsSampler, quiet),
+            "tpe": (samplers.TPESampler, after),
+            "nsga2": (samplers.NSGAIISampler, population),
+            "nsga3": (samplers.NSGAIIISampler, population),
+            "sobol": (samplers.QMCSampler, {"scramble": True, **quiet}),
+            "random": (samplers.RandomSampler, {}),
+        }[self.kind]
+        sampler, directions = make(seed=self.seed, **options), ["minimize"] * self._number
+        known = {"storage": storage, "sampler": sampler, "directions": directions}
+        return self._optuna.create_study(study_name=_NAME, load_if_exists=True, **known)
 
-    def _opened(self, place: str) -> optuna.Study:
+    def _opened(self, place: str) -> Any:
         digest = self.problem.digest
         try:
             study = self._created(_storage(place))
@@ -165,20 +162,6 @@ class Study:
         real = all(each.is_real for each in self.problem.parameters.free)
         return "cma" if real and len(self.problem.parameters) > 1 else "tpe"
 
-    def _made_sampler(self) -> Any:
-        samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
-        population = {"population_size": max(8, min(self._first, 48))}
-        after = {"multivariate": True, "constant_liar": True, "n_startup_trials": self._first}
-        make, options = {
-            "cma": (samplers.CmaEsSampler, quiet),
-            "tpe": (samplers.TPESampler, after),
-            "nsga2": (samplers.NSGAIISampler, population),
-            "nsga3": (samplers.NSGAIIISampler, population),
-            "sobol": (samplers.QMCSampler, {"scramble": True, **quiet}),
-            "random": (samplers.RandomSampler, {}),
-        }[self.kind]
-        return make(seed=self.seed, **options)
-
     @lazy
     def _space(self) -> dict[str, Any]:
         kinds, space = self._optuna.distributions, {}
@@ -198,20 +181,18 @@ class Study:
         missed = min(_MISSED * (1.0 + candidate.excess), _NEVER)
         if candidate.fidelity == "bounds":  # what is missed is no less: worse than all judged
             missed += 0.5 * _NEVER
-        return [missed] * max(1, len(self.problem.goals))
+        return [missed] * self._number
 
 
 def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
     """Designs evenly spread over all ranges and choices, after the one that the user has."""
     from scipy.stats import qmc
 
-    start = problem.parameters.start()
-    if start is not None:
+    if (start := problem.parameters.start()) is not None:
         yield start
     free = problem.parameters.free
     sampler = qmc.Sobol(len(free), rng=np.random.default_rng(seed))
-    cube = sampler.random(1 << max(0, math.ceil(math.log2(max(count, 1)))))[:count]
-    for place in cube:
+    for place in sampler.random_base2(math.ceil(math.log2(max(count, 1))))[:count]:
         yield {each.name: each.at(float(x)) for each, x in zip(free, place, strict=True)}
 
 
@@ -226,7 +207,7 @@ def _storage(place: str) -> Any:
         raise InvalidInput("storage", place, "a file in a folder that exists")
     is_new = not path.exists() or not path.stat().st_size
     is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
-    if not is_new and not (_is_own_database(path) if is_database else _is_own_journal(path)):
+    if not is_new and not _is_of_a_search(path, is_database=is_database):
         raise InvalidInput("storage", place, "a new file, or that of a search: choose another name")
     if is_database:
         return f"sqlite:///{path}"
@@ -244,20 +225,17 @@ def _storage(place: str) -> Any:
     return JournalStorage(JournalFileBackend(str(path)))
 
 
-def _is_own_database(path: Path) -> bool:
+def _is_of_a_search(path: Path, *, is_database: bool) -> bool:
     import sqlite3
 
-    with suppress(sqlite3.Error):
-        place = f"{path.absolute().as_uri()}?mode=ro"
-        with closing(sqlite3.connect(place, uri=True)) as database:
-            names = database.execute("SELECT study_name FROM studies").fetchall()
-        return set(names) <= {(_NAME,)}
-    return False
-
-
-def _is_own_journal(path: Path) -> bool:
-    with suppress(ValueError, KeyError, TypeError), path.open("rb") as file:
-        first = json.loads(file.readline(4096))
+    with suppress(sqlite3.Error, ValueError, KeyError, TypeError):
+        if is_database:
+            place = f"{path.absolute().as_uri()}?mode=ro"
+            with closing(sqlite3.connect(place, uri=True)) as database:
+                names = database.execute("SELECT study_name FROM studies").fetchall()
+            return set(names) <= {(_NAME,)}
+        with path.open("rb") as file:
+            first = json.loads(file.readline(4096))
         return first["op_code"] == 0 and first["study_name"] == _NAME
     return False
 

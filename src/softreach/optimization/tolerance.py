@@ -79,10 +79,9 @@ def tolerance(
     To first order the boundary of the reachable set moves along its normal by σ_n, the root of the
     sum of (σ ∂r/∂p · n)²: the share of the set that is kept is 1 - ∮ σ_n dA / (√(2π) V) in the
     mean, theory (99). Its quantile is that of samples of the deviations; a place at a depth d
-    within the boundary is kept with the probability Φ(d / σ_n). Beside a sharp rim that is too
-    much, as only the nearer of both sheets counts. Nothing of this is taken on trust: arms are
-    really made with the first of these samples, their sets are compared, and places are searched
-    for from all solutions of the design.
+    within the boundary is kept with the probability Φ(d / σ_n), less beside a sharp rim, where
+    only the nearer of both sheets counts. To check this, arms are really made with the first of
+    these samples, their sets are compared, and places are searched for from all solutions.
 
     Args:
         arm: The design, of three free bundles or more.
@@ -199,33 +198,25 @@ class Tolerance:
             f"volume          {self.volume}",
             f"unreachability  {self.unreachability}",
             *(f"{each.name} covered  {each}" for each in self.regions),
-            *(_target_text(each) for each in self.targets),
         ]
+        for target in self.targets:
+            count, least = len(target.probability), int(target.probability.argmin())
+            text = f"{100 * target.probability[least]:.3g} %"
+            if np.isfinite(share := target.made[least]):
+                error = 100 * target.made_error[least]
+                text += f" (of arms made {100 * share:.3g} ± {error:.2g} %)"
+            which = f" at place {least + 1} of {count:,}, the least likely" if count > 1 else ""
+            lines.append(f"{target.name} reached  {text}{which}")
         order = np.argsort(-self.costs, kind="stable")
         each = ", ".join(f"{self.parameters[k]} {100 * self.costs[k]:.2g} %" for k in order[:6])
         return "\n  ".join([*lines, f"lost by each alone  {each}"])
 
 
-def _target_text(target: TargetTolerance) -> str:
-    least = int(target.probability.argmin())
-    text = f"{100 * target.probability[least]:.3g} %"
-    made = target.made[least]
-    if np.isfinite(made):
-        text += f" (of arms made {100 * made:.3g} ± {100 * target.made_error[least]:.2g} %)"
-    count = len(target.probability)
-    which = f" at place {least + 1} of {count:,}, the least likely" if count > 1 else ""
-    return f"{target.name} reached  {text}{which}"
-
-
 def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
     """Numbers to first order, and of arms that are made with the first of the changes."""
     deviations = first.deviations
-    spreads = [
-        first.kept(),
-        first.of_set("volume", "m3", 1.0),
-        first.of_set("unreachability", "1", -1.0),
-        *(first.covered(*region) for region in first.regions),
-    ]
+    of_set = first.of_set("volume", "m3", 1.0), first.of_set("unreachability", "1", -1.0)
+    spreads = [first.kept(), *of_set, *(first.covered(*region) for region in first.regions)]
     made: list[tuple[list[float], list[Mask]]] = []
     errors = np.zeros(len(spreads))
     if checked:
@@ -269,8 +260,7 @@ class _Followed(NamedTuple):
 
     near: Array
     away: Array
-    share: float
-    """Share of the volume near the boundary."""
+    share: float  # Share of the volume near the boundary
 
     @classmethod
     def of(cls, first: FirstOrder, seed: int) -> _Followed:

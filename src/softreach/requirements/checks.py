@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.requirements.advice import advice
 from softreach.requirements.findings import (
     Finding,
     Verdict,
+    advice,
     design_limits,
     limit_finding,
     measure_findings,
@@ -44,8 +44,7 @@ _LEAST_PLACES = 64  # in a region to be covered
 _MOST_PLACES = 100_000
 _ROUGH_TOL = 1e-4  # of tips on the way of a search, in L
 
-Sets = Callable[[Manipulator], ReachableSet]
-"""Reachable sets of a design and of it under payloads."""
+Sets = Callable[[Manipulator], ReachableSet]  # Reachable sets of a design and of it under payloads
 
 
 class Coverage(NamedTuple):
@@ -134,8 +133,7 @@ class Check(Reported):
         Returns:
             As `configuration` has them; None where there are no places.
         """
-        count = min(as_integer("count", count, 0), len(self.places))
-        if not count:
+        if not (count := min(as_integer("count", count, 0), len(self.places))):
             return None
         rows = np.unique(np.linspace(0, len(self.places) - 1, count).round().astype(int))
         arm = with_payload(self.arm, self.payloads[-1])
@@ -153,15 +151,14 @@ class Check(Reported):
         counts = counts or [f"met, all {len(own)}"]
         space = 9 if "undecided" in own else 6
         rows = [(f.word.ljust(space), f.name, f.text) for f in self.findings]
-        caption = "The arm at the places that it must reach."
-        drawn = partial(plot_check, self, unit=unit)
+        caption, drawn = "The arm at the places that it must reach.", partial(plot_check, self)
         return Report(
             title="Requirements of an arm",
             verdict=f"Requirements of an arm of {unit.text(self.arm.length)}: {'; '.join(counts)}",
             state=self.verdict,
             sections=[
                 Section(title="Requirements", rows=rows, printed=max(1, len(rows))),
-                Section(title="Picture", figures=lambda: [(drawn().figure, caption)]),
+                Section(title="Picture", figures=lambda: [(drawn(unit=unit).figure, caption)]),
                 Section(title="The design", text=self.arm.to_toml()),
                 Section(title="The requirements", text=self.requirements.to_toml()),
             ],
@@ -241,9 +238,8 @@ def check(
     needs = as_instance("requirements", requirements, Requirements, "Requirements")
     accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.2))
     if not (needs.targets or needs.keeps or needs.limits.given or needs.measures):
-        raise NotPossible(
-            "the requirements are empty: add a target, a region to keep to, a limit or a measure"
-        )
+        hint = "add a target, a region to keep to, a limit or a measure"
+        raise NotPossible(f"the requirements are empty: {hint}")
     return checked(arm, needs, accuracy, step=as_progress(progress))
 
 
@@ -282,7 +278,7 @@ def checked(
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
         posed.append(solved(rules, needs.places, needs.within, step, quick=quick))
         for target, region in needs.regions:
-            share = float(_is_covered(rules, target, region.places(count), sets, step).mean())
+            share = float(_covered(rules, target, region.places(count), sets, step).mean())
             error = float(share_error(share, count))
             coverages.append(Coverage(target.name, payload, share, error, count))
     whole = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
@@ -298,9 +294,7 @@ def checked(
     return replace(made, findings=findings)
 
 
-def _is_covered(
-    rules: PoseRules, target: Target, places: Array, sets: Sets, step: Progress
-) -> Mask:
+def _covered(rules: PoseRules, target: Target, places: Array, sets: Sets, step: Progress) -> Mask:
     if len(rules):
         posed = solved(rules, places, np.full(len(places), target.within), step)
         near = max(target.within, TOL * rules.arm.length)
@@ -367,10 +361,8 @@ def _cover_findings(made: Check) -> Iterator[Finding]:
         # Where every place is reached that was tried, no share is left to be in doubt.
         error = worst.error if worst.share < 1.0 else 0.0
         verdict = verdict_of(worst.share - target.share, error)
-        text = (
-            f"{100 * worst.share:.2f} ± {100 * worst.error:.2g} % covered of at least "
-            f"{100 * target.share:.4g} %{_under(worst.payload)}"
-        )
+        covered = f"{100 * worst.share:.2f} ± {100 * worst.error:.2g} % covered"
+        text = f"{covered} of at least {100 * target.share:.4g} %{_under(worst.payload)}"
         yield Finding(target.name, "cover", verdict, max(target.share - worst.share, 0.0), text)
 
 

@@ -1,7 +1,5 @@
 """Parts of requirements as frozen values: targets to reach, regions to keep to, limits."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from typing import Literal
@@ -10,23 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.requirements.regions import Region
-from softreach.support.arguments import (
-    as_flag,
-    as_given,
-    as_instance,
-    as_integer,
-    as_number,
-    as_one_of,
-    as_text,
-)
+from softreach.support import arguments
 from softreach.support.arrays import Array, as_points, read_only
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.files.text import MEGABYTE
 
-MOST_PLACES = 1_000_000
-"""Places that all targets may have together."""
-LONGEST = 64 * MEGABYTE
-"""Bytes that a file of requirements may have."""
+MOST_PLACES = 1_000_000  # Places that all targets may have together
+LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
 
 _NOT_NEGATIVE = Range(0.0)
 _LENGTH = Range(0.0, unit="m")
@@ -56,21 +44,21 @@ class Target:
 
     def __post_init__(self) -> None:
         if (self.places is None) == (self.region is None):
-            raise InvalidInput("places", as_given(self.places), "given, or else a region")
+            raise InvalidInput("places", arguments.as_given(self.places), "given, or else a region")
         if self.places is not None:
             places = as_points("places", self.places)
             if not 0 < len(places) <= MOST_PLACES:
                 raise InvalidInput("places", f"{len(places):,}", f"from 1 to {MOST_PLACES:,}")
             object.__setattr__(self, "places", read_only(places.copy()))
         else:
-            region = as_instance("region", self.region, Region, _REGION)
+            region = arguments.as_instance("region", self.region, Region, _REGION)
             if not np.isfinite(region.volume):
                 raise InvalidInput("region", region, "bounded: a half-space has no end")
-        object.__setattr__(self, "share", as_number("share", self.share, _SHARE))
+        object.__setattr__(self, "share", arguments.as_number("share", self.share, _SHARE))
         if self.region is None and self.share != 1.0:
             raise InvalidInput("share", self.share, "left out where there is no region")
-        object.__setattr__(self, "within", as_number("within", self.within, _LENGTH))
-        as_text("name", self.name)
+        object.__setattr__(self, "within", arguments.as_number("within", self.within, _LENGTH))
+        arguments.as_text("name", self.name)
 
     @property
     def points(self) -> Array:
@@ -103,12 +91,13 @@ class Keep:
     """Name in results."""
 
     def __post_init__(self) -> None:
-        as_instance("region", self.region, Region, _REGION)
-        as_flag("inside", self.inside)
-        as_one_of("of", self.of, ("tip", "arm"))
-        as_one_of("when", self.when, ("targets", "always"))
-        object.__setattr__(self, "clearance", as_number("clearance", self.clearance, _LENGTH))
-        as_text("name", self.name)
+        arguments.as_instance("region", self.region, Region, _REGION)
+        arguments.as_flag("inside", self.inside)
+        arguments.as_one_of("of", self.of, ("tip", "arm"))
+        arguments.as_one_of("when", self.when, ("targets", "always"))
+        clearance = arguments.as_number("clearance", self.clearance, _LENGTH)
+        object.__setattr__(self, "clearance", clearance)
+        arguments.as_text("name", self.name)
 
     @property
     def kind(self) -> str:
@@ -155,10 +144,10 @@ class Limits:
     def __post_init__(self) -> None:
         for name, value in self.given.items():
             if name == "actuators":
-                as_integer(name, value, 0, 1_000_000)
+                arguments.as_integer(name, value, 0, 1_000_000)
                 continue
             allowed = Range(0.0, 1.0) if name == "shortening" else _NOT_NEGATIVE
-            object.__setattr__(self, name, as_number(name, value, allowed))
+            object.__setattr__(self, name, arguments.as_number(name, value, allowed))
 
     @property
     def given(self) -> dict[str, float]:
@@ -172,10 +161,6 @@ class Limits:
 
 
 _OF_POSES = ("shortening", "force", "pressure", "stroke", "bending")
-LIMIT_UNITS = dict.fromkeys((field.name for field in dataclasses.fields(Limits)), "") | {
-    "force": "N",
-    "pressure": "Pa",
-    "stroke": "m",
-    "mass": "kg",
-}
+_UNITS = {"force": "N", "pressure": "Pa", "stroke": "m", "mass": "kg"}
+LIMIT_UNITS = {field.name: _UNITS.get(field.name, "") for field in dataclasses.fields(Limits)}
 """Limit -> its SI unit."""

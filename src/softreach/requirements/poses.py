@@ -1,11 +1,9 @@
 """Poses of an arm: judged by regions and limits, and those chosen for places to reach."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -48,10 +46,8 @@ class Judged(NamedTuple):
 
     value: Array
     """Distances by which regions are missed [m], negative where kept to; values of limits."""
-    excess: Array
-    """Excess over L, or over the limit; 0 where nothing is missed, shape (n, rule)."""
-    error: Array
-    """Largest possible addition between the stations looked at, shape (n, rule)."""
+    excess: Array  # Excess over L, or over the limit; 0 where nothing is missed, shape (n, rule)
+    error: Array  # Largest possible addition between the stations looked at, shape (n, rule)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +57,7 @@ class PoseRules:
     arm: Manipulator
     keeps: tuple[Keep, ...]
     limits: dict[str, float]
-    tolerance: float
-    """Error that is allowed in how far a region is missed [m]."""
+    tolerance: float  # Error that is allowed in how far a region is missed [m]
     known_rod: TipMap | None = None
     """Tip map of the arm, if it is to be another than to the usual tolerance."""
 
@@ -76,7 +71,7 @@ class PoseRules:
     def __len__(self) -> int:
         return len(self.keeps) + len(self.limits)
 
-    def some(self, columns: Index) -> PoseRules:
+    def some(self, columns: Index) -> Self:
         """Some of the rules, by their columns."""
         keeps = tuple(self.keeps[k] for k in columns if k < len(self.keeps))
         limits = list(self.limits.items())
@@ -169,10 +164,8 @@ class PoseRules:
 class Body(NamedTuple):
     """Sections of an arm in poses, at stations."""
 
-    center: Array
-    """Shape (n, station, 3) [m]."""
-    tangent: Array
-    """Shape (n, station, 3)."""
+    center: Array  # Shape (n, station, 3) [m]
+    tangent: Array  # Shape (n, station, 3)
     radius: Array
     """Of what is widest before activation, body, tendons and the disks that hold these, shape
     (n, station) [m]."""
@@ -182,14 +175,19 @@ class Body(NamedTuple):
     bulge: Array
     """Farthest that the body bulges between two sections from the straight line between their
     points [m], shape (n, station - 1)."""
-    lost: Mask
-    """Poses without an arm, shape (n,)."""
+    lost: Mask  # Poses without an arm, shape (n,)
 
     @classmethod
-    def of(cls, rod: TipMap, gamma: Array, parts: int) -> Body:
+    def of(cls, rod: TipMap, gamma: Array, parts: int) -> Self:
         """The sections between so many parts."""
         z = np.linspace(0.0, rod.length, parts + 1)
-        frames, strains, radius = rod.frames(gamma, z), rod.strains(gamma, z), _widest(rod.arm, z)
+        frames, strains = rod.frames(gamma, z), rod.strains(gamma, z)
+        radius = rod.arm.profile.radius(z)
+        if rod.arm.bundles:
+            outline = rod.arm.outline(z)
+            held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
+            held = held[2:] | held[1:-1] | held[:-2]
+            radius = radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
         turn = np.linalg.norm(strains.curvature, axis=2) * np.maximum(strains.extension, 1.0)
         speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z))
         step = rod.length / parts
@@ -222,17 +220,6 @@ class Body(NamedTuple):
         bound = np.maximum(between.max(axis=1), seen)
         seen[lost] = bound[lost] = np.nan
         return seen, bound
-
-
-def _widest(arm: Manipulator, z: Array) -> Array:
-    """Radius of what is farthest from the axis, body or bundles, at ascending stations Z [m]."""
-    radius = arm.profile.radius(z)
-    if not arm.bundles:
-        return radius
-    outline = arm.outline(z)
-    held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
-    held = held[2:] | held[1:-1] | held[:-2]
-    return radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
 
 
 class Posed(NamedTuple):

@@ -1,7 +1,5 @@
 """Regions of space, in the world: boxes, spheres, half-spaces and closed meshes."""
 
-from __future__ import annotations
-
 import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -16,25 +14,15 @@ from numpy.typing import ArrayLike
 
 from softreach.geometry.surface import enclosed_volume
 from softreach.kernels.points.triangles import nearest_faces
-from softreach.support import parallel
+from softreach.support import arrays, parallel
 from softreach.support.arguments import POSITIVE, as_integer, as_number, as_path
-from softreach.support.arrays import (
-    Array,
-    Index,
-    as_directions,
-    as_faces,
-    as_floats,
-    as_points,
-    check_finite,
-    read_only,
-)
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
 from softreach.support.lazy import lazy
 from softreach.support.units import as_unit
 
 Triple = tuple[float, float, float]
-Ends = tuple[Array, Array]
-"""Least and largest of something."""
+Ends = tuple[Array, Array]  # Least and largest of something
 
 _STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
 """1/g, 1/g² and 1/g³ with g⁴ = g + 1: steps of a sequence that fills the cube evenly."""
@@ -149,7 +137,7 @@ class Box(Region):
         return np.array([self.low, self.high])
 
     def distance(self, points: ArrayLike) -> Array:
-        x = as_points("points", points)
+        x = arrays.as_points("points", points)
         beyond = np.maximum(self.low - x, x - self.high)
         return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
 
@@ -192,7 +180,8 @@ class Sphere(Region):
         return np.array(self.center) + self.radius * np.array([[-1.0], [1.0]])
 
     def distance(self, points: ArrayLike) -> Array:
-        return np.linalg.norm(as_points("points", points) - self.center, axis=1) - self.radius
+        apart = arrays.as_points("points", points) - self.center
+        return np.linalg.norm(apart, axis=1) - self.radius
 
     def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         apart = center - self.center
@@ -221,7 +210,7 @@ class HalfSpace(Region):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", _triple("point", self.point))
-        (normal,) = as_directions("normal", self.normal, 1).tolist()
+        (normal,) = arrays.as_directions("normal", self.normal, 1).tolist()
         object.__setattr__(self, "normal", tuple(normal))
 
     @property
@@ -233,7 +222,7 @@ class HalfSpace(Region):
         return np.array([[-np.inf] * 3, [np.inf] * 3])
 
     def distance(self, points: ArrayLike) -> Array:
-        return (as_points("points", points) - self.point) @ np.array(self.normal)
+        return (arrays.as_points("points", points) - self.point) @ np.array(self.normal)
 
     def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         distance, along = self._distances(center), tangent @ np.array(self.normal)
@@ -274,15 +263,15 @@ class Mesh(Region):
     """Unit of length of that file."""
 
     def __post_init__(self) -> None:
-        vertices = as_points("vertices", self.vertices)
-        faces = as_faces("faces", self.faces, len(vertices))
+        vertices = arrays.as_points("vertices", self.vertices)
+        faces = arrays.as_faces("faces", self.faces, len(vertices))
         _check_closed(faces, self.source or "the mesh")
         volume = enclosed_volume(vertices, faces)
         if not abs(volume) > 0.0:
             raise NotPossible(f"{self.source or 'the mesh'} encloses no volume")
         faces = faces if volume > 0.0 else faces[:, ::-1]
-        object.__setattr__(self, "vertices", read_only(vertices.copy()))
-        object.__setattr__(self, "faces", read_only(np.ascontiguousarray(faces, np.int64)))  # pyright: ignore[reportArgumentType]
+        object.__setattr__(self, "vertices", arrays.read_only(vertices.copy()))
+        object.__setattr__(self, "faces", arrays.read_only(np.ascontiguousarray(faces, np.int64)))  # pyright: ignore[reportArgumentType]
 
     @classmethod
     def load(cls, path: str | PathLike[str], *, unit: str | None = None) -> Self:
@@ -341,7 +330,7 @@ class Mesh(Region):
 
         The sign is that of the normal of the nearest face, edge or corner, weighted by angles.
         """
-        points = as_points("points", points)
+        points = arrays.as_points("points", points)
         out, face = np.empty(len(points)), np.empty(len(points), np.int64)
         table = (self.vertices, self.faces, *self._spheres)
         parallel.run(
@@ -437,7 +426,7 @@ def _unit_of(name: str) -> str | None:
 
 def _triple(name: str, value: object) -> Triple:
     allowed = "three finite numbers"
-    numbers = check_finite(name, as_floats(name, value, allowed))
+    numbers = arrays.check_finite(name, arrays.as_floats(name, value, allowed))
     if numbers.shape != (3,):
         raise InvalidInput(name, value, allowed)
     return tuple(numbers.tolist())

@@ -1,7 +1,5 @@
 """Requirements of an arm: what it is for, as a frozen value and as TOML with units."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,23 +18,9 @@ from softreach.requirements.parts import LIMIT_UNITS, LONGEST, MOST_PLACES, Keep
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats
-from softreach.support.errors import (
-    Fault,
-    InvalidDesign,
-    InvalidInput,
-    NotPossible,
-    Range,
-    SoftreachError,
-)
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
+from softreach.support.files import toml
 from softreach.support.files.text import read_text, write_text
-from softreach.support.files.toml import (
-    WRONG,
-    FaultReader,
-    document_of,
-    inline_table,
-    key_text,
-    value_text,
-)
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
 
@@ -161,16 +145,16 @@ class Requirements:
         place = None if folder is None else Path(as_path("folder", folder))
         size = None if length is None else as_number("length", length, POSITIVE)
         reader = _Reader(place, size)
-        parts = reader.parts(document_of(text, LONGEST, as_text("source", source)))
+        parts = reader.parts(toml.document_of(text, LONGEST, as_text("source", source)))
         if reader.faults:
             raise InvalidDesign(reader.faults, source)
         try:
             return cls(**parts)
         except InvalidInput as error:
-            fault = Fault(error.name, error.value, f"must be {error.allowed}")
-            raise InvalidDesign([fault], source) from None
+            faults = [Fault(error.name, error.value, f"must be {error.allowed}")]
         except InvalidDesign as error:
-            raise InvalidDesign(error.faults, source) from None
+            faults = error.faults
+        raise InvalidDesign(faults, source)
 
     def to_toml(self) -> str:
         """The text of a file in m and kg, from which `from_toml` makes the same."""
@@ -179,7 +163,7 @@ class Requirements:
         for target in self.targets:
             lines = ["[[reach]]", *_lines({"name": target.name})]
             if target.places is not None:
-                rows = (f"  {value_text(row)}," for row in target.points.tolist())
+                rows = (f"  {toml.value_text(row)}," for row in target.points.tolist())
                 lines += ["places_m = [", *rows, "]"]
             elif target.region is not None:
                 lines += [_region_line(target.region), *_lines({"share": target.share})]
@@ -194,8 +178,8 @@ class Requirements:
         blocks += [["[measures]"]] if self.measures else []
         for name, ends in self.measures.items():
             pairs = zip(("at_least", "at_most"), ends, strict=True)
-            table = inline_table((key, value_text(end)) for key, end in pairs if end is not None)
-            blocks[-1].append(f"{key_text(name)} = {table}")
+            known = ((key, toml.value_text(end)) for key, end in pairs if end is not None)
+            blocks[-1].append(f"{toml.key_text(name)} = {toml.inline_table(known)}")
         return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -221,11 +205,7 @@ class Requirements:
 
 
 def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
-    """The arm with a mass at its tip [kg]; as it is for None, and for 0 without loads.
-
-    Raises:
-        InvalidDesign: A layer without Young's modulus or density.
-    """
+    """The arm with a mass at its tip [kg]; as it is for None, and for 0 without loads."""
     if payload is None or (payload == 0.0 and arm.loads is None):
         return arm
     return arm.replace(loads=(arm.loads or Loads()).replace(payload=payload))
@@ -277,7 +257,7 @@ def _contradictions(needs: Requirements) -> Iterator[Fault]:
                 yield Fault(f"{target.name}, place {wrong[0] + 1}", place, allowed)
 
 
-class _Reader(FaultReader):
+class _Reader(toml.FaultReader):
     def __init__(self, folder: Path | None, length: float | None) -> None:
         super().__init__()
         self.folder, self.length = folder, length
@@ -285,7 +265,7 @@ class _Reader(FaultReader):
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""
         payloads = self._numbers(document, "", {"payloads": "kg"}, _KEYS)
-        limits = self._table(document, "limits")
+        raw = self._table(document, "limits")
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
         return payloads | {
@@ -295,9 +275,7 @@ class _Reader(FaultReader):
                 for kind in ("stay_inside", "avoid")
                 for each in self._tables(document, kind)
             ],
-            "limits": self._made(
-                Limits, limits, "limits", self._numbers(limits, "limits", LIMIT_UNITS)
-            ),
+            "limits": self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS)),
             "measures": self._measures(self._table(document, "measures")),
         }
 
@@ -305,9 +283,9 @@ class _Reader(FaultReader):
         numbers = {"within": "m", "share": "", "places": "m"}
         values = self._part(raw, path, numbers, ("name", "file"))
         file = values.pop("file", None)
-        sources = [x for x in (values.get("places"), file, values.get("region")) if x is not None]
-        if len(sources) != 1:
-            allowed = f"needs one of places, file, {', '.join(_SHAPES)}, and has {len(sources)}"
+        count = sum(x is not None for x in (values.get("places"), file, values.get("region")))
+        if count != 1:
+            allowed = f"needs one of places, file, {', '.join(_SHAPES)}, and has {count}"
             return self._refuse(path, None, allowed)
         if file is not None:
             try:
@@ -350,9 +328,8 @@ class _Reader(FaultReader):
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
-                return Mesh.load(
-                    self._beside(table, "vertices_m and faces"), unit=raw.get("mesh_unit")
-                )
+                file = self._beside(table, "vertices_m and faces")
+                return Mesh.load(file, unit=raw.get("mesh_unit"))
             except InvalidInput as error:
                 of_unit = error.name == "unit"
                 place, value = (f"{path}_unit", error.value) if of_unit else (path, table)
@@ -372,7 +349,7 @@ class _Reader(FaultReader):
     def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
         measures = {}
         for name, table in raw.items():
-            path = f"measures.{key_text(name)}"
+            path = f"measures.{toml.key_text(name)}"
             metric = known_metric(name)
             if metric is None or metric.over:
                 self._refuse(path, None, "is no metric: softreach list metrics names them")
@@ -387,17 +364,15 @@ class _Reader(FaultReader):
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `WRONG` and a fault where it refuses them."""
-        right = {name: value for name, value in values.items() if value is not WRONG}
+        right = {name: value for name, value in values.items() if value is not toml.WRONG}
         wrong = values.keys() - right.keys()
         if wrong and kind not in _INSTEAD:
-            return WRONG
+            return toml.WRONG
         if wrong & {"region", "places"}:
             right = _INSTEAD[kind] | right
         try:
             made = kind(**right)
-            return WRONG if wrong else made
-        except NotPossible as error:
-            return self._refuse(path, None, str(error))
+            return toml.WRONG if wrong else made
         except InvalidInput as error:
             field = error.name.partition(" ")[0].partition("[")[0]
             key = next((key for key in raw if key.startswith(field)), "")
@@ -405,6 +380,8 @@ class _Reader(FaultReader):
             said = "" if key or error.name == field else f"{error.name} "
             place = f"{path}.{key}" if key else path
             return self._refuse(place, value, f"{said}must be {error.allowed}")
+        except SoftreachError as error:
+            return self._refuse(path, None, str(error))
 
     def _numbers(
         self,
@@ -461,10 +438,8 @@ class _Reader(FaultReader):
             return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
         units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
         hint = "" if unit != "m" or self.length is not None else "; L is not known here"
-        return (
-            f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under '
-            f"{name}_{unit.lower()}{hint}"
-        )
+        key = f"{name}_{unit.lower()}{hint}"
+        return f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under {key}'
 
 
 def _keys(name: str, unit: str) -> dict[str, str]:
@@ -474,7 +449,7 @@ def _keys(name: str, unit: str) -> dict[str, str]:
 
 
 def _lines(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {value_text(x)}" for key, x in values.items() if x is not None]
+    return [f"{key} = {toml.value_text(x)}" for key, x in values.items() if x is not None]
 
 
 def _region_line(region: Region) -> str:
@@ -484,5 +459,5 @@ def _region_line(region: Region) -> str:
     shapes = _SHAPES.items()
     shape, numbers = next((name, own) for name, (kind, own) in shapes if isinstance(region, kind))
     keys = (f"{name}_{unit}".rstrip("_") for name, unit in numbers.items())
-    values = (value_text(np.asarray(getattr(region, name)).tolist()) for name in numbers)
-    return f"{shape} = {inline_table(zip(keys, values, strict=True))}"
+    values = (toml.value_text(np.asarray(getattr(region, name)).tolist()) for name in numbers)
+    return f"{shape} = {toml.inline_table(zip(keys, values, strict=True))}"

@@ -1,15 +1,4 @@
-"""Arguments of public functions, converted in their first lines and so refused in one way.
-
-A converter takes the argument's name and value, then what is allowed, and returns what the function
-goes on with, or raises `InvalidInput`, which names the argument::
-
-    n = as_integer("n", n, 1)
-    cell = None if cell is None else as_number("cell", cell, POSITIVE)
-
-Those of arrays are in `softreach.support.arrays`, that of callbacks is `progress.as_progress`.
-"""
-
-from __future__ import annotations
+"""Arguments of public functions, converted in their first lines and refused in one way."""
 
 import math
 import os
@@ -20,8 +9,7 @@ from typing import Any
 
 from softreach.support.errors import InvalidInput, Range, did_you_mean
 
-POSITIVE = Range(0.0, open_low=True)
-"""Finite numbers above zero."""
+POSITIVE = Range(0.0, open_low=True)  # Finite numbers above zero
 
 
 def as_number(name: str, value: object, allowed: Range = Range()) -> float:  # noqa: B008
@@ -95,16 +83,14 @@ def as_instance(name: str, value: Any, kind: Any, what: str) -> Any:
     raise InvalidInput(name, as_given(value), what)
 
 
-def as_dataset(
-    name: str, value: Any, *variables: str, kind: str = "Dataset", what: str = ""
-) -> Any:
+def as_dataset(name: str, value: Any, *needed: str, kind: str = "Dataset", what: str = "") -> Any:
     """An `xarray.Dataset` (or another `kind`), called `what`, that has some variables."""
-    with_variables = f" with {', '.join(variables)}" if variables else ""
+    with_variables = f" with {', '.join(needed)}" if needed else ""
     allowed = f"{what or f'an xarray.{kind}'}{with_variables}"
     xarray = sys.modules.get("xarray")  # who has a dataset has imported it
     if xarray is None or not isinstance(value, getattr(xarray, kind)):
         raise InvalidInput(name, as_given(value), allowed)
-    if missing := [variable for variable in variables if variable not in value]:
+    if missing := [variable for variable in needed if variable not in value]:
         raise InvalidInput(name, f"a {kind} without {', '.join(missing)}", allowed)
     return value
 

@@ -1,10 +1,4 @@
-"""Arrays that users pass: converted and checked in one place, and names for them by what they hold.
-
-Numbers are what NumPy takes for whole or real numbers; masked entries are none. What cannot be
-converted raises `InvalidInput`, which names the argument.
-"""
-
-from __future__ import annotations
+"""Arrays that users pass, converted and checked in one place, and names for what they hold."""
 
 from collections.abc import Sequence
 from operator import itemgetter
@@ -16,26 +10,15 @@ from numpy.typing import NDArray
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
 
-Array = NDArray[np.float64]
-"""Numbers."""
-
-Index = NDArray[np.int64]
-"""Places in other arrays."""
-
-Mask = NDArray[np.bool_]
-"""Truth values that mark some of several things."""
-
-Points = NDArray[np.float64]
-"""Places [m], shape (n, 3)."""
-
-Faces = NDArray[np.integer]
-"""Triangles as rows of three vertices, shape (n, 3)."""
+Array = NDArray[np.float64]  # Numbers
+Index = NDArray[np.int64]  # Places in other arrays
+Mask = NDArray[np.bool_]  # Truth values that mark some of several things
+Points = NDArray[np.float64]  # Places [m], shape (n, 3)
+Faces = NDArray[np.integer]  # Triangles as rows of three vertices, shape (n, 3)
+Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])  # Named, of columns of one length
 
 _FARTHEST = 1e9  # of positions [m]: their powers must be numbers
 _NUMBERS = "an array of numbers"
-
-Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
-"""A named tuple of arrays of one length: its columns."""
 
 
 def rows(table: Table, chosen: Mask | Index | slice) -> Table:
@@ -75,11 +58,7 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
 
 
 def labeled(name: str, values: Any, labels: Sequence[str]) -> Any:
-    """An xarray array with the columns that have these labels, in their order; others as given.
-
-    Raises:
-        InvalidInput: Some label has no column.
-    """
+    """An xarray array with columns of these labels, all of them, in this order; else as given."""
     dims = [dim for dim in getattr(values, "dims", ()) if dim in ("axis", "bundle")]
     if len(dims) != 1:
         return values
@@ -110,10 +89,8 @@ def as_points(name: str, values: object, *, any_scale: bool = False) -> Points:
     if points.size == 0 and points.ndim <= 2:
         return points.reshape(0, 3)
     points = as_rows(name, points, 3, allowed)
-    if not any_scale and max(-points.min(), points.max()) > _FARTHEST:
-        raise InvalidInput(
-            name, f"up to {np.abs(points).max():g} m", f"at most {_FARTHEST:g} m far"
-        )
+    if not any_scale and (farthest := max(-points.min(), points.max())) > _FARTHEST:
+        raise InvalidInput(name, f"up to {farthest:g} m", f"at most {_FARTHEST:g} m far")
     return points
 
 
@@ -125,9 +102,8 @@ def check_finite(name: str, values: Array) -> Array:
     if values.ndim < 2:
         raise InvalidInput(name, values, "finite numbers")
     wrong = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-    text = f"{values[wrong[0]]}"
     hint = f"so are {len(wrong):,} rows in all" if len(wrong) > 1 else ""
-    raise InvalidInput(f"{name}[{wrong[0]}]", text, "finite numbers", hint)
+    raise InvalidInput(f"{name}[{wrong[0]}]", values[wrong[0]], "finite numbers", hint)
 
 
 def as_stations(name: str, values: object) -> Array:
@@ -170,9 +146,7 @@ def as_faces(name: str, values: object, count: int) -> Faces:
     return _within(name, faces, faces.shape[1:] == (3,), count, allowed).astype(np.int64)
 
 
-def _within(
-    name: str, indices: NDArray[Any], fits: bool, count: int, allowed: str
-) -> NDArray[np.integer]:
+def _within(name: str, indices: NDArray[Any], fits: bool, count: int, allowed: str) -> NDArray[Any]:
     if not fits or (indices.size and indices.dtype.kind not in "iu"):
         raise InvalidInput(name, _described(indices, indices), allowed)
     if indices.size and not (indices.min() >= 0 and indices.max() < count):

@@ -1,7 +1,5 @@
 """Errors and warnings, said so that the reader knows what to do next."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import sys
@@ -9,7 +7,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 __all__ = [
     "Fault",
@@ -94,7 +92,7 @@ class Range(NamedTuple):
         below = value < self.high or (value == self.high and not self.open_high)
         return above and below and abs(value) <= sys.float_info.max
 
-    def in_degrees(self) -> Range:
+    def in_degrees(self) -> Self:
         """The same range of an angle, for files and the command line."""
         return self._replace(low=math.degrees(self.low), high=math.degrees(self.high), unit="deg")
 
@@ -138,26 +136,13 @@ class InvalidDesign(SoftreachError, ValueError):
 
     def __init__(self, faults: Sequence[Fault], source: str = "") -> None:
         self.faults = tuple(faults)
-        lines = list(map(str, self.faults))
-        if source:
-            count = counted(len(self.faults), "problem")
-            super().__init__("\n  ".join([f"{source}: {count}", *lines]))
-        else:
-            super().__init__("\n".join(lines))
+        head = [f"{source}: {counted(len(self.faults), 'problem')}"] if source else []
+        super().__init__(("\n  " if source else "\n").join([*head, *map(str, self.faults)]))
 
 
-_EXTRAS = {
-    "matplotlib": "plot",
-    "pyarrow": "export",
-    "trimesh": "export",
-    "meshio": "export",
-    "skimage": "surface",
-    "distributed": "cluster",
-    "viser": "studio",
-    "jinja2": "report",
-    "optuna": "search",
-    "cmaes": "search",
-}
+_EXTRAS = {"matplotlib": "plot", "skimage": "surface", "distributed": "cluster", "viser": "studio"}
+_EXTRAS |= {"jinja2": "report", "optuna": "search", "cmaes": "search"}
+_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")
 """Module -> extra of softreach that brings it."""
 
 
@@ -167,18 +152,13 @@ class MissingExtra(SoftreachError, ImportError):
     def __init__(self, *modules: str) -> None:
         names = dict.fromkeys(name.replace("skimage", "scikit-image") for name in modules)
         extras = ",".join(dict.fromkeys(_EXTRAS[name] for name in modules))
-        super().__init__(
-            f"this needs {' and '.join(names)}; install {'them' if len(names) > 1 else 'it'} with: "
-            f"pip install 'softreach[{extras}]', or in a clone with: make setup"
-        )
+        them = "them" if len(names) > 1 else "it"
+        remedy = f"pip install 'softreach[{extras}]', or in a clone with: make setup"
+        super().__init__(f"this needs {' and '.join(names)}; install {them} with: {remedy}")
 
 
 def check_installed(*modules: str) -> None:
-    """Name the modules that are missing, all at once, without the time that importing them takes.
-
-    Raises:
-        MissingExtra: Some are not installed.
-    """
+    """Name the modules that are missing, all at once, without the time that importing takes."""
     if missing := [name for name in modules if importlib.util.find_spec(name) is None]:
         raise MissingExtra(*missing)
 
@@ -210,12 +190,9 @@ def warn(text: str) -> None:
     if _silenced.get():
         return
     frame, level = sys._getframe(1), 2
-    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] == _PACKAGE:
+    while frame and frame.f_globals.get("__name__", "").split(".")[0] == __name__.split(".")[0]:
         frame, level = frame.f_back, level + 1
     warnings.warn(text, SoftreachWarning, stacklevel=level)
-
-
-_PACKAGE = __name__.split(".")[0]
 
 
 @contextmanager

@@ -1,7 +1,5 @@
 """End of a command by a signal: Ctrl-C, a request to terminate, a terminal that is closed."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
@@ -33,13 +31,11 @@ def wait_for_signal() -> None:
 
 
 def run_stoppable(run: Callable[[], int]) -> int:
-    """Run a command that SIGTERM and SIGHUP end as Ctrl-C does, with one line.
+    """The exit code of a command that SIGTERM and SIGHUP end as Ctrl-C does, with one line.
 
     They raise KeyboardInterrupt on the main thread once the kernel or the compilation that runs
-    there has ended. What ignores a signal goes on ignoring it, as under `nohup`.
-
-    Returns:
-        The exit code. If a signal came, the process ends here with 128 + its number.
+    there has ended; the process then ends here with 128 + the number of the signal. What ignores a
+    signal goes on ignoring it, as under `nohup`.
     """
     numbers = [getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP")]
     heeded = [n for n in numbers if n is not None and signal.getsignal(n) is not signal.SIG_IGN]

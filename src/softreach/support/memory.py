@@ -1,7 +1,5 @@
 """Free memory, and the refusal of what needs more."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import math
@@ -20,7 +18,14 @@ _CONTROL_GROUP = Path("/sys/fs/cgroup")  # of version 2
 
 def free_memory() -> float:
     """Memory that can be had without swapping [bytes], or 4e9 where the system does not say."""
-    return min(_system(), _container())
+    left = math.inf
+    with suppress(OSError, ValueError):  # no container, or its limit is "max"
+        limit, used, stat = (
+            (_CONTROL_GROUP / f"memory.{name}").read_text() for name in ("max", "current", "stat")
+        )
+        cache = re.search(r"^inactive_file (\d+)", stat, re.MULTILINE)  # kept only to be read
+        left = float(limit) - float(used) + (float(cache[1]) if cache else 0.0)
+    return min(_system(), left)
 
 
 def _system() -> float:
@@ -30,17 +35,6 @@ def _system() -> float:
     with suppress(AttributeError, OSError, ValueError):
         return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")) / 2.0
     return _UNKNOWN
-
-
-def _container() -> float:
-    """Memory that a container leaves of its limit, with the files that it keeps only to read."""
-    with suppress(OSError, ValueError):  # no such group, or its limit is "max"
-        limit, used, stat = (
-            (_CONTROL_GROUP / f"memory.{name}").read_text() for name in ("max", "current", "stat")
-        )
-        cache = re.search(r"^inactive_file (\d+)", stat, re.MULTILINE)
-        return float(limit) - float(used) + (float(cache[1]) if cache else 0.0)
-    return math.inf
 
 
 def return_memory() -> None:
@@ -53,11 +47,7 @@ def return_memory() -> None:
 
 
 def check_memory(name: str, value: object, needed: float) -> None:
-    """Refuse what takes more memory than is free [bytes]: Linux would grant it, then kill.
-
-    Raises:
-        NotPossible: What has this name and value needs too much.
-    """
+    """Refuse what takes more memory than is free [bytes]: Linux would grant it, then kill."""
     if needed > _NOTICED and needed > (free := free_memory()):
         taken = f"{needed / 1e9:,.1f} GB of memory, of which {free / 1e9:,.1f} GB are free"
         raise NotPossible(f"{name} = {value} needs {taken}")

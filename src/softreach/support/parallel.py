@@ -1,10 +1,4 @@
-"""Threads over blocks of work.
-
-The kernels release the interpreter lock, so plain threads use every core, nest safely in other
-people's thread and process pools, and let Ctrl-C through between blocks, however deep they are.
-"""
-
-from __future__ import annotations
+"""Threads over blocks of work, as kernels release the interpreter lock; Ctrl-C gets in between."""
 
 import os
 import threading
@@ -43,9 +37,8 @@ def thread_count() -> int:
     setting = os.environ.get("SOFTREACH_NUM_THREADS", "")
     if setting.isdigit() and int(setting) > 0:
         return int(setting)
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    has_affinity = hasattr(os, "sched_getaffinity")
+    return len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
 
 
 def threads_here() -> int:

@@ -3,14 +3,12 @@
 Nothing else runs code: design files and stores name kinds and metrics, never modules.
 """
 
-from __future__ import annotations
-
 import importlib
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -18,21 +16,15 @@ from typing import Any
 import softreach
 from softreach.support.errors import InvalidInput
 
-ACTUATORS, PROFILES, METRICS = (
-    f"softreach.{each}" for each in ("actuators", "profiles", "metrics")
-)
-"""Groups of entry points: the name of a class, or of a metric, and where it is."""
+# Groups of entry points: the name of a class, or of a metric, and where it is.
+ACTUATORS, PROFILES, METRICS = "softreach.actuators", "softreach.profiles", "softreach.metrics"
 
 _imported: list[ModuleType] = []
 
 
 @contextmanager
 def importing(names: Iterable[str]) -> Iterator[None]:
-    """A block for which modules of the user are imported, by their names or from .py files.
-
-    Raises:
-        InvalidInput: There is no such module, it fails, or another one has its name.
-    """
+    """A block for which modules of the user are imported, by their names or from .py files."""
     before = sys.path.copy()
     try:
         _imported.extend(map(_import, names))
@@ -62,17 +54,11 @@ def imported() -> tuple[ModuleType, ...]:
 
 def declared(group: str) -> dict[str, EntryPoint]:
     """Entry points of installed packages in a group, by name; none is imported."""
-    from importlib.metadata import entry_points
-
     return {entry.name: entry for entry in entry_points(group=group)}
 
 
 def loaded(entry: EntryPoint) -> Any:
-    """Object behind an entry point of an installed package.
-
-    Raises:
-        InvalidInput: It cannot be imported.
-    """
+    """Object behind an entry point of an installed package."""
     return _tried(f"entry point {entry.name}", entry.value, entry.load)
 
 
@@ -81,14 +67,11 @@ def _tried(name: str, value: str, load: Callable[[], Any]) -> Any:
     try:
         return load()
     except (Exception, SystemExit) as error:
-        cause = _cause(error)
-        raise InvalidInput(name, value or "''", "a module that can be imported", cause) from error
-
-
-def _cause(error: BaseException) -> str:
-    """The error in one line, with the line of the user's code that led to it."""
-    others = ("<", *(str(Path(file).parent) for file in (softreach.__file__, importlib.__file__)))
-    steps = traceback.extract_tb(error.__traceback__)
-    own = [step for step in steps if not step.filename.startswith(others)]
-    place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ") + place
+        files = (softreach.__file__, importlib.__file__)
+        others = ("<", *(str(Path(file).parent) for file in files))
+        steps = traceback.extract_tb(error.__traceback__)
+        own = [step for step in steps if not step.filename.startswith(others)]
+        place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+        said = f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
+        allowed = "a module that can be imported"
+        raise InvalidInput(name, value or "''", allowed, said + place) from error

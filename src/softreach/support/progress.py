@@ -1,7 +1,5 @@
 """Progress of long work: callbacks, a bar on a terminal, lines elsewhere."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time
@@ -10,13 +8,9 @@ from contextlib import contextmanager, suppress
 
 from softreach.support.arguments import as_function
 
-hidden = False
-"""No bars and no lines; `softreach --quiet` sets it."""
-
+Progress = Callable[[int], None]  # Called with the number of items done since the last call
+hidden = False  # No bars and no lines; `softreach --quiet` sets it
 _PAUSE = 30.0  # [s] between lines
-
-Progress = Callable[[int], None]
-"""Called with the number of items done since the last call."""
 
 
 def silent(done: int) -> None:
@@ -25,23 +19,15 @@ def silent(done: int) -> None:
 
 
 def as_progress(progress: object) -> Progress:
-    """The callback of a caller; one that reports nothing for None.
-
-    Raises:
-        InvalidInput: It cannot be called.
-    """
+    """The callback of a caller; one that reports nothing for None."""
     return silent if progress is None else as_function("progress", progress)
 
 
 @contextmanager
 def bar(label: str | Callable[[], str], total: int | None) -> Iterator[Progress]:
-    """A progress bar with rate and time left on standard error, if that is a terminal.
+    """A bar with rate and time left on standard error; elsewhere a line every half minute.
 
-    In a pipe, a file or a notebook a line every half minute says how far it is.
-
-    Args:
-        label: What is going on, or a function that says it anew each time.
-        total: Number of items; None if it is known only in the end, for a bar that moves on.
+    A label may be a function that says it anew each time; a total of None is known in the end.
     """
     if hidden:
         yield silent
@@ -52,12 +38,8 @@ def bar(label: str | Callable[[], str], total: int | None) -> Iterator[Progress]
         return
     from rich import console, progress
 
-    columns = (
-        progress.TextColumn("{task.description}"),
-        progress.BarColumn(),
-        progress.TaskProgressColumn(show_speed=True),
-        progress.TimeRemainingColumn(),
-    )
+    times = progress.TaskProgressColumn(show_speed=True), progress.TimeRemainingColumn()
+    columns = (progress.TextColumn("{task.description}"), progress.BarColumn(), *times)
     on_error = console.Console(stderr=True)
     with progress.Progress(*columns, console=on_error, transient=True) as display:
         task = display.add_task(said(), total=total)

@@ -1,7 +1,5 @@
 """Numbers as people write them: a value with its error and its unit."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -31,32 +29,21 @@ _UNITS = {
 
 
 def quantity(value: float, unit: str = "", error: float = math.nan, digits: int = 1) -> str:
-    """A value to the first digit of its error, such as "0.69164 ± 0.00002 m³".
-
-    Args:
-        value: The number.
-        unit: What it counts.
-        error: How far off it may be, same unit; without one the value has five digits.
-        digits: Number of digits of the error.
-    """
-    if math.isfinite(value) and 0 < error < math.inf:
-        return f"{_with_error(value, error, digits)} {unit}".rstrip()
-    return f"{five_digits(value)}{unit if unit == '°' else f' {unit}'}".rstrip()
-
-
-def five_digits(value: float) -> str:
-    """A number with five digits that count, and without an exponent up to a million."""
-    return f"{float(f'{value:.5g}'):.6g}"
-
-
-def _with_error(value: float, error: float, digits: int) -> str:
+    """A value to some digits of its error, such as "0.69164 ± 0.00002 m³", or with five digits."""
+    if not (math.isfinite(value) and 0 < error < math.inf):
+        return f"{five_digits(value)}{unit if unit == '°' else f' {unit}'}".rstrip()
     error = max(error, _FINEST * abs(value))
     largest = max(abs(value), error)
     power = math.floor(math.log10(largest)) if largest < _SMALLEST else 0
     scale = 10.0**power
     decimals = max(0, digits - 1 - math.floor(math.log10(error / scale)))
     text = f"{value / scale:.{decimals}f} ± {error / scale:.{decimals}f}"
-    return f"({text})e{power}" if power else text
+    return f"{f'({text})e{power}' if power else text} {unit}".rstrip()
+
+
+def five_digits(value: float) -> str:
+    """A number with five digits that count, and without an exponent up to a million."""
+    return f"{float(f'{value:.5g}'):.6g}"
 
 
 def round_below(value: float) -> float:
@@ -72,20 +59,12 @@ def round_above(value: float) -> float:
 
 
 def read_number(text: str) -> float:
-    """The finite number that a text is: decimal, with a point or an exponent if need be.
-
-    Raises:
-        ValueError: Anything else, also infinity, hexadecimal numbers and foreign digits.
-    """
+    """The finite decimal number that a text is, or `ValueError`."""
     return read_quantity(text, "1")
 
 
 def read_whole_number(text: str) -> int:
-    """The whole number that a text is, such as "400000", "400_000" or "4e5".
-
-    Raises:
-        ValueError: Anything else.
-    """
+    """The whole number that a text is, such as "400_000" or "4e5", or `ValueError`."""
     if _WHOLE.fullmatch(text):
         return int(text)
     read_number(text)  # refuses what is no finite decimal number
@@ -115,16 +94,9 @@ def sizes_in(unit: str) -> dict[str, float]:
 
 
 def read_quantity(text: str, unit: str) -> float:
-    """The value of a number with its unit, such as "200g" or "1.5 MPa", in an SI unit.
+    """The value in an SI unit, "1" for none, of "200g" or "1.5 MPa"; `ValueError` of anything else.
 
-    A zero needs no unit.
-
-    Args:
-        text: A number and one of `unit_names(unit)`.
-        unit: SI unit of what is read; "1" for a plain number.
-
-    Raises:
-        ValueError: No finite number, or another unit.
+    The unit is one of `unit_names(unit)`; a zero needs none.
     """
     match = _NUMBER.fullmatch(text)
     if match is None:

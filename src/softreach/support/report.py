@@ -1,7 +1,5 @@
 """Reports: what was found, printed in lines or written as one page with its pictures inside."""
 
-from __future__ import annotations
-
 import base64
 import io
 from abc import ABC, abstractmethod
@@ -18,9 +16,7 @@ from softreach.support.files.formats import FileFormat, Formats, format_of
 from softreach.support.files.text import write_text
 from softreach.support.quantity import columns
 
-REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}
-"""Formats of reports."""
-
+REPORT: Formats = {".html": FileFormat(("matplotlib", "jinja2"))}  # Formats of reports
 _DPI = 160
 
 
@@ -29,15 +25,13 @@ class Section:
     """A part of a report: what is given, in this order."""
 
     title: str = ""
-    head: Sequence[str] = ()
-    """Heading of the rows."""
+    head: Sequence[str] = ()  # Heading of the rows
     rows: Sequence[Sequence[str]] = ()
     note: str = ""
     points: Sequence[str] = ()
     figures: Callable[[], Iterable[tuple[Any, str]]] = tuple
     """Draws figures of matplotlib, or reads PNG files, each with its caption."""
-    text: str = ""
-    """Shown as it is, such as a design file."""
+    text: str = ""  # Shown as it is, such as a design file
     printed: int = 30
     """Rows among the lines, with the points; with 0 all of it is on the page alone."""
 
@@ -84,8 +78,7 @@ class Report:
 
         text = files("softreach.support").joinpath("report.html.jinja").read_text(encoding="utf-8")
         pages = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-        pictures = [[(_source(f), c) for f, c in part.figures()] for part in self.sections]
-        parts = list(zip(self.sections, pictures, strict=True))
+        parts = [(part, [(_source(f), c) for f, c in part.figures()]) for part in self.sections]
         page = pages.from_string(text).render(report=self, parts=parts)
         write_text(path, page, overwrite=overwrite)
 

@@ -15,31 +15,21 @@ if TYPE_CHECKING:
 
     from softreach.support.arrays import Array
 
-UNITS = ("m", "cm", "mm", "in", "L")
-"""Names of the units; L is the length of an arm."""
-
-TYPED = ", ".join(unit_names("m"))
-"""Units that lengths may be typed in, beside L where the arm is known."""
+UNITS = ("m", "cm", "mm", "in", "L")  # Names of the units; L is the length of an arm
+TYPED = ", ".join(unit_names("m"))  # Units to type lengths in, beside L where the arm is known
+POWERS = {"m": 1, "m2": 2, "m²": 2, "m3": 3, "m³": 3}  # SI unit -> power of the length
 
 _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 _VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6), "in": ("in³", 0.0254**3)}
 """Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
-
-POWERS = {"m": 1, "m2": 2, "m²": 2, "m3": 3, "m³": 3}
-"""SI unit of lengths, areas and volumes -> power of the length."""
-
 _PRESSURES = {"GPa": 1e9, "MPa": 1e6, "kPa": 1e3, "Pa": 1.0}
-
-_SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
 
 
 class LengthUnit(NamedTuple):
     """A unit of length with those of areas and volumes beside it."""
 
-    name: str
-    """One of `UNITS`."""
-    size: float
-    """[m]; of L, the length of the arm."""
+    name: str  # One of `UNITS`
+    size: float  # [m]; of L, the length of the arm
 
     @property
     def relative(self) -> bool:
@@ -57,7 +47,7 @@ class LengthUnit(NamedTuple):
         """Behind a number: "mm", "mm²", "mL"."""
         if power == 3 and not self.relative:
             return _VOLUMES[self.name][0]
-        return self.name + _SUPERSCRIPTS[power]
+        return self.name + ("", "²", "³")[power - 1]
 
     def label(self, name: str, power: int = 1) -> str:
         """Of an axis with lengths, areas or volumes, such as "x / L", "x [mm]" or "V [mL]"."""
@@ -88,11 +78,7 @@ METER = LengthUnit("m", 1.0)
 
 
 def in_lengths(length: float | None) -> LengthUnit:
-    """L for a given length [m], the meter for None.
-
-    Raises:
-        InvalidInput: A length that is not positive.
-    """
+    """L for a given length [m], the meter for None."""
     if length is None:
         return METER
     if not length > 0:
@@ -101,11 +87,7 @@ def in_lengths(length: float | None) -> LengthUnit:
 
 
 def as_unit(unit: object, length: float | None = None) -> LengthUnit:
-    """The unit of that name, of which L is one where the length [m] of the arm is known.
-
-    Raises:
-        InvalidInput: No such unit, or L where it is not known.
-    """
+    """The unit of that name, of which L is one where the length [m] of the arm is known."""
     if isinstance(unit, LengthUnit):
         return unit
     name = unit if isinstance(unit, str) else ""
@@ -124,10 +106,9 @@ def handy_unit(length: float) -> str:
 
 
 def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, float]:
-    """The unit that people read a number in, and its size.
+    """The unit that people read a number of an SI unit in, and its size.
 
-    Of an SI unit, "1" for none: that of length for lengths, areas and volumes; of pressures one of
-    the size of the number.
+    Lengths, areas and volumes are in that of length, pressures in one of the size of the number.
     """
     if power := POWERS.get(unit):
         return length.symbol(power), length.scale(power)
@@ -141,20 +122,13 @@ def readable_unit(unit: str, value: float, length: LengthUnit) -> tuple[str, flo
 def readable(
     value: float, unit: str, length: LengthUnit, error: float = math.nan, *, digits: int = 1
 ) -> str:
-    """A number in an SI unit as people read it, to some digits of its error: "12.5 mm", "20.3°".
-
-    Lengths, areas and volumes are in the unit of length.
-    """
+    """A number in an SI unit as people read it, to some digits of its error: "12.5 mm", "20.3°"."""
     name, size = readable_unit(unit, value, length)
     return quantity(value / size, name, error / size, digits)
 
 
 def read_length(text: str, length: float | None = None) -> float:
-    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L" where L is known [m].
-
-    Raises:
-        ValueError: No finite number, or another unit.
-    """
+    """A length [m] typed as "80mm", "0.08" in m, or "0.1L" where L is known; or `ValueError`."""
     text = text.strip()
     if length is not None and text.endswith("L"):
         return length * read_number(text[:-1])
@@ -162,9 +136,9 @@ def read_length(text: str, length: float | None = None) -> float:
 
 
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
-    """Comma-separated lengths [m], each with its unit or all without; a zero needs none.
+    """Comma-separated lengths [m], each as `read_length` takes it, all with a unit or all without.
 
-    None if the text is anything else than so many of what `read_length` takes.
+    A zero needs none. None if the text is anything else, or not so many.
     """
     parts = text.split(",")
     try:

@@ -1,13 +1,10 @@
 """The versions of the package and of its datasets, which everything that is stored carries."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 
-SCHEMA_VERSION = 3
-"""Of the names, dimensions and units of datasets."""
+SCHEMA_VERSION = 3  # Of the names, dimensions and units of datasets
 
 
 @cache  # looking the version up takes a millisecond

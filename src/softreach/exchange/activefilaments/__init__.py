@@ -3,11 +3,8 @@
 [ActiveFilamentsJl] is the program of the theory's authors.
 """
 
-from __future__ import annotations
-
 from softreach.exchange.activefilaments.cloud import gamma_path, read_cloud, write_cloud
-from softreach.exchange.activefilaments.definition import read_design
-from softreach.exchange.activefilaments.filament import design_script, write_design
+from softreach.exchange.activefilaments.filament import design_script, read_design, write_design
 
 __all__ = [
     "design_script",

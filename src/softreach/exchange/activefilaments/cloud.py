@@ -6,7 +6,7 @@ import re
 from io import BufferedWriter
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -76,13 +76,11 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     if (activation < low).any() or (activation > high).any():
         warn("activations leave the bounds of the design: widen these to cover its reachable set")
     if difference > _SAME * arm.length:
-        warn(
-            f"tips differ by up to {difference / arm.length:.2g} L from those of this design: "
-            "compare its numbers, and the order and scale of its sectors, with the filament",
-        )
-    cloud = schema.cloud_dataset(
-        arm, activation, tip, seed=0, sampler="ActiveFilaments.jl", tol=tol
-    )
+        hint = "compare its numbers, and the order and scale of its sectors, with the filament"
+        off = f"tips differ by up to {difference / arm.length:.2g} L from those of this design"
+        warn(f"{off}: {hint}")
+    drawn: Any = {"seed": 0, "sampler": "ActiveFilaments.jl", "tol": tol}
+    cloud = schema.cloud_dataset(arm, activation, tip, **drawn)
     del cloud.attrs["seed"]
     cloud.attrs["largest_tip_difference"] = difference
     return cloud

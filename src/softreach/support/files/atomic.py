@@ -11,8 +11,6 @@ full one, so that a folder takes four steps; each name says how far a killed pro
 What a killed process leaves under a hidden name stays, as nothing tells it from a slow one.
 """
 
-from __future__ import annotations
-
 import errno
 import io
 import os
@@ -21,50 +19,33 @@ import shutil
 import stat
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from softreach.support.errors import InvalidInput, NotWritten, warn
 
-MARK = ".softreach-"
-"""Beginning of the names of what is being written, and of its two names at the end."""
-
-_PATIENCE = 5.0
-"""Seconds in which threads of libraries end that still write into a folder after Ctrl-C."""
-
 StrPath = str | os.PathLike[str]
 Foreign = Callable[[Path], str]
 """Names the first thing in a folder that softreach did not write; empty if there is none."""
+MARK = ".softreach-"  # Beginning of names of what is being written, and of its two at the end
+_PATIENCE = 5.0  # s, in which threads of libraries end that still write there after Ctrl-C
 
 
 def check_place(
-    path: StrPath,
-    *,
-    overwrite: bool = False,
-    foreign: Foreign | None = None,
-    name: str = "path",
+    path: StrPath, *, overwrite: bool = False, foreign: Foreign | None = None, name: str = "path"
 ) -> Path:
     """The place, absolute and without links, where a file or a folder may be written.
 
     `foreign` is given for a folder, which is replaced only if it holds nothing foreign.
-
-    Raises:
-        InvalidInput: Something is there that may not be replaced.
-        NotWritten: Nothing can be written there.
-
-    Warns:
-        SoftreachWarning: The replacement of a folder was killed between two renames.
     """
     shown = os.fspath(path)
-    place = Path(os.path.realpath(shown))
+    place, mode = Path(os.path.realpath(shown)), None
     with _one_line(path):
         if foreign is not None and (whole := _rename_what_is_whole(place)):
             warn(f"{path}: a killed command left {whole.name}, which was renamed to it")
-        try:
+        with suppress(FileNotFoundError):
             mode = place.stat().st_mode
-        except FileNotFoundError:
-            mode = None
         nearest = next(folder for folder in place.parents if folder.exists())
         if not os.access(nearest, os.W_OK) or (mode and not os.access(place, os.W_OK)):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -80,10 +61,8 @@ def _refusal(place: Path, mode: int, foreign: Foreign | None, overwrite: bool) -
     if is_folder and foreign is not None and (strange := foreign(place)):
         hint = f"softreach did not write {strange} in it: move it away, or choose another name"
         return "a new name: a folder that holds other files is never replaced", hint
-    if not overwrite:
-        hint = "choose another name, or pass --overwrite (in Python overwrite=True)"
-        return "a new name, as something is there", hint
-    return ()
+    hint = "choose another name, or pass --overwrite (in Python overwrite=True)"
+    return () if overwrite else ("a new name, as something is there", hint)
 
 
 @contextmanager
@@ -93,10 +72,6 @@ def writing(path: StrPath, *, overwrite: bool = False) -> Iterator[io.BufferedWr
     After an error or Ctrl-C an older file is as it was. The file is ours and not the library's that
     fills it, so that no error of writing, flushing or closing can get lost; its name keeps the
     suffix of `path`.
-
-    Raises:
-        InvalidInput: Something is there that may not be replaced; see `check_place`.
-        NotWritten: It cannot be written, for instance as the disk is full.
     """
     place = check_place(path, overwrite=overwrite)
     with _one_line(path):
@@ -144,15 +119,10 @@ def replacing_folder(path: StrPath, foreign: Foreign, *, overwrite: bool = False
 
 
 def place_to_read(path: StrPath) -> str:
-    """The place of a folder to be read: its name, or where a killed process left it.
-
-    Warns:
-        SoftreachWarning: It is read from there.
-    """
+    """The place of a folder to be read: its name, or where a killed process left it."""
     if whole := _whole(Path(os.path.realpath(path))):
         warn(f"{path}: a killed command left {whole.name}, which is read")
-        return os.fspath(whole)
-    return os.fspath(path)
+    return os.fspath(whole or path)
 
 
 def sync(path: Path) -> None:

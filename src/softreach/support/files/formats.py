@@ -1,7 +1,5 @@
 """Formats of files: their suffix, and what writing them needs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from io import BufferedWriter
 from os import PathLike, fspath
@@ -15,25 +13,16 @@ from softreach.support.files.atomic import Foreign
 class FileFormat(NamedTuple):
     """A format of files, or of folders, that is written."""
 
-    libraries: tuple[str, ...] = ()
-    """Modules that are imported to write it."""
-    write: Callable[[Any, BufferedWriter], None] | None = None
-    """Writes a content to a file, where several formats take the same content."""
-    foreign: Foreign | None = None
-    """Given for a folder: the first thing in it for which it is never replaced."""
+    libraries: tuple[str, ...] = ()  # Modules that are imported to write it
+    write: Callable[[Any, BufferedWriter], None] | None = None  # Where several take one content
+    foreign: Foreign | None = None  # Of a folder: the first thing for which it is never replaced
 
 
-Formats = Mapping[str, FileFormat]
-"""Suffix, in lower case, -> format."""
+Formats = Mapping[str, FileFormat]  # Suffix, in lower case, -> format
 
 
 def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -> FileFormat:
-    """The format that a path names by its suffix.
-
-    Raises:
-        InvalidInput: Another suffix; the error lists those there are.
-        MissingExtra: The format needs a library that is not installed.
-    """
+    """The format that a path names by its suffix; what writing it needs must be installed."""
     known = formats.get(Path(path).suffix.lower())
     if known is None:
         raise InvalidInput(name, fspath(path), "a file name ending in " + ", ".join(formats))
@@ -41,14 +30,7 @@ def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -
     return known
 
 
-PICTURES: Formats = dict.fromkeys(
-    (".png", ".pdf", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp"),
-    FileFormat(("matplotlib",)),
-)
-"""Formats of figures."""
-
-PAGES: Formats = {".html": FileFormat()}
-"""Formats of figures that turn in a browser."""
-
-TABLES: Formats = {".csv": FileFormat()}
-"""Formats of tables."""
+_FIGURES = (".png", ".pdf", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
+PICTURES: Formats = dict.fromkeys(_FIGURES, FileFormat(("matplotlib",)))  # Formats of figures
+PAGES: Formats = {".html": FileFormat()}  # Formats of figures that turn in a browser
+TABLES: Formats = {".csv": FileFormat()}  # Formats of tables

@@ -1,11 +1,8 @@
 """Zarr stores that let no damage through: crc32c in each chunk, sha256 of the documents.
 
-The root lists the sha256 of the `zarr.json` of each array, and ends with its own. So a changed bit
-of any file is noticed when the file is read, and so is a missing chunk, which Zarr itself reads as
-fill values. A whole chunk of another place, or an older copy of the store, is not noticed.
+The root lists the sha256 of the `zarr.json` of each array, and ends with its own, so that a changed
+bit and a missing chunk are noticed; a whole chunk of another place, or an older store, is not.
 """
-
-from __future__ import annotations
 
 import asyncio
 import copy
@@ -13,44 +10,33 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import google_crc32c
-from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
+import zarr  # noqa: TID253  (imported where stores are)
+from zarr.abc.buffer import Buffer  # noqa: TID253
+from zarr.abc.store import ByteRequest, Store  # noqa: TID253
+from zarr.storage import FsspecStore, LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
 
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.files.atomic import sync
-
-if TYPE_CHECKING:
-    import zarr
-    from zarr.abc.buffer import Buffer
-    from zarr.abc.store import ByteRequest, Store
-    from zarr.storage import StoreLike, StorePath
 
 Kind = Literal["cloud", "atlas"]
 Mode = Literal["r", "r+"]
 
 ROOT = "zarr.json"
+# Attributes of a root: digest of each array's document by the array's name; digest of the root.
 ARRAYS, DIGEST = "arrays", "sha256"
-"""Attributes of a root: digest of each array's document by the array's name; digest of the root."""
-BLANK = "0" * 64
-"""What stands in place of a root's own digest when that is computed."""
-READING: Mapping[str, Any] = {
-    "consolidated": False,
-    "zarr_format": 3,
-    "chunks": None,
-    "decode_times": False,
-}
-"""Options with which xarray reads a store: as it was written, and numbers as numbers."""
+BLANK = "0" * 64  # What stands in place of a root's own digest when that is computed
+# Options with which xarray reads a store: as it was written, and numbers as numbers.
+READING: Any = {"consolidated": False, "zarr_format": 3, "chunks": None, "decode_times": False}
 
-_REMEDY = {
-    "cloud": "compute the cloud again, or bring back a copy",
-    "atlas": "run the command that built the atlas again, which repairs it",
-}
+_REMEDY = {"cloud": "compute the cloud again, or bring back a copy"}
+_REMEDY["atlas"] = "run the command that built the atlas again, which repairs it"
 _ALLOWED = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
 _KEY = re.compile(r"([^/]+)/c((?:/\d+)*)", re.ASCII)
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.partial$")  # what a killed writer of Zarr leaves
@@ -59,6 +45,21 @@ _CHECKSUM = 4  # bytes at the end of every chunk, by the crc32c codec
 
 class StoreFailed(SoftreachError):
     """The store cannot be written to, for instance because the disk is full; it can be resumed."""
+
+
+class Chunk(NamedTuple):
+    """A file of a store: a chunk of an array, or what describes an array or the store."""
+
+    array: str  # Empty for the store itself
+    place: tuple[int, ...] | None  # None for what describes the array
+
+    @classmethod
+    def of_key(cls, key: str) -> Self | None:
+        """The file with this key, from the root of the store on; None for any other."""
+        if key == ROOT or key.endswith(f"/{ROOT}"):
+            return cls(key.removesuffix(ROOT).rstrip("/"), None)
+        found = _KEY.fullmatch(key)
+        return cls(found[1], tuple(map(int, found[2].split("/")[1:]))) if found else None
 
 
 class DamagedStore(InvalidInput):
@@ -78,38 +79,16 @@ class DamagedStore(InvalidInput):
         super().__init__(where, found, "as softreach wrote it", remedy)
 
 
-class Chunk(NamedTuple):
-    """A file of a store: a chunk of an array, or what describes an array or the store."""
-
-    array: str
-    """Empty for the store itself."""
-    place: tuple[int, ...] | None
-    """None for what describes the array."""
-
-    @classmethod
-    def of_key(cls, key: str) -> Self | None:
-        """The file with this key, from the root of the store on; None for any other."""
-        if key == ROOT or key.endswith(f"/{ROOT}"):
-            return cls(key.removesuffix(ROOT).rstrip("/"), None)
-        if (found := _KEY.fullmatch(key)) is None:
-            return None
-        return cls(found[1], tuple(map(int, found[2].split("/")[1:])))
-
-
 @dataclass(eq=False)
 class Opened:
     """A store that is open, what is known of its files, and what becomes of damaged ones."""
 
     location: object
     kind: Kind
-    durable: bool
-    """Whether a file is on the disk, not only on its way there, when it counts as written."""
-    required: Callable[[Chunk], bool] = lambda _: False
-    """True for chunks that must exist; others that are missing hold fill values."""
-    digests: dict[str, str] = field(default_factory=dict)
-    """Digest of what describes each array, as the root lists it."""
-    place: StorePath = field(init=False)
-    """For xarray."""
+    durable: bool  # A file that counts as written is on the disk, not only on its way there
+    required: Callable[[Chunk], bool] = lambda _: False  # Others that are missing hold fill values
+    digests: dict[str, str] = field(default_factory=dict)  # Of each array's document, as listed
+    place: StorePath = field(init=False)  # For xarray
     group: zarr.Group = field(init=False)
     _noted: dict[Chunk, DamagedStore] | None = None
 
@@ -124,9 +103,8 @@ class Opened:
     def noting(self, *, raising: bool = False) -> Iterator[dict[Chunk, DamagedStore]]:
         """Read damaged files as missing ones, and collect what is wrong with each.
 
-        Args:
-            raising: Whether the first is raised in the end, and not before: Zarr reads chunks at
-                once, would lose all errors but the first, and print them at exit.
+        With `raising` the first is raised in the end, and not before: Zarr reads chunks at once,
+        would lose all errors but the first, and print them at exit.
         """
         before, noted = self._noted, dict[Chunk, DamagedStore]()
         self._noted = noted
@@ -138,22 +116,12 @@ class Opened:
                 raise next(iter(noted.values())) from None
 
     def check_arrays(self) -> None:
-        """Check what describes each array.
-
-        Raises:
-            DamagedStore: It is missing, or changed.
-        """
+        """Check what describes each array."""
         for name in self.digests:
             _ = self.group[name]
 
     def check_root(self) -> None:
-        """Check that the store is still the one that was opened.
-
-        Raises:
-            StoreFailed: Another took its place, and some of what was read may be of that one.
-        """
-        import zarr
-
+        """Check that the store is still the one that was opened."""
         again = zarr.open_group(self.place, mode="r", zarr_format=3)
         if again.attrs[DIGEST] != self.group.attrs[DIGEST]:
             raise StoreFailed(f"{self.location} was replaced while it was read: open it again")
@@ -162,16 +130,7 @@ class Opened:
 def opened_store(
     location: StoreLike, kind: Kind, mode: Mode = "r", *, durable: bool = False
 ) -> Opened | None:
-    """A store of softreach, if there is any.
-
-    Raises:
-        InvalidInput: No place of a store, or something else is there.
-        DamagedStore: Its root is not as softreach wrote it.
-        StoreFailed: It cannot be reached.
-    """
-    import zarr
-    from zarr.storage import StorePath
-
+    """A store of softreach, if there is any; `StoreFailed` where it cannot be reached."""
     if isinstance(location, str) and "://" not in location:
         if Path(location).is_file():
             raise InvalidInput("store", location, _ALLOWED[kind], "it is a file")
@@ -194,9 +153,6 @@ def opened_store(
 
 def place_of(location: Any, mode: Mode) -> StorePath:
     """The place behind a path, a URL, a mapping or a Zarr store."""
-    from zarr.abc.store import Store
-    from zarr.storage import FsspecStore, MemoryStore, StorePath
-
     if isinstance(location, StorePath):
         return location
     if isinstance(location, dict):
@@ -212,8 +168,7 @@ def place_of(location: Any, mode: Mode) -> StorePath:
 
 def absolute(location: StoreLike) -> StoreLike:
     """The same place for a process elsewhere."""
-    if isinstance(location, str):
-        # A path, so that files are written beside their place and renamed.
+    if isinstance(location, str):  # a path, so that files are written beside their place
         location = location.removeprefix("file://")
     if isinstance(location, os.PathLike) or (isinstance(location, str) and "://" not in location):
         return str(Path(location).absolute())
@@ -221,13 +176,7 @@ def absolute(location: StoreLike) -> StoreLike:
 
 
 class CheckedStore(WrapperStore[Any]):
-    """Another store, of which every file is checked when it is read.
-
-    Args:
-        store: The store.
-        opened: What becomes of damage.
-        root: Where in it the root of the arrays is.
-    """
+    """Another store, whose arrays lie at `root`, of which every file is checked when it is read."""
 
     def __init__(self, store: Store, opened: Opened, root: str) -> None:
         super().__init__(store)
@@ -242,26 +191,15 @@ class CheckedStore(WrapperStore[Any]):
     async def get(
         self, key: str, prototype: Any, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """The content of a file; None if it is missing and may be.
-
-        Raises:
-            DamagedStore: It is not what was written, or it is missing.
-        """
-        content = await super().get(key, prototype, byte_range)
-        chunk = self._chunk(key)
-        fault = self._fault(chunk, content) if chunk else ""
-        if chunk and fault:
-            self._opened.report(chunk, fault)
-        return None if fault else content
+        """The content of a file; None if it is missing and may be."""
+        content, chunk = await super().get(key, prototype, byte_range), self._chunk(key)
+        if chunk and (fault := self._fault(chunk, content)):
+            return self._opened.report(chunk, fault)
+        return content
 
     async def set(self, key: str, value: Buffer) -> None:
-        """Write a file.
-
-        Raises:
-            StoreFailed: It describes an array otherwise than the root lists.
-        """
-        chunk = self._chunk(key)
-        opened = self._opened
+        """Write a file, unless it describes an array otherwise than the root lists."""
+        chunk, opened = self._chunk(key), self._opened
         listed = opened.digests.get(chunk.array) if chunk and chunk.place is None else None
         if listed and listed != sha256(value.to_bytes()):
             raise StoreFailed(f"{key} of {opened.location} was written by another Zarr release")
@@ -283,13 +221,12 @@ class CheckedStore(WrapperStore[Any]):
         if content is None:
             needed = chunk.array in opened.digests if described else opened.required(chunk)
             return "missing" if needed else ""
+        if described and chunk.array:
+            same = opened.digests.get(chunk.array) == sha256(content.to_bytes())
+            return "" if same else "changed since it was written"
         if described:
-            text = content.to_bytes()
-            if chunk.array:
-                same = opened.digests.get(chunk.array) == sha256(text)
-                return "" if same else "changed since it was written"
             try:
-                opened.digests = unsealed(text)[ARRAYS]
+                opened.digests = unsealed(content.to_bytes())[ARRAYS]
             except ValueError as error:
                 return str(error)
             return ""
@@ -301,10 +238,8 @@ class CheckedStore(WrapperStore[Any]):
 
 def _sync_in(path: Path, root: Path) -> None:
     """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
-    for place in (path, *path.parents):
+    for place in (path, *path.parents[: len(path.relative_to(root).parts)]):
         sync(place)
-        if place == root:
-            return
 
 
 def sha256(text: bytes) -> str:
@@ -318,11 +253,7 @@ def sealed(text: bytes) -> bytes:
 
 
 def unsealed(text: bytes) -> dict[str, Any]:
-    """Attributes of a root.
-
-    Raises:
-        ValueError: It was changed, or is not of softreach.
-    """
+    """Attributes of a root; `ValueError` if it was changed, or is not of softreach."""
     try:
         attributes = json.loads(text)["attributes"]
         if sealed(text.replace(attributes[DIGEST].encode(), BLANK.encode())) == text:
@@ -334,9 +265,8 @@ def unsealed(text: bytes) -> dict[str, Any]:
 
 def seal(folder: Path) -> None:
     """List what describes the arrays of a new store on disk in its root."""
-    digests = {
-        path.parent.name: sha256(path.read_bytes()) for path in sorted(folder.glob(f"*/{ROOT}"))
-    }
+    paths = sorted(folder.glob(f"*/{ROOT}"))
+    digests = {path.parent.name: sha256(path.read_bytes()) for path in paths}
     root = json.loads((folder / ROOT).read_bytes())
     root["attributes"] |= {ARRAYS: digests, DIGEST: BLANK}
     (folder / ROOT).write_bytes(sealed(json.dumps(root, indent=2).encode()))

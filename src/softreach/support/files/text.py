@@ -1,29 +1,20 @@
 """Text that others wrote, read up to a limit, and text of ours, written whole or not at all."""
 
-from __future__ import annotations
-
 import os
 import stat
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import TABLES, format_of
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 MEGABYTE = 1_000_000
 
 
 def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
-    """The text of a file of at most so many bytes in UTF-8; its lines end with a line feed.
-
-    Raises:
-        InvalidInput: No such file, another kind of file, too large a one, or no text in UTF-8.
-    """
+    """The text of a file of at most so many bytes in UTF-8; its lines end with a line feed."""
     shown = os.fspath(path)
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):  # some never end
@@ -53,19 +44,14 @@ def text_of(name: str, shown: str, content: bytes, most: int) -> str:
 
 
 def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> None:
-    """Write text in UTF-8.
-
-    Raises:
-        InvalidInput: Something is there, and `overwrite` is not given.
-        NotWritten: It cannot be written.
-    """
+    """Write text in UTF-8, whole or not at all."""
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     with writing(path, overwrite=overwrite) as file:
         file.write(text.encode())
 
 
-def write_table(path: str | os.PathLike[str], table: pd.DataFrame, *, overwrite: bool) -> None:
-    """Write a CSV, as `write_text`."""
+def write_table(path: str | os.PathLike[str], table: Any, *, overwrite: bool) -> None:
+    """Write a table of pandas as CSV, as `write_text`."""
     format_of(as_path("path", path), TABLES)
     text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
     write_text(path, text, overwrite=overwrite)

@@ -1,7 +1,5 @@
 """TOML as people write it: its tables with all their faults at once, and values as text."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib
@@ -10,27 +8,25 @@ from typing import Any
 
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, NotPossible, did_you_mean
 
-WRONG: Any = object()
-"""In place of a value that has faults."""
+WRONG: Any = object()  # In place of a value that has faults
 
 
 def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]:
-    """The tables of TOML text; `number` makes values of numbers with a point or an exponent.
+    """The tables of TOML text, or `ValueError`.
 
-    Raises:
-        ValueError: No TOML, whole numbers of more than 64 bits, or tables nested without end.
+    `number` makes values of numbers with a point or an exponent.
     """
     try:
         tables = tomllib.loads(text, parse_float=number)
-        if not _fit_64_bits(tables):
-            raise OverflowError
+        if _fit_64_bits(tables):
+            return tables
     except tomllib.TOMLDecodeError:
         raise
-    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
-        raise ValueError("a whole number has more than 64 bits") from None
     except RecursionError:
         raise ValueError("lists or tables are nested too deep") from None
-    return tables
+    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
+        pass
+    raise ValueError("a whole number has more than 64 bits")
 
 
 def _fit_64_bits(value: Any) -> bool:
@@ -42,11 +38,7 @@ def _fit_64_bits(value: Any) -> bool:
 def document_of(
     text: str, most: int, source: str, number: Callable[[str], Any] = float
 ) -> dict[str, Any]:
-    """The tables of TOML text of at most so many characters, called `source` in errors.
-
-    Raises:
-        InvalidDesign: Text that is no TOML, or too long.
-    """
+    """The tables of TOML text of at most so many characters, called `source` in errors."""
     if len(text) > most:
         allowed = f"must be at most {most:,} characters long, and has {len(text):,}"
         raise InvalidDesign([Fault("TOML", None, allowed)], source)
@@ -91,14 +83,12 @@ class FaultReader:
             self._refuse(f"{path}{key}", raw, "must be a table")
         return raw if isinstance(raw, dict) else {}
 
-    def _tables(
-        self, document: Mapping[str, Any], key: str
-    ) -> Iterator[tuple[dict[str, Any], str]]:
-        raw = document.get(key, [])
-        if not isinstance(raw, list):
-            self._refuse(key, raw, f"must be tables: write [[{key}]]")
+    def _tables(self, raw: Mapping[str, Any], key: str) -> Iterator[tuple[dict[str, Any], str]]:
+        tables = raw.get(key, [])
+        if not isinstance(tables, list):
+            self._refuse(key, tables, f"must be tables: write [[{key}]]")
             return
-        for k, table in enumerate(raw):
+        for k, table in enumerate(tables):
             if isinstance(table, dict):
                 yield table, f"{key}[{k}]"
             else:
@@ -112,12 +102,7 @@ def unknown_key(name: str, keys: Mapping[str, str]) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Text, numbers, truth values and sequences of them as JSON, which is TOML but for a character.
-
-    Raises:
-        TypeError: Another kind of value.
-        ValueError: A number that is not finite.
-    """
+    """Text, finite numbers, truth values and sequences of them as JSON, which is TOML."""
     if not _is_plain(value):
         raise TypeError(f"{type(value).__name__} has no text in TOML")
     return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
