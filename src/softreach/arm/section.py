@@ -306,7 +306,8 @@ class Section(Part):
         """Faults that keep loads from acting on an arm."""
         faults = self.modulus_faults("where loads act")
         if self.measured is not None and self.bending_ratio != 1.0:
-            given, allowed = self.measured.bending_stiffness, "must be one number where loads act or compliance is computed"
+            allowed = "must be one number where loads act or compliance is computed"
+            given = self.measured.bending_stiffness
             faults.append(Fault("measured.bending_stiffness", given, allowed))
         return faults
 
