@@ -15,8 +15,8 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.cli.app import MODULES, app, run
-from softreach.cli.changes import design_from
 from softreach.cli.console import console
+from softreach.cli.options import design_from
 from softreach.rod.summary import describe
 
 # Few samples make the α-shape too fine; the command line prints that and goes on.

@@ -18,11 +18,11 @@ from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _GROUPS = (
-    ("Design", "design:design search:check search:search listing:list studio:studio"),
+    ("Design", "design:design search:check search:search demo:list studio:studio"),
     ("Bench", "bench:plan-poses bench:calibrate"),
-    ("Reach", "reach:reach cloud:cloud cloud:volume reach:payload reach:gradient"),
+    ("Reach", "reach:reach reach:cloud reach:volume reach:payload reach:gradient"),
     ("Places", "places:solve places:track places:equilibria"),
-    ("Output", "cloud:show convert:export convert:import"),
+    ("Output", "reach:show convert:export convert:import"),
     ("Families", "atlas:atlas"),
     ("More", "demo:demo demo:example warmup:doctor demo:paper warmup:warmup"),
 )

@@ -10,9 +10,8 @@ from cyclopts import App, Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import console
-from softreach.cli.values import Whole, pairs_in, read_as, rows_of
+from softreach.cli.console import console, rows_of
+from softreach.cli.options import UNCHANGED, Changes, Whole, design_from, pairs_in, read_as
 from softreach.support.arguments import POSITIVE, as_integer
 from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
 from softreach.support.files.text import read_text

@@ -9,9 +9,8 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
-from softreach.cli.console import console
-from softreach.cli.values import Number, Rows
+from softreach.cli.console import Rows, console
+from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible
 
 Format = Annotated[

@@ -8,10 +8,18 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import softreach as sr
-from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import console
-from softreach.cli.options import DEFAULT, Design, Out, Output, check_output, refuse
-from softreach.cli.values import Rows, to_degrees
+from softreach.cli.console import Rows, console, to_degrees
+from softreach.cli.options import (
+    DEFAULT,
+    UNCHANGED,
+    Changes,
+    Design,
+    Out,
+    Output,
+    check_output,
+    design_from,
+    refuse,
+)
 from softreach.support.errors import NotPossible, no_warnings
 
 if TYPE_CHECKING:

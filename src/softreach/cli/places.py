@@ -7,9 +7,8 @@ from typing import Annotated
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
-from softreach.cli.console import console
-from softreach.cli.values import Whole, fields_of, for_machines
+from softreach.cli.console import console, fields_of, for_machines
+from softreach.cli.options import UNCHANGED, Changes, Signed, Whole, design_from
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text

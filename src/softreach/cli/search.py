@@ -12,15 +12,13 @@ from cyclopts import Group, Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
-from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, fields_of, for_machines, pairs_in
+from softreach.cli.console import as_read, console, fields_of, for_machines
+from softreach.cli.options import UNCHANGED, Changes, Number, Whole, design_from, pairs_in, shown_in
 from softreach.support import progress
 from softreach.support.files.text import read_text
 
 _ASKED = Group("Override the file", sort_key=1)
-_EXIT = {"met": 0, "missed": 1, "undecided": 3}
-"""Verdict -> exit code; 2 is that of wrong input."""
+_EXIT = {"met": 0, "missed": 1, "undecided": 3}  # verdict -> exit code; 2 is that of wrong input
 
 
 def check(

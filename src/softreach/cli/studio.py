@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.atlas import grid_of
-from softreach.cli.changes import design_from
 from softreach.cli.console import console
-from softreach.cli.options import OUTPUT, Overwrite, Unit, is_stored, refuse
-from softreach.cli.values import Whole
+from softreach.cli.options import OUTPUT, Overwrite, Unit, Whole, design_from, is_stored, refuse
 from softreach.support import progress
 from softreach.support.errors import NotPossible, counted
 from softreach.support.interruption import wait_for_signal
@@ -21,7 +19,6 @@ from softreach.support.interruption import wait_for_signal
 if TYPE_CHECKING:
     from softreach.studio import Start
     from softreach.studio.start import KeptWork
-
 
 _HERE = "127.0.0.1"
 

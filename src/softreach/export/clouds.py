@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-
 _BLOCK = 1 << 18
 _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 

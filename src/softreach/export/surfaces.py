@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
-
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 _CORE_3MF = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 _UNITS_3MF = {"m": "meter", "cm": "centimeter", "mm": "millimeter", "in": "inch"}

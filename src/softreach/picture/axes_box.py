@@ -24,10 +24,8 @@ _FLAT = 0.25  # of its length, that a tick along the floor has at least in the p
 class Edge(NamedTuple):
     """The edge that carries the numbers of an axis."""
 
-    high: tuple[bool, ...]
-    """True where it is at the high side, along x, y and z."""
-    outward: int
-    """The axis along which its ticks lead out of the box."""
+    high: tuple[bool, ...]  # True where it is at the high side, along x, y and z
+    outward: int  # The axis along which its ticks lead out of the box
 
 
 class Side(NamedTuple):
@@ -37,19 +35,15 @@ class Side(NamedTuple):
     """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""
     edges: tuple[Edge | None, ...]
     """With the numbers of x, y and z; None of an axis that is seen end on."""
-    steps: tuple[float, ...]
-    """From one number to the next [L]."""
-    names: tuple[float, ...]
-    """From an edge to the name of its axis, in ticks."""
+    steps: tuple[float, ...]  # From one number to the next [L]
+    names: tuple[float, ...]  # From an edge to the name of its axis, in ticks
 
 
 class AxesBox(NamedTuple):
     """Lines and texts [L]."""
 
-    lines: Array
-    """Shape (n, 2, 3)."""
-    labels: list[tuple[str, Array]]
-    """Text and where it stands."""
+    lines: Array  # Shape (n, 2, 3)
+    labels: list[tuple[str, Array]]  # Text and where it stands
 
 
 def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf) -> Side:

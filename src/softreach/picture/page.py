@@ -32,38 +32,29 @@ class PagePart(NamedTuple):
     """Something to show; parts of one name are switched on and off together."""
 
     name: str
-    shape: Dots | Skin
-    """In the unit of the page."""
+    shape: Dots | Skin  # In the unit of the page
     opacity: float = 1.0
-    through: bool = False
-    """True if it shows through what hides it."""
-    surface: bool = False
-    """True if a slider changes its opacity."""
-    size: float = 0.0
-    """Diameter of dots, in the unit of the page."""
+    through: bool = False  # True if it shows through what hides it
+    surface: bool = False  # True if a slider changes its opacity
+    size: float = 0.0  # Diameter of dots, in the unit of the page
 
 
-PackedPart = dict[str, Any]
-"""A part as the script of a page reads it."""
+PackedPart = dict[str, Any]  # a part as the script of a page reads it
 
 
 class Swatches(NamedTuple):
     """Key of colors that stand for something each."""
 
-    entries: Sequence[tuple[str, str]]
-    """Label and color, as CSS has it."""
-    title: str = ""
-    """Meaning of the colors."""
+    entries: Sequence[tuple[str, str]]  # Label and color, as CSS has it
+    title: str = ""  # Meaning of the colors
 
 
 class ColorScale(NamedTuple):
     """Key of colors that stand for numbers."""
 
     label: str
-    colors: Sequence[str]
-    """In even steps, as CSS has them."""
-    numbers: Sequence[str]
-    """Below the scale, in even steps from end to end."""
+    colors: Sequence[str]  # In even steps, as CSS has them
+    numbers: Sequence[str]  # Below the scale, in even steps from end to end
 
 
 @dataclass(frozen=True)

@@ -52,22 +52,17 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
 class Skin(NamedTuple):
     """A lit surface."""
 
-    vertices: ArrayLike
-    """Shape (v, 3)."""
-    faces: ArrayLike
-    """Shape (f, 3)."""
+    vertices: ArrayLike  # Shape (v, 3)
+    faces: ArrayLike  # Shape (f, 3)
     color: Color = STEEL
-    clear: bool = False
-    """True if the outward sides of all that is not so show through it."""
+    clear: bool = False  # True if the outward sides of all that is not so show through it
 
 
 class Dots(NamedTuple):
     """Points."""
 
-    points: ArrayLike
-    """Shape (n, 3)."""
-    colors: ArrayLike = (64, 100, 150)
-    """RGB from 0 to 255, shape (n, 3) or (3,)."""
+    points: ArrayLike  # Shape (n, 3)
+    colors: ArrayLike = (64, 100, 150)  # RGB from 0 to 255, shape (n, 3) or (3,)
 
 
 def html_card(text: str, *parts: Skin | Dots, view: View = "oblique") -> str:

@@ -16,14 +16,15 @@ from softreach.picture.shading import draw_mesh, faces_to_eye
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
-from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import (
     WIDTH,
+    Unit,
     a_result,
     figure_style,
     legend_above,
     new_figure,
     some_bundles,
+    unit_for,
 )
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_configuration
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
@@ -130,8 +130,9 @@ def draw_arms(
 def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
     """Small dots where the markers of all shapes are."""
     if arm.markers:
-        points = [marker_points(arm.markers, shape) for shape in shapes]
-        panel.dot(np.concatenate(points), 1.0 - fade)
+        points = np.concatenate([marker_points(arm.markers, shape) for shape in shapes])
+        edge = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4, "zorder": 3}
+        panel.plot(panel.unit.of(points), "o", markersize=3, alpha=1.0 - fade, **edge)
 
 
 def arm_images(
@@ -204,10 +205,9 @@ def plot_designs(
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
     with figure_style():
         heights = [2.6, *[width / len(panels)] * len(stations)]
-        shape = {"height_ratios": heights, "squeeze": False}
-        size = (width, sum(heights) + 0.1)
-        figure = new_figure(figsize=size, layout="constrained")
-        axes = figure.subplots(len(heights), len(panels), **shape)
+        figure = new_figure(figsize=(width, sum(heights) + 0.1), layout="constrained")
+        shape = len(heights), len(panels)
+        axes = figure.subplots(*shape, height_ratios=heights, squeeze=False)
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
             drawn, shown = panel.bundles, length * box

@@ -28,9 +28,8 @@ from softreach.plot.coloring import (
     draw_figure_key,
     key_height,
 )
-from softreach.plot.lengths import unit_of
 from softreach.plot.statistics import SIDES, plot_curvature
-from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes
+from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes, unit_of
 from softreach.schema import is_stable
 from softreach.support import parallel
 from softreach.support.arguments import as_integer
@@ -42,7 +41,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
 _KEY = 0.45  # inches for the key of colors at least

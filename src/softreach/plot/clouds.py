@@ -23,15 +23,18 @@ from softreach.plot.coloring import (
     draw_key,
     key_height,
 )
-from softreach.plot.lengths import Unit, common_unit, unit_for, unit_of
 from softreach.plot.style import (
     LENGTH,
     PAGE,
     PLACE,
     SIZE,
+    Unit,
     as_box,
+    common_unit,
     figure_style,
     place_panels,
+    unit_for,
+    unit_of,
     write_note,
 )
 from softreach.rod.kinematics import rest_configuration
@@ -47,11 +50,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
 _LARGEST = 8.0  # pixels
 _THICKNESS = 1 / 50  # of L, or of the cloud's extent
-Images = tuple[ZBuffer, ZBuffer | None]
-"""An image, and what shows through it."""
+Images = tuple[ZBuffer, ZBuffer | None]  # an image, and what shows through it
 
 _VIEWS = ("front", "side", "top", "oblique")
 _BESIDE = {True: (0.55, 0.12), False: (0.60, 0.22)}  # left and right of four views, in L or not

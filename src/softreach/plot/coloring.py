@@ -35,12 +35,9 @@ class BundleKey(NamedTuple):
 
     names: tuple[str, ...]
     colors: NDArray[np.uint8]
-    symbols: tuple[str, ...]
-    """Symbol of the activation of each: γ, τ or P."""
-    unstable: bool = False
-    """True if some samples are marked as unstable equilibria."""
-    title: str = ""
-    """Meaning of a color by itself; empty if it is one part of a mixture."""
+    symbols: tuple[str, ...]  # Symbol of the activation of each: γ, τ or P
+    unstable: bool = False  # True if some samples are marked as unstable equilibria
+    title: str = ""  # Meaning of a color by itself; empty if it is one part of a mixture
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -57,12 +54,10 @@ class ScalarKey(NamedTuple):
     label: str
     low: float
     high: float
-    unstable: bool = False
-    """True if some samples are marked as unstable equilibria."""
+    unstable: bool = False  # True if some samples are marked as unstable equilibria
     logarithmic: bool = False
     """True if equal ratios, and not equal differences, are equal steps of color."""
-    clipped: bool = False
-    """True if the ends stand for all values beyond them too."""
+    clipped: bool = False  # True if the ends stand for all values beyond them too
 
     @property
     def extend(self) -> str:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import LENGTH, PLACE, some_bundles, styled_axes
+from softreach.plot.style import LENGTH, PLACE, Unit, some_bundles, styled_axes, unit_for
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, Color, bundle_color, material_fill
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 
     from softreach.arm.material import Material
     from softreach.arm.section import Section
-
 
 _MOST = 12  # entries
 _HANDLE, _LETTER = 0.5, 0.056  # inches

@@ -22,8 +22,7 @@ from softreach.plot.arm import shapes_of
 from softreach.plot.axes import bounding_box
 from softreach.plot.clouds import drawn_tips, point_size
 from softreach.plot.coloring import BundleKey, ScalarKey, color_map, color_samples, key_entries
-from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import a_surface
+from softreach.plot.style import Unit, a_surface, unit_for
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_cloud, a_configuration

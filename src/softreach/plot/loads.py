@@ -12,8 +12,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.picture.projection import View, on_paper
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import a_result, figure_style, styled_axes
+from softreach.plot.style import Unit, a_result, figure_style, styled_axes, unit_for
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
 from softreach.support.arguments import POSITIVE, as_number
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
     from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
-
 
 _STATIONS = 121
 _PALE = 0.7  # how far the colors of other stable arms go toward white

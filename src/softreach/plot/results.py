@@ -11,14 +11,15 @@ import numpy as np
 from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
 from softreach.plot.axes import bounding_box, draw_box, view_extent
 from softreach.plot.coloring import COLORMAP
-from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import (
+    Unit,
     a_result,
     figure_style,
     legend_above,
     new_figure,
     pyplot,
     remark,
+    unit_for,
     write_note,
 )
 from softreach.support.arrays import Array, Mask

@@ -16,14 +16,16 @@ from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
 from softreach.picture.shading import draw_mesh
 from softreach.plot.axes import Panel
 from softreach.plot.coloring import draw_entries
-from softreach.plot.lengths import Unit, unit_for, unit_of
 from softreach.plot.style import (
     LENGTH,
     PLACE,
+    Unit,
     a_surface,
     figure_style,
     new_figure,
     styled_axes,
+    unit_for,
+    unit_of,
 )
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number
 from softreach.support.arrays import as_floats

@@ -21,14 +21,16 @@ from softreach.plot.coloring import (
     draw_key,
     scale_colors,
 )
-from softreach.plot.lengths import Unit, common_unit, unit_of
 from softreach.plot.style import (
     LENGTH,
     PAGE,
+    Unit,
+    common_unit,
     figure_style,
     new_figure,
     place_panels,
     styled_axes,
+    unit_of,
     write_note,
 )
 from softreach.schema import a_cloud
@@ -47,7 +49,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
