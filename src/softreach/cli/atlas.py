@@ -69,6 +69,9 @@ def build(
         scheduler: Dask scheduler: tcp://host:port
         scheduler_file: Dask scheduler file.
     """
+    first, _, count = shard.partition("/")
+    if not (shard.isascii() and first.isdigit() and count.isdigit() and len(shard) < 20):
+        raise InvalidInput("shard", shard or "''", "i/k with 0 <= i < k")
     groups = tuple(sr.atlas.METRIC_GROUPS if metrics is None else metrics.split(","))
     if "concave" not in groups:
         options.refuse("without the metrics concave", alpha=alpha)
@@ -80,7 +83,7 @@ def build(
         metrics=groups,
         keep_clouds=keep_clouds,
         executor=_executor(scheduler, scheduler_file),
-        shard=_shard(shard),
+        shard=(int(first), int(count)),
         durable=durable,
     )
     status(store, json=json)
@@ -153,8 +156,7 @@ def best(
     if out is not None:
         if not designs.sizes["rank"]:
             raise NotPossible(f"no design of {store} meets {' and '.join(where or ())}")
-        parameters = command_of(atlas).space.names
-        first = {name: float(designs[name][0]) for name in parameters}
+        first = {name: float(designs[name][0]) for name in command_of(atlas).space.names}
         sr.atlas.atlas_design(atlas, **first).save(out, overwrite=overwrite)
     console.rows(f"best {metric} of {store}", rows_of(designs), json)
 
@@ -228,10 +230,3 @@ def _over_length(text: str) -> float:
     allowed = "a radius > 0 over the length of each design, like 0.05L"
     bare = text[:-1] if text.endswith("L") else ""
     return read_as("alpha", text, lambda _: read_number(bare), allowed, POSITIVE)
-
-
-def _shard(text: str) -> tuple[int, int]:
-    first, _, count = text.partition("/")
-    if not (text.isascii() and first.isdigit() and count.isdigit() and len(text) < 20):
-        raise InvalidInput("shard", text or "''", "i/k with 0 <= i < k")
-    return int(first), int(count)

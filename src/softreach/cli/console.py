@@ -29,15 +29,14 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import xarray as xr
-    from rich.console import Console as RichConsole
 
 Rows = dict[str, tuple[Any, str]]  # name -> (value, unit)
 ERROR = " error"  # behind the name of a row with the error of another
 _READ_AS = {"m2": "m²", "m3": "m³", "1": ""}
 _PLAIN = str.maketrans({"³": "3", "²": "2", "/": "_per_", " ": "_", "(": "", ")": ""})
 _NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
+# characters that a terminal obeys: of names and paths that others gave
 _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-"""Characters that a terminal obeys: of names and paths that others gave."""
 
 
 def _printable(text: object) -> str:
@@ -45,15 +44,10 @@ def _printable(text: object) -> str:
 
 
 class Console:
-    """Prints for all commands.
+    """Prints for all commands."""
 
-    Attributes:
-        quiet: Results and errors only.
-        verbose: Also what is compiled, and where an error comes from.
-    """
-
-    quiet = False
-    verbose = False
+    quiet = False  # Results and errors only
+    verbose = False  # Also what is compiled, and where an error comes from
 
     def set(self, *, quiet: bool = False, verbose: bool = False) -> None:
         """Set how much is printed."""
@@ -71,13 +65,9 @@ class Console:
     def rows(
         self, title: str, rows: Rows, as_json: bool, arm: sr.Manipulator | None = None
     ) -> None:
-        """Named values with their units, one below the other.
+        """Named values in SI units below a title; in JSON, names with their units are the keys.
 
-        Args:
-            title: Heading for people.
-            rows: Name -> (value, unit) in SI units; JSON keys are the names with their units.
-            as_json: Print JSON.
-            arm: The design whose unit people see, and whose length is the unit L for machines.
+        People see the unit of the arm, and machines values in its length L too.
         """
         if as_json:
             self.json(for_machines(rows, None if arm is None else arm.length))
@@ -129,20 +119,15 @@ class Console:
             log.setLevel(level)
 
     def flush(self) -> None:
-        """Write what was printed, so that a full disk is found before the end.
-
-        Raises:
-            NotWritten: It cannot be written.
-            BrokenPipeError: Whoever read it has gone.
-        """
+        """Write what was printed, so that a full disk is found before the end."""
         try:
             sys.stdout.flush()
         except BrokenPipeError:
             raise
         except OSError as error:
             self.discard()
-            reason = error.strerror or str(error)
-            raise NotWritten("standard output", error.errno or 0, reason) from None
+            why = error.errno or 0, error.strerror or str(error)
+            raise NotWritten("standard output", *why) from None
 
     def discard(self) -> None:
         """Drop output that cannot be written; Python would print an error."""
@@ -159,17 +144,14 @@ class HelpConsole:
     """The console that help is laid out on, made when it is needed as Rich takes its time."""
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(_rich_console(), name)
+        from rich.console import Console as RichConsole
 
+        class StrictConsole(RichConsole):
+            def on_broken_pipe(self) -> None:
+                raise BrokenPipeError
 
-def _rich_console() -> RichConsole:
-    from rich.console import Console as RichConsole
-
-    class StrictConsole(RichConsole):
-        def on_broken_pipe(self) -> None:
-            raise BrokenPipeError
-
-    return StrictConsole(width=max(_NARROWEST, shutil.get_terminal_size().columns))
+        width = max(_NARROWEST, shutil.get_terminal_size().columns)
+        return getattr(StrictConsole(width=width), name)
 
 
 class _Compilations(logging.Handler):

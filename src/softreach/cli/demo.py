@@ -14,12 +14,13 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import as_read, console
 from softreach.cli.options import UNCHANGED, Changes, Whole, design_from
-from softreach.cli.reach import check_hull_memory, volume_rows
+from softreach.cli.reach import HULL_BYTES, volume_rows
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PICTURES
 from softreach.support.files.text import write_text
+from softreach.support.memory import check_memory
 
 Kind = Literal[
     "designs", "examples", "materials", "actuators", "metrics", "objectives", "parameters"
@@ -59,7 +60,7 @@ def demo(
     formats |= {"cloud.ply": CLOUD_FILES, "hull.ply": CLOUD_FILES}
     for name, kinds in formats.items():
         options.check_output(out / name, kinds, output.overwrite)
-    check_hull_memory(n)
+    check_memory("n", n, HULL_BYTES * n)
     cloud = sr.compute_cloud(arm, n)
     computed = perf_counter() - start
     written = options.written_unit(arm)

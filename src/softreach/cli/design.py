@@ -158,22 +158,17 @@ def load_rows(arm: sr.Manipulator) -> Rows:
     if loads is None:
         return rows
     if any(loads.gravity):
-        rows = {
-            "gravity": (list(loads.gravity), "m/s²"),
-            "base": (_posture(loads.seen_from(arm.base)) + (f": {arm.base}" if posed else ""), ""),
-        }
+        gravity = loads.seen_from(arm.base).gravity  # a straight arm points along +z there
+        angle = to_degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
+        words = {0: "upright", 90: "sideways", 180: "hanging"}
+        posture = words.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
+        posture += f": {arm.base}" if posed else ""
+        rows = {"gravity": (list(loads.gravity), "m/s²"), "base": (posture, "")}
     for field, number in fields_of(type(loads)).items():
         value = getattr(loads, field)
         if field != "gravity" and (any(value) if isinstance(value, tuple) else value):
             rows[field.replace("_", " ")] = (value, number.unit)
     return rows | ({"point loads": (len(loads.point_loads), "")} if loads.point_loads else {})
-
-
-def _posture(loads: sr.Loads) -> str:
-    """The way the base stands by gravity in its own frame: a straight arm points along +z there."""
-    angle = to_degrees(math.acos(-loads.gravity[2] / math.hypot(*loads.gravity)))
-    names = {0: "upright", 90: "sideways", 180: "hanging"}
-    return names.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
 
 
 def _rest_rows(arm: sr.Manipulator) -> Rows:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -20,11 +20,9 @@ from softreach.support.files.formats import PAGES, PICTURES
 from softreach.support.memory import check_memory
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from softreach.geometry.hull import Hull
 
-_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
+HULL_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
 
 
 def reach(
@@ -275,7 +273,7 @@ def volume(
     options.check_output(out, SURFACE_FILES, output.overwrite)
     options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
     if not options.is_stored(source):
-        check_hull_memory(sampling.count)
+        check_memory("n", sampling.count, HULL_BYTES * sampling.count)
     cloud, arm = options.cloud_of(source, sampling, changes, output.unit)
     bias = cloud.attrs["sampler"] == "uniform"
     concave = sr.concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
@@ -291,11 +289,6 @@ def volume(
         written = options.written_unit(arm)
         sr.export.export_mesh(concave, out, unit=written, overwrite=output.overwrite)
         console.written(out, written)
-
-
-def check_hull_memory(n: int) -> None:
-    """Refuse more samples than can be computed and triangulated in the free memory."""
-    check_memory("n", n, _BYTES * n)
 
 
 def volume_rows(concave: Hull, convex: Hull) -> Rows:
@@ -337,22 +330,17 @@ def show(
             effort, the name of a bundle, or compliance (how far the tip yields).
         out: Picture file: .png .pdf .svg, or .html to turn
     """
+    from softreach.plot.coloring import bundle_names
+
     options.check_picture(out, overwrite, page=True)
     cloud, arm = options.cloud_of(source, sampling, changes, unit)
     shape = None if activation is None else options.shape_of(activation, arm)
-    look = {"color": _colors(cloud, color), "unit": arm.length_unit}
+    look: dict[str, Any] = {"color": color, "unit": arm.length_unit}
+    if color == "compliance" and color not in bundle_names(cloud):  # which figures do not compute
+        look["color"] = sr.stiffness.cloud_compliance(cloud)["largest_compliance"]
     if options.is_page(out):
         figure = sr.plot.plot_3d([cloud, arm if shape is None else shape], **look)
     else:
         figure = sr.plot.plot_views(cloud, arm, shape, **look)
     options.save_picture(figure, out, overwrite)
     console.line(out)
-
-
-def _colors(cloud: xr.Dataset, color: str | None) -> str | xr.DataArray | None:
-    """The colors of the samples: a name that figures know, or numbers that they do not compute."""
-    from softreach.plot.coloring import bundle_names
-
-    if color != "compliance" or color in bundle_names(cloud):
-        return color
-    return sr.stiffness.cloud_compliance(cloud)["largest_compliance"]

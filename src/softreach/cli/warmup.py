@@ -127,6 +127,12 @@ def doctor(*, json: AsJson = False) -> None:
 
     Example: softreach doctor --json
     """
+    from softreach.kernels.compiler import not_kept
+    from softreach.kernels.rod import tips
+
+    cache = getattr(tips._tips, "_cache", None)
+    kept = str(getattr(cache, "cache_path", "nowhere: not compiled"))
+    kept = f"nowhere: {not_kept[0]}" if not_kept else kept
     names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
     has_screen = platform.system() in ("Windows", "Darwin")
     has_screen = has_screen or bool({"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ})
@@ -138,20 +144,11 @@ def doctor(*, json: AsJson = False) -> None:
         "cores": (os.cpu_count(), ""),
         "threads used": (thread_count(), ""),
         "free memory": (round(free_memory() / 1e9, 1), "GB"),
-        "kernels are kept in": (_kernel_cache(), ""),
+        "kernels are kept in": (kept, ""),
         "screen": ("yes" if has_screen else "none: headless", ""),
     }
     rows |= {name: (_version(name), "") for name in names if name != "softreach"}
     console.rows("this machine and this installation", rows, json)
-
-
-def _kernel_cache() -> str:
-    from softreach.kernels.compiler import not_kept
-    from softreach.kernels.rod import tips
-
-    if not_kept:
-        return f"nowhere: {not_kept[0]}"
-    return str(getattr(getattr(tips._tips, "_cache", None), "cache_path", "nowhere: not compiled"))
 
 
 def _version(package: str) -> str:
