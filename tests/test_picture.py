@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from softreach.geometry.hull import convex_hull
 from softreach.picture import Dots, Skin, html_card, thumbnail
 from softreach.picture.projection import VIEWS, is_mirrored, project, sight_axis, view_axes
-from softreach.picture.shading import shade
 from softreach.picture.thumbnail import png_bytes
-from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.picture.zbuffer import Extent, ZBuffer, shade
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
 

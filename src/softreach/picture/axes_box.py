@@ -31,10 +31,8 @@ class Edge(NamedTuple):
 class Side(NamedTuple):
     """Side from which a box is seen: all that its drawing depends on."""
 
-    visible: tuple[int, ...]
-    """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""
-    edges: tuple[Edge | None, ...]
-    """With the numbers of x, y and z; None of an axis that is seen end on."""
+    visible: tuple[int, ...]  # Face across x, y and z seen from outside: 1 the high one, -1 the low
+    edges: tuple[Edge | None, ...]  # With the numbers of x, y and z; None if it is seen end on
     steps: tuple[float, ...]  # From one number to the next [L]
     names: tuple[float, ...]  # From an edge to the name of its axis, in ticks
 
@@ -47,20 +45,18 @@ class AxesBox(NamedTuple):
 
 
 def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf) -> Side:
-    """The side of a box that a camera sees.
+    """The side of a box, from its lowest to its highest corner [L], that a camera sees.
 
-    Args:
-        camera: Where it is [L].
-        low: Lowest corner of the box [L].
-        high: Highest [L].
-        focal: Focal length of the camera [pixel]: numbers have room between each other.
+    The camera is at a place [L]; by its focal length [pixel], numbers have room between each other.
     """
     place = np.asarray(camera, float)
     visible = tuple(((place > high).astype(int) - (place < low)).tolist())
     toward = place - (low + high) / 2
     toward /= max(float(np.linalg.norm(toward)), 1e-12)
-    right = np.array([-toward[1], toward[0], 0.0])
-    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
+    right = (
+        np.array([-toward[1], toward[0], 0.0]) if toward[:2].any() else np.array([1.0, 0.0, 0.0])
+    )
+    right /= np.linalg.norm(right)
     picture = np.stack([right, np.cross(toward, right)])  # right and up, shape (2, 3)
     edges = [_outer_edge(axis, visible, toward, picture) for axis in range(3)]
     usual = _round_step(float((high - low).max()))
@@ -113,13 +109,9 @@ def axes_box(
     focal: float = np.inf,
     label: Callable[[str], str] = "{} / L".format,
 ) -> AxesBox:
-    """The box around points, shapes (n, 3), without the edges that would run across them.
+    """The box around points [L], shapes (n, 3), without the edges that would run across them.
 
-    Args:
-        points: What is in the box [L].
-        camera: From where it is seen [L].
-        focal: As `seen_from` takes it.
-        label: From "x", "y" or "z" to the name of that axis, with its unit.
+    Camera and focal length are as in `seen_from`; the label names an axis, with its unit.
     """
     low, high = round_box(*points)
     side = seen_from(camera, low, high, focal)

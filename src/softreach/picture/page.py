@@ -88,21 +88,11 @@ def web_page(
     more: str = "",
     scripts: str = "",
 ) -> str:
-    """The page as HTML.
+    """The page as HTML: parts in a box, lower and upper corner in a unit, shape (2, 3).
 
-    Args:
-        parts: What it shows.
-        box: Lower and upper corner around it, in the unit, shape (2, 3).
-        unit: Of places.
-        keys: To the colors.
-        caption: Text below the figure.
-        note: Small text below that.
-        view: The direction of sight at first.
-        more: HTML at the end of the page, whose scripts know the names of the page's own.
-        scripts: Where else scripts may come from, as a Content-Security-Policy has it.
-
-    Raises:
-        InvalidInput: An unknown view.
+    Keys explain the colors; the caption, and a note in small letters, stand below the figure.
+    `more` is HTML at the end, whose scripts know the names of the page's own; `scripts` says where
+    else scripts may come from, as a Content-Security-Policy has it.
     """
     content = {
         "box": box.tolist(),
@@ -115,12 +105,11 @@ def web_page(
         "note": note,
         "parts": [part if isinstance(part, dict) else _packed(part, box) for part in parts],
     }
-    text = script_text(content)
     page = files("softreach.picture").joinpath("page.html").read_text(encoding="utf-8")
     title = html.escape(caption.partition("\n")[0] or "softreach")
     head, body = page.split("@DATA@")
     head = head.replace("@SCRIPTS@", scripts and f" {scripts}").replace("@TITLE@", title)
-    return head + text + body.replace("@MORE@", more)
+    return head + script_text(content) + body.replace("@MORE@", more)
 
 
 def script_text(content: Any) -> str:

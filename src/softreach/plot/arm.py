@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.projection import View, plane_of
-from softreach.picture.shading import draw_mesh, faces_to_eye
-from softreach.picture.zbuffer import ZBuffer
+from softreach.picture.zbuffer import ZBuffer, draw_mesh, faces_to_eye
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.style import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,8 +17,7 @@ from softreach.cloud.curvature import curvature_statistics
 from softreach.cloud.volume import concave_hull
 from softreach.geometry.hull import Hull
 from softreach.picture.projection import View, view_axes
-from softreach.picture.shading import draw_mesh
-from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.picture.zbuffer import Extent, ZBuffer, draw_mesh
 from softreach.plot.axes import view_extent
 from softreach.plot.clouds import drawn_tips, plot_opposite_sides, point_size
 from softreach.plot.coloring import (
@@ -160,18 +159,14 @@ def hull_over_length(cloud: xr.Dataset, alpha: float) -> Hull:
 
 
 def box_over_length(atlas: xr.Dataset) -> Array:
-    """Corners around all clouds, each in its own L [-], shape (2, 3).
-
-    Raises:
-        InvalidInput: The atlas has no bounding boxes, or no design is done.
-    """
+    """Corners around all clouds, each in its own L [-], shape (2, 3)."""
     if "x_min" not in atlas:
         raise InvalidInput("atlas", "without bounding boxes", 'built with the metrics "extent"')
-    low = [float(over_length(atlas, f"{axis}_min").min()) for axis in "xyz"]
-    high = [float(over_length(atlas, f"{axis}_max").max()) for axis in "xyz"]
-    if not np.isfinite([low, high]).all():
+    low = [over_length(atlas, f"{axis}_min").min() for axis in "xyz"]
+    box = np.array([low, [over_length(atlas, f"{axis}_max").max() for axis in "xyz"]])
+    if not np.isfinite(box).all():
         raise InvalidInput("atlas", "no design is done", "at least one design")
-    return np.array([low, high])
+    return box
 
 
 def panel_extent(box: Array, view: View) -> Extent:
@@ -211,8 +206,7 @@ def _sheet(
         top = max(_KEY, key_height(key)) if keyed else _TOP
         figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
         grid = grid[::-1]  # row 0 at the bottom
-        _label_sheet(grid, across, up)
-        _name_axes(figure, (across, up), atlas, top)
+        _label_sheet(figure, grid, (across, up), atlas, top)
         across_each = max(16, round(grid[0, 0].get_position().width * PAGE * DPI))
 
         def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
@@ -229,26 +223,22 @@ def _sheet(
     return figure
 
 
-def _label_sheet(grid: NDArray[Any], across: SheetAxis, up: SheetAxis) -> None:
+def _label_sheet(
+    figure: Figure, grid: NDArray[Any], axes: Sequence[SheetAxis], atlas: xr.Dataset, top: float
+) -> None:
+    """Both parameters: their values beside the panels, and how many of them are shown."""
     for ax in grid.ravel().tolist():
         ax.patch.set_visible(False)
         ax.spines[:].set(color="0.88", linewidth=0.4)
-    for ax, value in zip(grid[0], across.values, strict=True):
+    for ax, value in zip(grid[0], axes[0].values, strict=True):
         ax.set_xlabel(f"{value:.4g}", labelpad=3)
-    for ax, value in zip(grid[:, 0], up.values, strict=True):
+    for ax, value in zip(grid[:, 0], axes[1].values, strict=True):
         ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
-
-
-def _name_axes(
-    figure: Figure, axes: tuple[SheetAxis, SheetAxis], atlas: xr.Dataset, top: float
-) -> None:
-    """Symbols of both parameters, and how many of their values are shown."""
     width, height = figure.get_size_inches()
     middle = (_LEFT + width - _RIGHT) / 2 / width, (_BOTTOM + height - top) / 2 / height
-    sizes = zip(axes, (len(axis.values) for axis in axes), atlas["status"].shape, strict=True)
     across, up = (
-        axis.label if shown == size else f"{axis.label}, {shown} of {size} values"
-        for axis, shown, size in sizes
+        axis.label + f", {len(axis.values)} of {size} values" * (len(axis.values) < size)
+        for axis, size in zip(axes, atlas["status"].shape, strict=True)
     )
     figure.text(middle[0], 0.12 / height, across, ha="center", fontsize=9)
     figure.text(0.1 / width, middle[1], up, va="center", rotation=90, fontsize=9)
@@ -314,11 +304,7 @@ class SheetAxis(NamedTuple):
 
 
 def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:
-    """The two parameters of an atlas, for the horizontal and the vertical edge.
-
-    Raises:
-        InvalidInput: The atlas is no grid of two parameters.
-    """
+    """The two parameters of an atlas, for the horizontal and the vertical edge."""
     dims = atlas["status"].dims
     if len(dims) != 2:
         raise InvalidInput("atlas", f"of dimensions {dims}", "a grid of two parameters")
@@ -351,7 +337,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
         if np.isfinite(values).any():
             _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         relative = _RELATIVE.get(atlas[metric].attrs.get("units", "1"), "")
-        label = _NAMES.get(metric, _plain(metric) + relative)
+        label = _NAMES.get(metric, metric.replace("_", " ") + relative)
         ax.figure.colorbar(filled, ax=ax, label=label)
         ax.set(xlabel=across.label, ylabel=up.label)
     return ax
@@ -361,15 +347,11 @@ def _axis(values: xr.DataArray) -> SheetAxis:
     si_unit = values.attrs.get("units", "1")
     unit = _UNITS.get(si_unit, si_unit)
     shown = np.degrees(values.values) if si_unit == "rad" else values.values
-    name = _plain(str(values.name))
+    name = str(values.name).replace("_", " ")
     if symbol := values.attrs.get("symbol"):
         name = _INDEXED.sub(lambda found: found[0].translate(_LOWERED), symbol)
         name += f" of {part}" if (part := values.attrs.get("part")) else ""
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
@@ -397,10 +379,10 @@ def _draw_contours(
     lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
     low = np.array([across.values[0], up.values[0]])
     span = np.array([across.values[-1], up.values[-1]]) - low
-    paths = ((np.asarray(path.vertices, float) - low) / span for path in lines.get_paths())
     places = []
-    for path in paths:  # far from every edge
-        inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
+    for line in lines.get_paths():
+        path = (np.asarray(line.vertices, float) - low) / span
+        inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]  # far from every edge
         if len(inside):
             distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
             places.append(low + span * inside[distance.argmin()])
@@ -418,13 +400,7 @@ def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smalle
     # inside the axes, whichever edge the best lies at
     left = column > (len(across.values) - 1) / 2
     down = row > (len(up.values) - 1) / 2
-    ax.annotate(
-        f"{values[row, column]:.3f}",
-        place,
-        (-7 if left else 7, -6 if down else 6),
-        textcoords="offset points",
-        ha="right" if left else "left",
-        va="top" if down else "bottom",
-        fontsize=7,
-        bbox={"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8},
-    )
+    away = {"xytext": (-7 if left else 7, -6 if down else 6), "textcoords": "offset points"}
+    look = {"ha": "right" if left else "left", "va": "top" if down else "bottom", "fontsize": 7}
+    look["bbox"] = {"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8}
+    ax.annotate(f"{values[row, column]:.3f}", place, **away, **look)

@@ -20,8 +20,7 @@ from softreach.picture.projection import (
     view_angles,
     view_axes,
 )
-from softreach.picture.shading import seen_through
-from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.picture.zbuffer import Extent, ZBuffer, seen_through
 from softreach.plot.style import DPI, as_axes, as_box, figure_style, small_axes
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -79,7 +78,7 @@ class Panel:
     def opened(
         cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: object = None
     ) -> Iterator[Self]:
-        """Axes in our style for points in their unit, shape (..., 3), or a box [m], shape (2, 3)."""
+        """Axes in our style for points in their unit, shape (..., 3), or a box [m], (2, 3)."""
         view_angles(view)
         with figure_style(as_axes(ax)):
             shown = bounding_box(points) if box is None else unit.of(as_box("box", box))

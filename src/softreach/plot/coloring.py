@@ -42,10 +42,8 @@ class BundleKey(NamedTuple):
     @property
     def labels(self) -> tuple[str, ...]:
         """Label of each color."""
-        if self.title:
-            return self.names
         pairs = zip(self.symbols, self.names, strict=True)
-        return tuple(f"|{symbol}| {name}" for symbol, name in pairs)
+        return self.names if self.title else tuple(f"|{symbol}| {name}" for symbol, name in pairs)
 
 
 class ScalarKey(NamedTuple):

@@ -115,12 +115,8 @@ def _materials(section: Section) -> dict[Material, tuple[str, Material]]:
         parts.append(("core", section.core_material))
     different: dict[Material, tuple[str, Material]] = {}
     for part, material in parts:
-        different.setdefault(_nameless(material), (part, material))
+        different.setdefault(material.replace(name=""), (part, material))
     return different
-
-
-def _nameless(material: Material) -> Material:
-    return material.replace(name="")
 
 
 def _material_style(number: int) -> dict[str, Any]:
@@ -167,7 +163,7 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
     def draw(low: float, high: float, material: Material | None, alpha: float = 1.0) -> None:
         if material is not None and len(materials) > 1:
             fill = _annulus(outer * low, outer * high, "none")
-            style = _material_style(materials.index(_nameless(material)))
+            style = _material_style(materials.index(material.replace(name="")))
             fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
             fill.set_hatch_linewidth(0.4)
             ax.add_patch(fill)

@@ -73,7 +73,10 @@ def plot_equilibria(
     counted = unit_for(arm.length, unit)
     rings = np.flatnonzero(equilibria.is_ring).tolist()
     circles = {k: counted.of(_circle(equilibria, k)) for k in rings}
-    rim = counted.of(equilibria.rod.pose.to_world(_rim(arm)))
+    turn = np.linspace(0.0, 2.0 * np.pi, 65)
+    disk = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    disk *= _BASE * float(arm.profile.radius(0.0))
+    rim = counted.of(equilibria.rod.pose.to_world(disk))
     points = [rim, *(arm_points(arm, shape, counted) for shape in shapes), *circles.values()]
     with Panel.opened(np.concatenate(points), counted, ax, view, box) as panel:
         draw_arms(panel, arm, pale, range(arm.bundles), _PALE)
@@ -182,19 +185,12 @@ def plot_payload_curve(
         style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
         ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)
         for point in largest:
-            ax.vlines(point.payload, 0.0, point.share, color="0.3", linewidth=0.8, linestyle=":")
-            ax.hlines(point.share, 0.0, point.payload, color="0.3", linewidth=0.8, linestyle=":")
+            sides = [point.payload, point.payload, 0.0], [0.0, point.share, point.share]
+            ax.plot(*sides, color="0.3", linewidth=0.8, linestyle=":")
             ax.plot(point.payload, point.share, "o", markersize=4, mfc="white", color="0.3")
         ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
         ax.set(xlim=(0.0, None), ylim=(0.0, None))
     return ax
-
-
-def _rim(arm: Manipulator) -> Array:
-    """Edge of the disk that the arm stands on [m], shape (n, 3)."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 65)
-    circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    return circle * (_BASE * float(arm.profile.radius(0.0)))
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from softreach.geometry.surface import SurfaceMesh
 from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
-from softreach.picture.shading import draw_mesh
+from softreach.picture.zbuffer import draw_mesh
 from softreach.plot.axes import Panel
 from softreach.plot.coloring import draw_entries
 from softreach.plot.style import (

@@ -268,18 +268,15 @@ def _draw_side(
     medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
     style: dict[str, Any] = {"color": color, "alpha": 0.75, "lw": 0.3, "ec": "w"}
     for k in range(len(medians)):
-        values, density = _coarse(data.isel(station=k), quantity)
+        station = data.isel(station=k)
+        count, edges = station[f"{quantity}_count"].values, station[f"{quantity}_edge"].values
+        used = np.flatnonzero(count)
+        first, last = used[0], used[-1] + 1
+        # fewer bins, between the smallest and the largest value
+        ends = np.unique(np.linspace(first, last, _COARSE + 1).astype(int))
+        density = np.add.reduceat(count[:last], ends[:-1]) / np.diff(edges[ends])
+        values = (edges[ends[:-1]] + edges[ends[1:]]) / 2
         reach = 0.46 * density / density.max()
         low, high = (k - reach if side <= 0 else k), (k + reach if side >= 0 else k)
         ax.fill_betweenx(values * scale, low, high, label=None if k else label, **style)
     ax.plot(np.arange(len(medians)) + 0.1 * side, medians, ".", color="k", ms=3, zorder=3)
-
-
-def _coarse(data: xr.Dataset, quantity: str) -> tuple[Array, Array]:
-    """Centers of fewer bins, between the smallest and largest value, and counts per width."""
-    count, edges = data[f"{quantity}_count"].values, data[f"{quantity}_edge"].values
-    used = np.flatnonzero(count)
-    first, last = used[0], used[-1] + 1
-    ends = np.unique(np.linspace(first, last, _COARSE + 1).astype(int))
-    sums = np.add.reduceat(count[:last], ends[:-1])
-    return (edges[ends[:-1]] + edges[ends[1:]]) / 2, sums / np.diff(edges[ends])

@@ -29,7 +29,10 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
     ratio, angle = facts.radius_ratio, float(facts.helical_angles[1])
     errors = np.array([_errors(ratio, taper, a) for taper in _TAPERS for a in _ANGLES])
     sets = {r: reachable_set(minimal_trunk(radius_ratio=r), accuracy=accuracy) for r in _RATIOS}
-    from_axis, from_circle = np.degrees(_inclination(arm))
+    # the right-handed fiber at the base, on the surface in the plane normal to e_R (Appendix C)
+    step = 1e-6 * arm.length
+    start, end = arm.outline([0.0, step]).center[:, 1]
+    around, along = facts.base_radius * (end - start), step / np.cos(_TAPER)
     return {
         "delta0": errors[:, 0].max(),
         "delta1": errors[:, 1].max(),
@@ -40,8 +43,8 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
         "ratio": ratio,
         "volumes": {r: reached.volume for r, reached in sets.items()},
         "helical_angle_deg": np.degrees(angle),
-        "from_axis_deg": from_axis,
-        "from_circle_deg": from_circle,
+        "from_axis_deg": np.degrees(np.arctan2(around, along)),
+        "from_circle_deg": np.degrees(np.arctan2(along, around)),
     }
 
 
@@ -91,13 +94,8 @@ def _misprint(words: str, is_wrong: bool) -> Finding:
 def printed_deltas(ratio: float, taper: float, angle: float, nu: float) -> tuple[float, ...]:
     """δ0, δ1 = δ2 and δ3 of Appendix A for R2 = 1, as printed, and δ3 corrected [-].
 
-    Corrected, the 3 stands before the arctangents T alone, and not before the bracket.
-
-    Args:
-        ratio: R1/R2 [-].
-        taper: φ [rad], not 0.
-        angle: α [rad], neither 0 nor ±φ.
-        nu: ν [-].
+    Corrected, the 3 stands before the arctangents T alone, and not before the bracket. The ratio is
+    R1/R2, the taper φ ≠ 0, the angle α neither 0 nor ±φ [rad].
     """
     p, a, inner = np.tan(taper), np.tan(angle), ratio**2
     rise = (1 + inner * p**2) * (1 + a**2) / ((1 + p**2) * (1 + inner * a**2))
@@ -147,17 +145,6 @@ def _rotation_errors(arm: Manipulator, angle: float) -> dict[str, float]:
         "rotation": abs(printed(_TAPER) / integral - 1),
         "rotation_limit": abs(printed(1e-5) / limit - 1),
     }
-
-
-def _inclination(arm: Manipulator) -> tuple[float, float]:
-    """Angle of the right-handed fiber at the base to the axis and to e_Θ, on the surface [rad].
-
-    In the plane normal to e_R, as Appendix C has it.
-    """
-    step = 1e-6 * arm.length
-    start, end = arm.outline([0.0, step]).center[:, 1]
-    around, along = describe(arm).base_radius * (end - start), step / np.cos(_TAPER)
-    return np.arctan2(around, along), np.arctan2(along, around)
 
 
 def _refusal(arm: Manipulator) -> str:

@@ -19,11 +19,15 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
     arm = minimal_trunk(taper=np.radians(3))
     _draw(arm, notes)
     facts = describe(arm)
+    # between the right-handed bundle and the longitudinal one at the tip
+    angles = arm.outline(arm.length).center[0]
+    apart = (angles[1] - angles[2] + np.pi) % (2 * np.pi) - np.pi
+    gap = abs(apart) - arm.outline(0.0).extent[1:].mean()
     corners = [minimal_trunk(np.radians(o), np.radians(p)) for o in (0, 108) for p in (0, 3)]
     return {
         "narrowing": facts.taper_ratio,
         "helical_angle_deg": float(np.degrees(facts.helical_angles[1])),
-        "gap_deg": _gap(arm),
+        "gap_deg": float(np.degrees(gap)),
         "asymmetry": max(_asymmetry(corner, settings.seed) for corner in corners),
     }
 
@@ -40,13 +44,6 @@ def narrowing(n: Numbers) -> Finding:
 def symmetry(n: Numbers) -> Finding:
     words = f"exchanging the helical activations mirrors the tip to within {n.asymmetry:.1e} L"
     return judged(words, n.asymmetry < 1e-9)
-
-
-def _gap(arm: Manipulator) -> float:
-    """Angle between the right-handed bundle and the longitudinal one at the tip [deg]."""
-    angles = arm.outline(arm.length).center[0]
-    apart = (angles[1] - angles[2] + np.pi) % (2 * np.pi) - np.pi
-    return float(np.degrees(abs(apart) - arm.outline(0.0).extent[1:].mean()))
 
 
 def _asymmetry(arm: Manipulator, seed: int) -> float:

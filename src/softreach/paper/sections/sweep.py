@@ -67,11 +67,7 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
 
 
 def swept_atlas(figures: Path) -> xr.Dataset:
-    """The atlas that the sweep left beside the folder of figures.
-
-    Raises:
-        InvalidInput: It was removed.
-    """
+    """The atlas that the sweep left beside the folder of figures."""
     try:
         return open_atlas(figures.parent / _STORE)
     except InvalidInput as error:
