@@ -24,7 +24,7 @@ _GROUPS = (
     ("Places", "places:solve places:track places:equilibria"),
     ("Output", "reach:show convert:export convert:import"),
     ("Families", "atlas:atlas"),
-    ("More", "demo:demo demo:example warmup:doctor demo:paper warmup:warmup"),
+    ("More", "demo:demo demo:example demo:doctor demo:paper demo:warmup"),
 )
 """Titles of the help, and commands behind the modules that they are in."""
 MODULES = {
