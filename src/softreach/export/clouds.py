@@ -149,8 +149,8 @@ def export_cloud(
 
 
 def path_csv(found: xr.Dataset) -> str:
-    """Activations and tip errors [m] at the points that `track_path` found, one line each, as CSV."""
-    names = [*column_names(found["bundle"].values.astype(str)), "tip_error_m"]
+    """Activations and tip errors [m] at the points that `track_path` found, as lines of CSV."""
+    names = [*column_names(found["bundle"].values.astype(str).tolist()), "tip_error_m"]
     rows = np.column_stack([found.activation.values, found.tip_error.values]).tolist()
     return "\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in rows), ""])
 
@@ -210,8 +210,9 @@ def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str
 
 
 def _write_npz(table: CloudTable, file: BufferedWriter) -> None:
-    arrays: dict[str, Any] = table.metadata | _arrays(table) | {"bundle": table.bundles}
-    np.savez(file, **{name: np.array(values) for name, values in arrays.items()})
+    content = table.metadata | _arrays(table) | {"bundle": table.bundles}
+    arrays: dict[str, Any] = {name: np.array(values) for name, values in content.items()}
+    np.savez(file, **arrays)
 
 
 def _write_mat(table: CloudTable, file: BufferedWriter) -> None:

@@ -13,18 +13,9 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.projection import View, plane_of
 from softreach.picture.zbuffer import ZBuffer, draw_mesh, faces_to_eye
+from softreach.plot import style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
-from softreach.plot.style import (
-    WIDTH,
-    Unit,
-    a_result,
-    figure_style,
-    legend_above,
-    new_figure,
-    some_bundles,
-    unit_for,
-)
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_instance, as_number
@@ -61,7 +52,7 @@ def plot_arm(
     rest: bool = True,
     bundles: Collection[int] | None = None,
     box: ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw an arm; where both are shown, the arm at rest is pale and behind.
 
@@ -81,9 +72,9 @@ def plot_arm(
         MissingExtra: matplotlib is not installed.
     """
     arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
-    shapes, counted = shapes_of(configuration), unit_for(arm.length, unit)
+    shapes, counted = shapes_of(configuration), style.unit_for(arm.length, unit)
     resting = [rest_configuration(arm)] if rest or not shapes else []
-    drawn = some_bundles(arm, bundles)
+    drawn = style.some_bundles(arm, bundles)
     points = np.concatenate([arm_points(arm, shape, counted) for shape in shapes + resting])
     with Panel.opened(points, counted, ax, view, box) as panel:
         draw_arms(panel, arm, resting, drawn, _FADE if shapes else 0.0)
@@ -175,7 +166,7 @@ def plot_designs(
     *,
     stations_over_length: Sequence[float] = (0.0,),
     width: float | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Figure:
     """Draw arms at rest, and under each its cross-sections, all at one scale (figures 1b-d, 4a).
 
@@ -196,15 +187,15 @@ def plot_designs(
     stations = as_stations("stations_over_length", stations_over_length).tolist()
     least = _LEAST if all(plane_of(p.view) for p in panels) else _LEAST_OBLIQUE
     usual = max(_LEAST * len(panels), least)
-    width = usual if width is None else as_number("width", width, WIDTH)
+    width = usual if width is None else as_number("width", width, style.WIDTH)
     box = bounding_box(
         *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
     )
     places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
-    with figure_style():
+    with style.figure_style():
         heights = [2.6, *[width / len(panels)] * len(stations)]
-        figure = new_figure(figsize=(width, sum(heights) + 0.1), layout="constrained")
+        figure = style.new_figure(figsize=(width, sum(heights) + 0.1), layout="constrained")
         shape = len(heights), len(panels)
         axes = figure.subplots(*shape, height_ratios=heights, squeeze=False)
         for k, panel in enumerate(panels):
@@ -223,7 +214,7 @@ def plot_designs(
 
 
 def plot_check(
-    check: Any, *, ax: Axes | None = None, view: View = "oblique", unit: Unit = None
+    check: Any, *, ax: Axes | None = None, view: View = "oblique", unit: style.Unit = None
 ) -> Axes:
     """Draw an arm at the places that it must reach, and the regions that it must keep to.
 
@@ -241,8 +232,8 @@ def plot_check(
         InvalidInput: Unknown view or unit, or no check.
         MissingExtra: matplotlib is not installed.
     """
-    arm = a_result("check", check, "Check", "check").arm
-    counted = unit_for(arm.length, arm.length_unit if unit is None else unit)
+    arm = style.a_result("check", check, "Check", "check").arm
+    counted = style.unit_for(arm.length, arm.length_unit if unit is None else unit)
     shapes = shapes_of(check.shapes(_POSES)) or [rest_configuration(arm)]
     points = [arm_points(arm, shape, counted) for shape in shapes]
     points.append(counted.of(check.places))
@@ -254,13 +245,13 @@ def plot_check(
     with Panel.opened(np.concatenate(points), counted, ax, view) as panel:
         draw_arms(panel, arm, shapes, range(arm.bundles), _CHECKED)
         for kind, each in lines.items():
-            style = {"linewidth": 0.9, **_REGIONS[kind]}
+            look = {"linewidth": 0.9, **_REGIONS[kind]}
             words = {each.verdict for each in check.findings if each.kind == kind} - {"met"}
-            style["label"] = ": ".join([str(style["label"]), *sorted(words)])
-            _draw_lines(panel, each, style)
+            look["label"] = ": ".join([str(look["label"]), *sorted(words)])
+            _draw_lines(panel, each, look)
         _draw_places(panel, check)
         if panel.ax.get_legend_handles_labels()[1]:
-            legend_above(panel.ax)
+            style.legend_above(panel.ax)
     return panel.ax
 
 
@@ -277,7 +268,7 @@ def _draw_places(panel: Panel, check: Any) -> None:
             panel.plot(panel.unit.of(check.places[rows]), marks, **look, **edge)
 
 
-def _draw_lines(panel: Panel, lines: Iterable[Array], style: dict[str, Any]) -> None:
+def _draw_lines(panel: Panel, lines: Iterable[Array], look: dict[str, Any]) -> None:
     for line in lines:
-        panel.plot(line, **style)
-        style = {**style, "label": None}
+        panel.plot(line, **look)
+        look = {**look, "label": None}

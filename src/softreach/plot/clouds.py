@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -14,29 +14,9 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.cloud.clouds import design_of
 from softreach.picture.projection import View, sight_axis, view_angles
 from softreach.picture.zbuffer import ZBuffer
+from softreach.plot import coloring, style
 from softreach.plot.arm import arm_images, arm_points, draw_markers, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.coloring import (
-    bundle_names,
-    color_samples,
-    draw_figure_key,
-    draw_key,
-    key_height,
-)
-from softreach.plot.style import (
-    LENGTH,
-    PAGE,
-    PLACE,
-    SIZE,
-    Unit,
-    as_box,
-    common_unit,
-    figure_style,
-    place_panels,
-    unit_for,
-    unit_of,
-    write_note,
-)
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
@@ -52,7 +32,6 @@ if TYPE_CHECKING:
 
 _LARGEST = 8.0  # pixels
 _THICKNESS = 1 / 50  # of L, or of the cloud's extent
-Images = tuple[ZBuffer, ZBuffer | None]  # an image, and what shows through it
 
 _VIEWS = ("front", "side", "top", "oblique")
 _BESIDE = {True: (0.55, 0.12), False: (0.60, 0.22)}  # left and right of four views, in L or not
@@ -70,7 +49,7 @@ def plot_cloud(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw a cloud in one view.
 
@@ -92,12 +71,12 @@ def plot_cloud(
         MissingExtra: matplotlib is not installed.
     """
     cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
-    size = None if size is None else as_number("size", size, SIZE)
-    counted = unit_of(cloud["tip"], unit)
-    tips, coloring = drawn_tips(cloud, counted), color_samples(cloud, color)
+    size = None if size is None else as_number("size", size, style.SIZE)
+    counted = style.unit_of(cloud["tip"], unit)
+    tips, colored = drawn_tips(cloud, counted), coloring.color_samples(cloud, color)
     with Panel.opened(tips, counted, ax, view, box) as panel:
-        panel.show(cloud_image(panel, tips, coloring.rgb, size))
-        draw_key(panel.ax, coloring.key if key else None)
+        panel.show(cloud_image(panel, tips, colored.rgb, size))
+        coloring.draw_key(panel.ax, colored.key if key else None)
     return panel.ax
 
 
@@ -133,7 +112,7 @@ def plot_slab(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw the tips in a slab across the line of sight; a note in the axes says which.
 
@@ -157,29 +136,29 @@ def plot_slab(
         MissingExtra: matplotlib is not installed.
     """
     cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
-    size = None if size is None else as_number("size", size, SIZE)
-    counted, axis = unit_of(cloud["tip"], unit), sight_axis(view)
+    size = None if size is None else as_number("size", size, style.SIZE)
+    counted, axis = style.unit_of(cloud["tip"], unit), sight_axis(view)
     tips = drawn_tips(cloud, counted)
-    at = float(base_of(cloud)["xyz".index(axis)]) if at is None else as_number("at", at, PLACE)
+    along = "xyz".index(axis)
+    at = float(base_of(cloud)[along]) if at is None else as_number("at", at, style.PLACE)
     if thickness is None:
         whole = _THICKNESS * (1.0 if counted.relative else float(np.nanmax(np.ptp(tips, axis=0))))
     else:
-        whole = float(counted.of(as_number("thickness", thickness, LENGTH)))
+        whole = float(counted.of(as_number("thickness", thickness, style.LENGTH)))
     middle, half = float(counted.of(at)), whole / 2
-    depth = tips[:, "xyz".index(axis)] - middle
-    inside = np.abs(depth) <= half
+    inside = np.abs(tips[:, along] - middle) <= half
     if not inside.any():
         allowed = f"such that a tip lies in the slab about {axis} = {at:.4g} m"
         raise InvalidInput("thickness", f"{2 * half * counted.size:.4g} m", allowed)
-    coloring = color_samples(cloud, color)
+    colored = coloring.color_samples(cloud, color)
     with Panel.opened(tips, counted, ax, view, box) as panel:
         area = np.prod(panel.extent.size) / inside.sum()
         # about the mean spacing in the plane, which closes the slab
         spacing = float(np.clip(1.2 * np.sqrt(area) * panel.pixels_per_unit, 2.0, 8.0))
-        panel.show(cloud_image(panel, tips[inside], coloring.rgb[inside], size or spacing))
+        panel.show(cloud_image(panel, tips[inside], colored.rgb[inside], size or spacing))
         distance = f"{axis} - {middle:.3g} {counted.name}" if middle else axis
-        write_note(panel.ax, f"|{distance}| ≤ {half:.3g} {counted.name}", 0.03, 0.02)
-        draw_key(panel.ax, coloring.key if key else None)
+        style.write_note(panel.ax, f"|{distance}| ≤ {half:.3g} {counted.name}", 0.03, 0.02)
+        coloring.draw_key(panel.ax, colored.key if key else None)
     return panel.ax
 
 
@@ -189,7 +168,7 @@ def plot_views(
     configuration: xr.Dataset | None = None,
     *,
     color: str | int | ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Figure:
     """Draw a cloud in three orthogonal views at one scale and an oblique one.
 
@@ -209,41 +188,41 @@ def plot_views(
         MissingExtra: matplotlib is not installed.
     """
     cloud = a_cloud("cloud", cloud)
-    counted = unit_of(cloud["tip"], unit)
+    counted = style.unit_of(cloud["tip"], unit)
     tips = drawn_tips(cloud, counted)
     shown, shapes = [tips], shapes_of(configuration)
     if arm is not None:
         arm = a_manipulator("arm", arm)
-        common_unit([counted, unit_for(arm.length, unit)])
+        style.common_unit([counted, style.unit_for(arm.length, unit)])
         shapes = shapes or [rest_configuration(arm)]
         shown += [arm_points(arm, shape, counted) for shape in shapes]
     box = bounding_box(*shown)
     span = np.ptp(box, axis=0)
     slim = np.maximum(0.5 * span.max() - span, 0.0) / 2  # so that a thin arm fits a page
     box = box + [-slim, slim]
-    coloring = color_samples(cloud, color)
-    with figure_style():
+    colored = coloring.color_samples(cloud, color)
+    with style.figure_style():
         x, y, z = np.ptp(box, axis=0)
-        room = max(_ROOM, key_height(coloring.key))
+        room = max(_ROOM, coloring.key_height(colored.key))
         around = (*_BESIDE[counted.relative], _ROOM, room)
-        figure, axes = place_panels(PAGE, (x, y), (z, y), around, (_GAP, _GAP))
+        figure, axes = style.place_panels(style.PAGE, (x, y), (z, y), around, (_GAP, _GAP))
         low, height = axes[1, 1].get_position(), figure.get_size_inches()[1]
         axes[1, 1].set_position(low.translated(0.0, -_LOWER / height))
         pairs = zip(axes.ravel().tolist(), _VIEWS, strict=True)
         panels = [Panel(ax, box, view, counted) for ax, view in pairs]
 
-        def images(panel: Panel) -> Iterator[Images]:
-            yield cloud_image(panel, tips, coloring.rgb, None), None
-            if arm is not None:
-                yield arm_images(panel, arm, shapes, range(arm.bundles))
+        def images(panel: Panel) -> list[tuple[ZBuffer, ZBuffer | None]]:
+            of_cloud = cloud_image(panel, tips, colored.rgb, None), None
+            of_arm = [arm_images(panel, arm, shapes, range(arm.bundles))] if arm is not None else []
+            return [of_cloud, *of_arm]
 
-        tasks = (partial(list[Images], images(panel)) for panel in panels)
+        tasks = (partial(images, panel) for panel in panels)
         for panel, drawn in zip(panels, parallel.in_order(tasks), strict=True):
-            for image, within in drawn:
-                panel.show(image, within)
+            for image in drawn:
+                panel.show(*image)
             if arm is not None:
                 draw_markers(panel, arm, shapes, 0.0)
-        draw_figure_key(figure, coloring.key, room)
+        coloring.draw_figure_key(figure, colored.key, room)
     return figure
 
 
@@ -252,7 +231,7 @@ def plot_opposite_sides(
     *,
     view: View = "oblique",
     box_over_length: ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Figure:
     """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
 
@@ -268,25 +247,25 @@ def plot_opposite_sides(
         MissingExtra: matplotlib is not installed.
     """
     clouds = as_mapping("clouds", clouds, a_cloud)
-    around = None if box_over_length is None else as_box("box_over_length", box_over_length)
-    bundles = {bundle_names(cloud) for cloud in clouds.values()}
+    around = None if box_over_length is None else style.as_box("box_over_length", box_over_length)
+    bundles = {coloring.bundle_names(cloud) for cloud in clouds.values()}
     if len(bundles) != 1:
         raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "some of equal bundles")
     azimuth, elevation = view_angles(view)
     sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
     if around is None:
-        tips = (drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values())
+        tips = (drawn_tips(cloud, style.unit_of(cloud["tip"])) for cloud in clouds.values())
         around = bounding_box(*tips)
     first = next(iter(clouds.values()))
-    key, relative = color_samples(first, "rgb").key, unit_of(first["tip"], unit).relative
-    room, columns = max(_ROOM, key_height(key)), [1.0] * len(clouds)
-    beside, right = (0.58, 0.26) if relative else (0.75, 0.48)
+    key = coloring.color_samples(first, "rgb").key
+    room, columns = max(_ROOM, coloring.key_height(key)), [1.0] * len(clouds)
+    beside, right = (0.58, 0.26) if style.unit_of(first["tip"], unit).relative else (0.75, 0.48)
     titles = [f"({k + 1})  {title}" for k, title in enumerate(clouds)]
     titles = [fill(title, round(_LETTERS / len(clouds))) for title in titles]
     top = room + 0.16 * max(1 + title.count("\n") for title in titles)
-    with figure_style():
+    with style.figure_style():
         edges = (beside + 0.07, right, 0.45, top)
-        figure, panels = place_panels(PAGE, columns, [1.1, 1.1], edges, (beside, 0.45))
+        figure, panels = style.place_panels(style.PAGE, columns, [1.1, 1.1], edges, (beside, 0.45))
         for k, cloud in enumerate(clouds.values()):
             arm = design_of(cloud)
             box = np.asarray(around) * arm.length
@@ -294,5 +273,5 @@ def plot_opposite_sides(
             for ax, side in zip(panels[:, k], sides, strict=True):
                 plot_cloud(cloud, ax=ax, view=side, color="rgb", key=False, box=box, unit=unit)
                 plot_arm(arm, ax=ax, view=side, box=box, unit=unit)
-        draw_figure_key(figure, key, room)
+        coloring.draw_figure_key(figure, key, room)
     return figure

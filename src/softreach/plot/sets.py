@@ -14,19 +14,9 @@ from numpy.typing import ArrayLike
 from softreach.geometry.surface import SurfaceMesh
 from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
 from softreach.picture.zbuffer import draw_mesh
+from softreach.plot import style
 from softreach.plot.axes import Panel
 from softreach.plot.coloring import draw_entries
-from softreach.plot.style import (
-    LENGTH,
-    PLACE,
-    Unit,
-    a_surface,
-    figure_style,
-    new_figure,
-    styled_axes,
-    unit_for,
-    unit_of,
-)
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, Range
@@ -51,7 +41,7 @@ def plot_hull(
     view: View = "front",
     length: float | None = None,
     box: ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw the boundary of a hull in one view.
 
@@ -69,9 +59,9 @@ def plot_hull(
         InvalidInput: Unknown view or unit, or no vertices.
         MissingExtra: matplotlib is not installed.
     """
-    hull = a_surface("hull", hull)
-    length = None if length is None else as_number("length", length, LENGTH)
-    counted = unit_for(length, unit)
+    hull = style.a_surface("hull", hull)
+    length = None if length is None else as_number("length", length, style.LENGTH)
+    counted = style.unit_for(length, unit)
     vertices = counted.of(hull.vertices)
     with Panel.opened(vertices, counted, ax, view, box) as panel:
         buffer = panel.buffer(oversample=3)
@@ -88,7 +78,7 @@ def plot_volume_curve(
     length: float | None = None,
     exact: float | None = None,
     convex: float | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw V(α) of clouds.
 
@@ -108,18 +98,18 @@ def plot_volume_curve(
     from matplotlib.ticker import LogLocator, NullFormatter
 
     curves, radii = as_mapping("curves", curves, as_floats), as_floats("alphas", alphas)
-    length = None if length is None else as_number("length", length, LENGTH)
+    length = None if length is None else as_number("length", length, style.LENGTH)
     exact = None if exact is None else as_number("exact", exact, _VOLUMES)
     convex = None if convex is None else as_number("convex", convex, _VOLUMES)
-    counted = unit_for(length, unit)
-    with styled_axes(ax, 3.4, 2.6) as ax:
+    counted = style.unit_for(length, unit)
+    with style.styled_axes(ax, 3.4, 2.6) as ax:
         for label, volumes in curves.items():
             if np.shape(volumes) != radii.shape:
                 raise InvalidInput(label, np.shape(volumes), f"volumes of {radii.shape} radii")
             ax.plot(counted.of(radii), counted.of(volumes, 3), linewidth=1.2, label=label)
-        for value, name, style in ((exact, "exact", "-"), (convex, "convex hull", ":")):
+        for value, name, look in ((exact, "exact", "-"), (convex, "convex hull", ":")):
             if value is not None:
-                ax.axhline(float(counted.of(value, 3)), color="0.3", lw=0.8, ls=style, label=name)
+                ax.axhline(float(counted.of(value, 3)), color="0.3", lw=0.8, ls=look, label=name)
         ax.set(xscale="log", xlabel=counted.label("radius α"), ylim=(0, None))
         few = float(np.max(radii)) < 100 * float(np.min(radii))
         ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
@@ -137,7 +127,7 @@ def plot_slice(
     view: View = "front",
     at: float | None = None,
     key: bool = True,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw one plane of a reachable set: the number of activations that reach each place.
 
@@ -159,14 +149,14 @@ def plot_slice(
         MissingExtra: matplotlib is not installed.
     """
     grid = as_dataset("grid", grid, "x", "y", "z")
-    axis, counted, key = sight_axis(view), unit_of(grid, unit), as_flag("key", key)
-    at = _middle(grid, axis) if at is None else as_number("at", at, PLACE)
+    axis, counted, key = sight_axis(view), style.unit_of(grid, unit), as_flag("key", key)
+    at = _middle(grid, axis) if at is None else as_number("at", at, style.PLACE)
     centers, half = grid[axis].values, grid.attrs["cell"] / 2
     if not centers[0] - half <= at <= centers[-1] + half:
         allowed = f"between {centers[0]:.4g} and {centers[-1]:.4g} m along {axis}"
         raise InvalidInput("at", at, allowed)
     layer = grid.sel({axis: at}, method="nearest")
-    with styled_axes(ax, 3.4, 4.2) as ax:
+    with style.styled_axes(ax, 3.4, 4.2) as ax:
         highest = _draw(ax, layer, view, counted)
         place = at if abs(at) > 1e-6 * half else 0.0  # no -0, nor what rounding left of 0
         ax.set_title(f"{axis} = {counted.of(place):.3g} {counted.name}")
@@ -177,7 +167,7 @@ def plot_slice(
 
 
 def plot_slices(
-    grid: xr.Dataset, *, at: Sequence[float] | None = None, unit: Unit = None
+    grid: xr.Dataset, *, at: Sequence[float] | None = None, unit: style.Unit = None
 ) -> Figure:
     """Draw the three planes of a reachable set that meet at a point: from the side, front and top.
 
@@ -194,8 +184,8 @@ def plot_slices(
     point = as_floats("at", [_middle(grid, axis) for axis in "xyz"] if at is None else at)
     if point.shape != (3,):
         raise InvalidInput("at.shape", point.shape, "a point (x, y, z) [m]")
-    with figure_style():
-        figure = new_figure(figsize=_ROW, layout="constrained")
+    with style.figure_style():
+        figure = style.new_figure(figsize=_ROW, layout="constrained")
         axes = figure.subplots(1, 3)
         for ax, view, place in zip(axes, ("side", "front", "top"), point.tolist(), strict=True):
             plot_slice(grid, ax=ax, view=view, at=place, unit=unit, key=False)
