@@ -8,18 +8,9 @@ from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import softreach as sr
+from softreach.cli import options
 from softreach.cli.console import Rows, console, to_degrees
-from softreach.cli.options import (
-    DEFAULT,
-    UNCHANGED,
-    Changes,
-    Design,
-    Out,
-    Output,
-    check_output,
-    design_from,
-    refuse,
-)
+from softreach.cli.options import UNCHANGED, Changes, design_from
 from softreach.support.errors import NotPossible, no_warnings
 
 if TYPE_CHECKING:
@@ -27,13 +18,13 @@ if TYPE_CHECKING:
 
 
 def design(
-    design: Design | None = None,
+    design: options.Design | None = None,
     /,
     *,
     schema: bool = False,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    output: Output = DEFAULT,
+    out: options.Out = None,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Describe a design: angles, radii, stiffness, weight, warnings.
 
@@ -50,7 +41,7 @@ def design(
 
     if schema:
         given = {"out": out, "overwrite": output.overwrite, "unit": output.unit}
-        refuse("with --schema", **given, **changes.given)
+        options.refuse("with --schema", **given, **changes.given)
         from softreach.arm.design_file.schema import json_schema
 
         console.json(json_schema(), indent=2)
@@ -59,7 +50,7 @@ def design(
         raise NotPossible("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
         arm = design_from(design, changes, output.unit)
-    check_output(out, DESIGN_FILE, output.overwrite)
+    options.check_output(out, DESIGN_FILE, output.overwrite)
     facts = sr.describe(arm)
     if out is not None:
         arm.save(out, overwrite=output.overwrite)

@@ -6,12 +6,7 @@ What draws one panel takes `ax=None` and returns the axes; what draws several re
 from __future__ import annotations
 
 from softreach.plot.arm import DesignPanel, plot_arm, plot_check, plot_designs
-from softreach.plot.atlas import (
-    atlas_figures,
-    plot_cloud_sheet,
-    plot_hull_sheet,
-    plot_metric_map,
-)
+from softreach.plot.atlas import atlas_figures, plot_cloud_sheet, plot_hull_sheet, plot_metric_map
 from softreach.plot.clouds import plot_cloud, plot_opposite_sides, plot_slab, plot_views
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.figure_3d import Figure3D, plot_3d

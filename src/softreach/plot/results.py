@@ -28,7 +28,8 @@ _FAR = 4.0  # times the 95 % quantile, beyond which places would squash all othe
 _MILLIMETER = LengthUnit("mm", 1e-3)  # of inputs
 _MEASURED = "0.45"
 _ABOVE, _LINE, _ENDS = 2.5, 0.24, 0.75  # heights of panels, of a parameter, and around these [inch]
-_COARSE: dict[str, Any] = {"marker": "o", "s": 14, "facecolors": "none", "linewidths": 0.7}
+_COARSE: dict[str, Any] = {"marker": "o", "s": 14, "facecolors": "none", "edgecolors": MET}
+_COARSE["linewidths"] = 0.7
 _FINAL: dict[str, Any] = {"marker": "D", "s": 24, "color": BEST, "linewidths": 0, "zorder": 4}
 _OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": MISSED, "linewidths": 0.8, "zorder": 3}
 _BARS: dict[str, Any] = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zorder": 4}
@@ -106,8 +107,7 @@ class _Errors:
 
     def frame(self, ax: Axes) -> None:
         ax.set_ylim(0.0, self.top)
-        far = int((self.distance > self.top).sum())
-        if far:
+        if far := int((self.distance > self.top).sum()):
             style.write_note(ax, f"{far} beyond", 0.98, 0.96)
 
 
@@ -196,7 +196,7 @@ def plot_search(search: Any, *, unit: style.Unit = None) -> Figure:
     with style.figure_style():
         figure = style.new_figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
         grid = figure.add_gridspec(2, 2, height_ratios=[_ABOVE, below], width_ratios=[1.6, 1.0])
-        beside = goals == 1 or bool(goals and (~shown.feasible & ~shown.final).any())
+        beside = goals == 1 or bool(goals and shown.missed.any())
         draw = (_draw_missed, _draw_progress, _draw_front, _draw_objectives)[min(goals, 3)]
         draw(figure.add_subplot(grid[0, 0] if beside else grid[0, :]), shown)
         if beside:
@@ -213,6 +213,7 @@ class _Designs:
         count = data.sizes["design"]
         self.final: Mask = np.arange(count) >= count - int(data.attrs["finalists"])
         self.front: Mask = data["front"].values & self.final
+        self.met, self.missed = self.feasible & ~self.final, ~self.feasible & ~self.final
         self.looked_at, self.senses = data["looked_at"].values, data["sense"].values
         self.values, self.errors = data["objective_value"].values, data["objective_error"].values
         self.labels: list[str] = []
@@ -225,23 +226,26 @@ class _Designs:
             label = f"{objective} / {name}" if relative else f"{objective} [{name}]"
             self.labels.append(label if name else objective)
 
+    def mark(self, ax: Axes, rows: Mask, heights: Array, **look: Any) -> None:
+        """Marks of some designs, if any, over when they were looked at."""
+        if rows.any():
+            ax.scatter(self.looked_at[rows], heights[rows], **look)
+
 
 def _draw_progress(ax: Axes, shown: _Designs) -> None:
-    value, at = shown.values[:, 0], shown.looked_at
-    way, final = shown.feasible & ~shown.final, shown.feasible & shown.final
-    ax.scatter(at[way], value[way], edgecolors=MET, label="on the way", zorder=3, **_COARSE)
-    if way.any():
+    value, at, met = shown.values[:, 0], shown.looked_at, shown.met
+    ax.scatter(at[met], value[met], label="on the way", zorder=3, **_COARSE)
+    if met.any():
         best = np.maximum if shown.senses[0] > 0 else np.minimum
-        so_far = best.accumulate(value[way])
-        ends = [*at[way], shown.looked_at[-1]], [*so_far, so_far[-1]]
+        so_far = best.accumulate(value[met])
+        ends = [*at[met], at[-1]], [*so_far, so_far[-1]]
         ax.step(*ends, where="post", color="0.35", lw=0.9, zorder=2, label="best so far")
+    final = shown.feasible & shown.final
     if final.any():
         ax.errorbar(at[final], value[final], shown.errors[final, 0], capsize=2, **_BARS)
-        ax.scatter(at[final], value[final], label="full accuracy", **_FINAL)
-    out = ~shown.feasible & ~shown.final
-    if out.any():  # which have no value
-        places = {"transform": ax.get_xaxis_transform(), "clip_on": False}
-        ax.scatter(at[out], np.zeros(out.sum()), label="requirements missed", **places, **_OUT)
+    shown.mark(ax, final, value, label="full accuracy", **_FINAL)
+    edge = {"transform": ax.get_xaxis_transform(), "clip_on": False}  # what is missed has no value
+    shown.mark(ax, shown.missed, 0.0 * at, label="requirements missed", **edge, **_OUT)
     ax.set(xlabel="designs looked at", ylabel=shown.labels[0])
     style.legend_above(ax, 4, handletextpad=0.3)
 
@@ -267,8 +271,7 @@ def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_front(ax: Axes, shown: _Designs) -> None:
-    way = shown.feasible & ~shown.final
-    ax.scatter(*shown.values[way].T, edgecolors=MET, label="on the way", zorder=3, **_COARSE)
+    ax.scatter(*shown.values[shown.met].T, label="on the way", zorder=3, **_COARSE)
     rows = np.flatnonzero(shown.front & shown.feasible)
     if len(rows):
         points, errors = shown.values[rows].T, shown.errors[rows].T
@@ -287,18 +290,15 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
 
 def _draw_missed(ax: Axes, shown: _Designs) -> None:
     """Excess of each design, in their order; infinite ones stand at the upper edge."""
-    excess, at = shown.data["excess"].values, shown.looked_at
-    met, never = shown.feasible & ~shown.final, ~np.isfinite(excess) & ~shown.final
-    out = ~(met | never | shown.final)
-    if met.any():
-        ax.scatter(at[met], excess[met], edgecolors=MET, label="met", **_COARSE)
-    if out.any():
-        ax.scatter(at[out], excess[out], label="missed", **_OUT)
-    if never.any():
-        look = {**_OUT, "marker": "v", "transform": ax.get_xaxis_transform(), "clip_on": False}
-        ax.scatter(at[never], np.ones(never.sum()), label="no such arm", **look)
+    excess = shown.data["excess"].values
+    never = ~np.isfinite(excess) & ~shown.final
+    missed = shown.missed & ~never
+    shown.mark(ax, shown.met, excess, label="met", **_COARSE)
+    shown.mark(ax, missed, excess, label="missed", **_OUT)
+    edge = {"marker": "v", "transform": ax.get_xaxis_transform(), "clip_on": False}
+    shown.mark(ax, never, np.ones(len(excess)), label="no such arm", **_OUT | edge)
     ax.set(xlabel="designs looked at", ylabel="requirements missed, sum [-]")
-    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]), top=None if out.any() else 1.0)
+    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]), top=None if missed.any() else 1.0)
     style.legend_above(ax, handletextpad=0.3)
 
 
@@ -327,12 +327,12 @@ def _draw_objectives(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_ranges(ax: Axes, shown: _Designs) -> None:
-    data, way, small = shown.data, ~shown.final, {"s": 9, "linewidths": 0.5, "alpha": 0.6}
+    data, small = shown.data, {"s": 9, "linewidths": 0.5, "alpha": 0.6}
     low, high = data["low"].values, data["high"].values
     shares = (data["value"].values - low) / np.where(high > low, high - low, 1.0)
     styles = (
-        (way & shown.feasible, {"edgecolors": MET, **_COARSE, **small}),
-        (way & ~shown.feasible, {**_OUT, **small}),
+        (shown.met, {**_COARSE, **small}),
+        (shown.missed, {**_OUT, **small}),
         (shown.front, _FINAL),
     )
     for k in range(len(low)):

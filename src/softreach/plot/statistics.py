@@ -23,7 +23,6 @@ from softreach.support.arguments import (
     as_number,
     as_one_of,
 )
-from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -107,9 +106,18 @@ def plot_distance_histograms(distances: Mapping[str, xr.DataArray]) -> Figure:
         figure = style.new_figure(figsize=(style.PAGE, 0.37 * style.PAGE), layout="constrained")
         grid = figure.subplots(1, len(distances), sharex=True, squeeze=False)
         edges = np.linspace(0.0, largest_distance(distances.values()), _BINS + 1)
+        colors = coloring.scale_colors(edges[:-1], 0.0, edges[-1]) / 255
         for ax, (title, distance) in zip(grid[0], distances.items(), strict=True):
-            _draw_histogram(ax, distance.values, edges)
-            ax.set_title(title)
+            finite = distance.values[np.isfinite(distance.values)]
+            share = 100.0 * np.histogram(finite, edges)[0] / max(distance.size, 1)
+            ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
+            ax.set(title=title, xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
+            ax.spines[["top", "right"]].set_visible(False)
+            if len(finite):
+                median, isolated = float(np.median(finite)), 1 - len(finite) / distance.size
+                ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
+                text = f"median {median:.3f}\nisolated {isolated:.2%}"
+                style.write_note(ax, text, 0.98, 0.98)
         grid[0, 0].set_ylabel("share of points per bin / %")
     return figure
 
@@ -179,20 +187,6 @@ def plot_redundancy(
                 ax.set(ylabel="", yticklabels=[])
             row[0].set_ylabel(f"{names[title]}\n{row[0].get_ylabel()}")
     return figure
-
-
-def _draw_histogram(ax: Any, values: Array, edges: Array) -> None:
-    finite = values[np.isfinite(values)]
-    share = 100.0 * np.histogram(finite, edges)[0] / max(len(values), 1)
-    colors = coloring.scale_colors(edges[:-1], 0.0, edges[-1]) / 255
-    ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
-    ax.set(xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
-    ax.spines[["top", "right"]].set_visible(False)
-    if len(finite):
-        median = float(np.median(finite))
-        ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
-        text = f"median {median:.3f}\nisolated {1 - len(finite) / len(values):.2%}"
-        style.write_note(ax, text, 0.98, 0.98)
 
 
 def plot_curvature(
