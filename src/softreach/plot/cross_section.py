@@ -218,7 +218,6 @@ class _Placed:
 
     @property
     def style(self) -> dict[str, Any]:
-        """That of a patch or of a dot."""
         color = self.color
         if self.shape == "line":
             edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
