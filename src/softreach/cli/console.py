@@ -50,6 +50,7 @@ class Console:
     verbose = False  # Also what is compiled, and where an error comes from
 
     def set(self, *, quiet: bool = False, verbose: bool = False) -> None:
+        """Set how much is printed."""
         self.quiet = progress.hidden = quiet
         self.verbose = verbose
 
@@ -94,6 +95,7 @@ class Console:
         self.note(f"{path}: lengths in {unit.name}")
 
     def error(self, text: str) -> None:
+        """A line on standard error."""
         with suppress(OSError, ValueError):  # it was closed
             sys.stderr.write(f"{_printable(text)}\n")
 

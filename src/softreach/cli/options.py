@@ -144,6 +144,7 @@ class Sampling:
 
     @property
     def count(self) -> int:
+        """Number of samples."""
         return 400_000 if self.n is None else self.n
 
     @property

@@ -83,6 +83,7 @@ class Notebook:
         self.pictures.append((label, name, caption))
 
     def fill(self, compute: Callable[[Settings, Notebook], Any], settings: Settings) -> Self:
+        """Compute the part, and write what was found."""
         start = perf_counter()
         self.numbers = json.loads(json.dumps(compute(settings, self)))
         self.seconds = perf_counter() - start

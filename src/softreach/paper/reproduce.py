@@ -51,6 +51,7 @@ class Claim(NamedTuple):
     full: bool = False  # True if only the full sizes test it
 
     def check(self, numbers: Mapping[str, Any]) -> Finding:
+        """Finding from the numbers of its part."""
         known = {k: np.asarray(x) if isinstance(x, list) else x for k, x in numbers.items()}
         return getattr(SECTIONS[self.part], self.judge)(Numbers(**known))
 

@@ -53,6 +53,7 @@ class ZBuffer:
 
     @property
     def shape(self) -> tuple[int, int]:
+        """Rows and columns of the image."""
         return self._keys.shape[0] // self.oversample, self._keys.shape[1] // self.oversample
 
     def draw_points(

@@ -95,6 +95,7 @@ class Panel:
 
     @property
     def pixels_per_unit(self) -> float:
+        """At print resolution."""
         return self._columns() / self.extent.size[0]
 
     def buffer(self, oversample: int, color_step: int = 1) -> ZBuffer:

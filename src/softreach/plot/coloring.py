@@ -41,6 +41,7 @@ class BundleKey(NamedTuple):
 
     @property
     def labels(self) -> tuple[str, ...]:
+        """Label of each color."""
         pairs = zip(self.symbols, self.names, strict=True)
         return self.names if self.title else tuple(f"|{symbol}| {name}" for symbol, name in pairs)
 

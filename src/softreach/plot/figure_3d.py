@@ -123,6 +123,7 @@ class Scene:
     notes: list[str] = field(default_factory=list)
 
     def add(self, things: Sequence[Any]) -> None:
+        """Things to show, one after the other."""
         for thing in things:
             getattr(self, f"add_{_kind(thing)}")(thing)
 
@@ -160,6 +161,7 @@ class Scene:
         self.parts.append(PagePart(self._name("reachable set"), Dots(points), size=size))
 
     def add_hull(self, hull: Any) -> None:
+        """A hull, whose volume is known."""
         kind = "convex hull" if np.isinf(hull.alpha) else "alpha shape"
         self.captions.append(f"{kind.capitalize()}: volume {self.unit.text(hull.volume, 3)}")
         self.add_surface(hull, kind)
@@ -189,6 +191,7 @@ class Scene:
         self._explain_bundles(arm)
 
     def add_configuration(self, configuration: xr.Dataset) -> None:
+        """The arm in one configuration or several."""
         arm, name = design_of(configuration), self._name("arm")
         for shape in shapes_of(configuration):
             self._add_body(arm, shape, name)
