@@ -13,10 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.projection import View, project
 from softreach.picture.zbuffer import Extent, ZBuffer, draw_mesh, faces_to_eye, seen_through
-from softreach.support.errors import InvalidInput
 from softreach.support.palette import STEEL, Color
 
-_COLOR_TYPES = {3: 2, 4: 6}  # channels -> RGB or RGBA
 _WIDTH = 220  # pixels
 _MARGIN = 0.03
 _MOST = 100_000  # points; more do not show at this size
@@ -24,13 +22,10 @@ _FINE = 20_000  # faces; more are about a pixel each, whose edges need no smooth
 
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:
-    """A PNG file of RGB or RGBA from 0 to 255, from top to bottom, (rows, columns, 3 or 4)."""
-    if image.ndim != 3 or image.shape[2] not in _COLOR_TYPES or not image.size:
-        raise InvalidInput("image.shape", image.shape, "(rows, columns, 3 or 4)")
-    rows, columns, channels = image.shape
-    header = struct.pack(">2I5B", columns, rows, 8, _COLOR_TYPES[channels], 0, 0, 0)
-    # each row begins with its filter: 0, none
-    lines = np.pad(image.astype(np.uint8).reshape(rows, -1), ((0, 0), (1, 0)))
+    """A PNG file of RGBA from 0 to 255, from top to bottom, shape (rows, columns, 4)."""
+    rows, columns, _ = image.shape
+    header = struct.pack(">2I5B", columns, rows, 8, 6, 0, 0, 0)  # 8 bits a channel, RGBA
+    lines = np.pad(image.reshape(rows, -1), ((0, 0), (1, 0)))  # each begins with its filter: none
     content = zlib.compress(lines.tobytes(), 9)
     file = b"\x89PNG\r\n\x1a\n"
     for kind, data in ((b"IHDR", header), (b"IDAT", content), (b"IEND", b"")):
@@ -55,9 +50,9 @@ class Dots(NamedTuple):
     colors: ArrayLike = (64, 100, 150)  # RGB from 0 to 255, shape (n, 3) or (3,)
 
 
-def html_card(text: str, *parts: Skin | Dots, view: View = "oblique") -> str:
+def html_card(text: str, *parts: Skin | Dots) -> str:
     """HTML that shows parts in common units above a text, which is escaped, for `_repr_html_`."""
-    shown = thumbnail(*parts, view=view)
+    shown = thumbnail(*parts)
     said = f"<pre>{html.escape(text)}</pre>"
     if shown is None:
         return said
