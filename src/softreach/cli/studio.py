@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from softreach.studio.start import KeptWork
 
 _HERE = "127.0.0.1"
+_USE = "can use this studio and this machine's processor; what is sent is not encrypted"
+_WITH_TOKEN = f"warning: everyone who has an address with its token {_USE}"
+_WITHOUT_TOKEN = f"warning: everyone in the network, without a token, {_USE}"
 
 
 def studio(
@@ -74,7 +77,7 @@ def studio(
             console.line(f"{url}  (for other machines)")
         console.flush()
         if not is_local(host):
-            console.note(_warning(with_token=with_token))
+            console.note(_WITH_TOKEN if with_token else _WITHOUT_TOKEN)
         if open_page:
             webbrowser.open(running.url)
         wait_for_signal()
@@ -96,14 +99,6 @@ def _write_static(
     gaps = f", {counted(written.gaps, 'gap')}" if written.gaps else ""
     console.line(str(written.page))
     console.line(f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB")
-
-
-def _warning(*, with_token: bool) -> str:
-    who = "who has an address with its token" if with_token else "in the network, without a token,"
-    return (
-        f"warning: everyone {who} can use this studio and this machine's processor; "
-        "what is sent is not encrypted"
-    )
 
 
 def begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:

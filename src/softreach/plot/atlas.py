@@ -87,18 +87,12 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         ax.set_title(across.text(last), fontsize=9)
         yield "curvature", ax
     hulls = plot_hull_sheet(atlas, panels=panels)
-    if len(those) == len(SIDES):
-        _frame_compared(hulls)
-    yield "hulls", hulls
-
-
-def _frame_compared(hulls: Figure) -> None:
-    """Frame the two designs that figure 3c compares, the ends of the last column, in its colors."""
     grid = hulls.axes[0].get_gridspec()
-    assert grid is not None
-    rows, columns = grid.get_geometry()
-    for row, color in zip((rows - 1, 0), SIDES, strict=True):
-        hulls.axes[(row + 1) * columns - 1].spines[:].set(color=color, linewidth=1.6)
+    if len(those) == len(SIDES) and grid is not None:
+        rows, columns = grid.get_geometry()
+        for row, color in zip((rows - 1, 0), SIDES, strict=True):  # whose curvatures are compared
+            hulls.axes[(row + 1) * columns - 1].spines[:].set(color=color, linewidth=1.6)
+    yield "hulls", hulls
 
 
 def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
