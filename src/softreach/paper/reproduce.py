@@ -58,8 +58,9 @@ class Claim(NamedTuple):
 
 _TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
 CLAIMS = tuple(
-    Claim(name.partition(".")[0], name.partition(".")[2], **row)
-    for name, row in tomllib.loads(_TEXT).items()
+    Claim(*name.split("."), section=section, **row)
+    for section, rows in tomllib.loads(_TEXT).items()
+    for name, row in rows.items()
 )
 """Every statement that is checked, in the paper's order."""
 
