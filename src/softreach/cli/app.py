@@ -88,9 +88,7 @@ def _always(help: str, *names: str) -> Parameter:
 
 
 _QUIET = _always("Print results and errors only: no warnings, no progress.", "--quiet", "-q")
-_VERBOSE = _always(
-    "Print more: what is compiled, and where an error comes from.", "--verbose", "-v"
-)
+_VERBOSE = _always("Print more: what is compiled, and where errors come from.", "--verbose", "-v")
 _IMPORT = _always(
     "Module, or .py file, with actuators, profiles or metrics of your own, which is run. "
     "May be repeated.",

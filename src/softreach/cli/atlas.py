@@ -150,12 +150,11 @@ def best(
 
     options.check_output(out, DESIGN_FILE, overwrite)
     atlas = sr.open_atlas(store)
-    designs = sr.atlas.best_designs(
-        atlas, metric, smallest=smallest, where=where or (), count=count
-    )
+    where = where or []
+    designs = sr.atlas.best_designs(atlas, metric, smallest=smallest, where=where, count=count)
     if out is not None:
         if not designs.sizes["rank"]:
-            raise NotPossible(f"no design of {store} meets {' and '.join(where or ())}")
+            raise NotPossible(f"no design of {store} meets {' and '.join(where)}")
         first = {name: float(designs[name][0]) for name in command_of(atlas).space.names}
         sr.atlas.atlas_design(atlas, **first).save(out, overwrite=overwrite)
     console.rows(f"best {metric} of {store}", rows_of(designs), json)

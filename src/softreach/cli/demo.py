@@ -99,8 +99,7 @@ def example(
 ) -> None:
     """Write an example here: a design and the data and scripts that go with it.
 
-    softreach list examples prints their names. Designs of the gallery are examples
-    of one file.
+    softreach list examples prints their names, designs of the gallery among them.
 
     Example: softreach example tentacle
 

@@ -97,9 +97,8 @@ def _output(help: str, name: str | None = None) -> Parameter:
     return Parameter(name=name, group=OUTPUT, help=help)
 
 
-Design = Annotated[
-    str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
-]
+_DESIGN = "Design file (.toml), or a built-in design such as minimal_trunk."
+Design = Annotated[str, Parameter(help=_DESIGN)]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
 _ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
 Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]

@@ -131,9 +131,6 @@ def equilibria(
         at = activation_text(arm, result.activation)
         console.line(f"equilibria{f' at {at}' if at else ''}: {result}")
     if out is not None:
-        look = {"view": view or "oblique", "unit": arm.length_unit}
-        page = options.is_page(out)
-        figure = (
-            sr.plot.plot_3d([result], **look) if page else sr.plot.plot_equilibria(result, **look)
-        )
+        draw = sr.plot.plot_3d if options.is_page(out) else sr.plot.plot_equilibria
+        figure = draw(result, view=view or "oblique", unit=arm.length_unit)
         options.save_picture(figure, out, output.overwrite)

@@ -189,9 +189,8 @@ def gradient(
         derivatives = sr.volume_gradient(arm, parameters, accuracy=accuracy, progress=step)
     numbers = rows_of(derivatives.to_dataset())
     rows: Rows = {"route": numbers.pop("route")}
-    for k, (parameter, unit) in enumerate(
-        zip(derivatives.parameters, derivatives.units, strict=True)
-    ):
+    pairs = zip(derivatives.parameters, derivatives.units, strict=True)
+    for k, (parameter, unit) in enumerate(pairs):
         for name, (values, symbol) in numbers.items():
             label = f"{name.removesuffix(ERROR)} by {parameter}{ERROR * name.endswith(ERROR)}"
             kind = as_read((), symbol.removesuffix(" per unit"))[1]

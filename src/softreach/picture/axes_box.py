@@ -53,10 +53,8 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
     visible = tuple(((place > high).astype(int) - (place < low)).tolist())
     toward = place - (low + high) / 2
     toward /= max(float(np.linalg.norm(toward)), 1e-12)
-    right = (
-        np.array([-toward[1], toward[0], 0.0]) if toward[:2].any() else np.array([1.0, 0.0, 0.0])
-    )
-    right /= np.linalg.norm(right)
+    right = np.array([-toward[1], toward[0], 0.0])
+    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
     picture = np.stack([right, np.cross(toward, right)])  # right and up, shape (2, 3)
     edges = [_outer_edge(axis, visible, toward, picture) for axis in range(3)]
     usual = _round_step(float((high - low).max()))

@@ -73,8 +73,7 @@ def plot_arm(
 
     Args:
         arm: The design.
-        configuration: One configuration of that arm or several along `sample`; None for the arm at
-            rest alone.
+        configuration: One of that arm or several along `sample`; None for the arm at rest alone.
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
         rest: Whether to draw the arm at rest beside its configurations.

@@ -18,15 +18,9 @@ from softreach.cloud.volume import concave_hull
 from softreach.geometry.hull import Hull
 from softreach.picture.projection import View, view_axes
 from softreach.picture.zbuffer import Extent, ZBuffer, draw_mesh
+from softreach.plot import coloring
 from softreach.plot.axes import view_extent
 from softreach.plot.clouds import drawn_tips, plot_opposite_sides, point_size
-from softreach.plot.coloring import (
-    COLORMAP,
-    bundle_activations,
-    color_samples,
-    draw_figure_key,
-    key_height,
-)
 from softreach.plot.statistics import SIDES, plot_curvature
 from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes, unit_of
 from softreach.schema import is_stable
@@ -114,7 +108,7 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
         tips = drawn_tips(cloud, unit_of(cloud["tip"]))
         pixels = point_size(len(tips), box) * columns / extent.size[0]
         buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
-        colors = activation_colors(bundle_activations(cloud).values)
+        colors = activation_colors(coloring.bundle_activations(cloud).values)
         buffer.draw_points(tips, colors, max(1.0, pixels), view=_VIEW)
         return buffer
 
@@ -124,8 +118,7 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
 def plot_hull_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
     """A sheet of the lit α-shapes of an atlas at one scale (figure 3a).
 
-    Their radius is that of the metric `volume` of the atlas, 0.05 L without it. What is not
-    described here is as in `plot_cloud_sheet`.
+    The radius is that of the metric `volume`, or 0.05 L; all else is as in `plot_cloud_sheet`.
 
     Args:
         atlas: As in `plot_cloud_sheet`.
@@ -166,8 +159,7 @@ def box_over_length(atlas: xr.Dataset) -> Array:
 def panel_extent(box: Array, view: View) -> Extent:
     """Extent of a panel: tighter than a box in space, whose corners are empty.
 
-    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
-    clouds that bulge beyond it.
+    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; clouds bulge beyond it.
     """
     middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
     limits = view_extent(box, view)
@@ -191,13 +183,13 @@ def _sheet(
     across, up = sheet_axes(picked)
     with figure_style():
         places = np.ndindex(picked["status"].shape if keyed else (0,))
-        clouds = (cloud for at in places if (cloud := _cloud_at(picked, *at)) is not None)
-        first = next(clouds, None)
-        key = None if first is None else color_samples(first.isel(sample=slice(1)), "rgb").key
+        clouds = (_cloud_at(picked, *at) for at in places)
+        first = next((cloud.isel(sample=slice(1)) for cloud in clouds if cloud is not None), None)
+        key = None if first is None else coloring.color_samples(first, "rgb").key
         extent = panel_extent(box, _VIEW)
         wide, high = extent.size.tolist()
         columns, rows = [wide] * len(across.values), [high] * len(up.values)
-        top = max(_KEY, key_height(key)) if keyed else _TOP
+        top = max(_KEY, coloring.key_height(key)) if keyed else _TOP
         figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
         grid = grid[::-1]  # row 0 at the bottom
         _label_sheet(figure, grid, (across, up), atlas, top)
@@ -213,7 +205,7 @@ def _sheet(
                 ax.imshow(rgba, extent=extent, interpolation="none", aspect="auto")
             ax.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
         _draw_scale(figure, grid[0, 0])
-        draw_figure_key(figure, key, top)
+        coloring.draw_figure_key(figure, key, top)
     return figure
 
 
@@ -310,8 +302,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
     """Contours of a metric over the two parameters of an atlas (figure 3b); its best is marked.
 
     Volumes and lengths are relative to each design's own L. The best is the largest value, of
-    unreachability the smallest. Designs without a value stay white; where there are no contours, as
-    in a single row of designs, each design is a cell.
+    unreachability the smallest. Designs without a value stay white; each of a single row is a cell.
 
     Args:
         atlas: From `open_atlas`, a grid of two parameters.
@@ -351,8 +342,8 @@ def _axis(values: xr.DataArray) -> SheetAxis:
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
     known = values.compressed()
     if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
-        return ax.pcolormesh(_edges(across), _edges(up), values, cmap=COLORMAP)
-    filled = ax.contourf(across.values, up.values, values, 14, cmap=COLORMAP)
+        return ax.pcolormesh(_edges(across), _edges(up), values, cmap=coloring.COLORMAP)
+    filled = ax.contourf(across.values, up.values, values, 14, cmap=coloring.COLORMAP)
     _draw_contours(ax, across, up, values, np.asarray(filled.levels))
     return filled
 

@@ -11,15 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.picture.projection import (
-    View,
-    is_mirrored,
-    on_paper,
-    plane_of,
-    project,
-    view_angles,
-    view_axes,
-)
+from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, project, view_axes
 from softreach.picture.zbuffer import Extent, ZBuffer, seen_through
 from softreach.plot.style import DPI, as_axes, as_box, figure_style, small_axes
 from softreach.support.arrays import Array
@@ -79,7 +71,6 @@ class Panel:
         cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: object = None
     ) -> Iterator[Self]:
         """Axes in our style for points in their unit, shape (..., 3), or a box [m], (2, 3)."""
-        view_angles(view)
         with figure_style(as_axes(ax)):
             shown = bounding_box(points) if box is None else unit.of(as_box("box", box))
             if ax is None:

@@ -57,8 +57,7 @@ def plot_cloud(
         cloud: tip(sample, axis) [m], with the attribute `length` [m] if known, and
             activation(sample, bundle), each in its unit.
         ax: Axes to draw in; None for a new figure.
-        view: "front", "side", "top", "oblique", "back", "left", or azimuth and elevation of the
-            camera [rad].
+        view: "front", "side", "top", "oblique", "back", "left", or azimuth and elevation [rad].
         color: "rgb", "strongest" (bundle), "effort", the name or index of a bundle, or an array;
             None for "rgb" of up to three bundles and "strongest" of more; see `color_samples`.
         size: Diameter of a point [pixels at 250 per inch]; None chooses by their number.
@@ -123,8 +122,7 @@ def plot_slab(
         ax: As in `plot_cloud`.
         view: A view along an axis: "front" for a slab in y, "side" in x, "top" in z.
         at: Where the middle of the slab is on that axis [m]; None for the base of the arm.
-        thickness: Of the whole slab [m]; None for a fiftieth of L, or where the cloud does not know
-            L, of its largest extent.
+        thickness: Of the slab [m]; None for L / 50, or extent / 50 where L is not known.
         color: As in `plot_cloud`, for all samples of the cloud.
         size: As in `plot_cloud`.
         key: As in `plot_cloud`.
@@ -180,8 +178,7 @@ def plot_views(
         unit: As in `plot_cloud`.
 
     Returns:
-        The figure, with the axes front, side, top and oblique, and those of the color bar if there
-        is one.
+        The figure, with the axes front, side, top and oblique, and those of a color bar, if any.
 
     Raises:
         InvalidInput: As `plot_cloud`; an arm beside a cloud that does not know L, without a unit.
@@ -238,8 +235,7 @@ def plot_opposite_sides(
     Args:
         clouds: Clouds by the title of their column; each says which arm it belongs to.
         view: Of the upper row, as in `plot_cloud`; the lower row is opposite.
-        box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3); None
-            for all points.
+        box_over_length: What is shown, lower and upper corner in L [-], shape (2, 3); None for all.
         unit: Of the axes, as in `plot_cloud`.
 
     Raises:

@@ -56,8 +56,7 @@ def plot_cross_section(
         z: Station Z [m].
         ax: Axes to draw in; None for a new figure.
         bundles: Which to draw, by index; None for all.
-        half_width: Of what is shown [m], to draw several sections at one scale; None for this
-            section.
+        half_width: Of what is shown [m], for sections at one scale; None for this section alone.
         legend: Whether to name materials and bundles beside it; None where there are several
             materials, or bundles other than fibers.
         unit: As in `plot_arm`.

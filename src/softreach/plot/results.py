@@ -181,8 +181,7 @@ def plot_search(search: Any, *, unit: style.Unit = None) -> Figure:
 
     Args:
         search: What `search` returned.
-        unit: Unit of lengths and volumes, m, cm, mm or L; None for that of the design, as in the
-            report.
+        unit: Of lengths and volumes, m, cm, mm or L; None for that of the design, as in the report.
 
     Raises:
         InvalidInput: Unknown unit, or no search.

@@ -49,11 +49,9 @@ def plot_hull(
         hull: A hull, the surface of a reachable set, or anything with vertices [m] and faces.
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
-        length: L [m], by which coordinates are divided unless `unit` says otherwise; None leaves
-            them in meters.
+        length: L [m], which divides coordinates unless `unit` says otherwise; None leaves meters.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all of it.
-        unit: Of the axes: "m", "cm", "mm", or "L" with `length`; None for L if `length` is given,
-            else m.
+        unit: Of the axes: "m", "cm", "mm", or "L" with `length`; None for L with it, else m.
 
     Raises:
         InvalidInput: Unknown view or unit, or no vertices.
@@ -138,11 +136,9 @@ def plot_slice(
         grid: `ReachableSet.grid`: `count` and `degree`, or `occupied`, over x, y, z [m].
         ax: Axes to draw in; None for a new figure.
         view: A view along an axis: "front" for a plane y = at, "side" for x = at, "top" for z = at.
-        at: Where the plane cuts that axis [m]; the nearest layer of cells is shown. None for the
-            middle of the set.
+        at: Where the plane cuts that axis [m], to the nearest layer of cells; None for the middle.
         key: Whether to explain the colors.
-        unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the grid knows it (attribute
-            `length`), else m.
+        unit: Of the axes: "m", "cm", "mm" or "L"; None for L by the attribute `length`, else m.
 
     Raises:
         InvalidInput: Not a view along an axis, or a plane that misses the grid.

@@ -148,8 +148,7 @@ def plot_redundancy(
         bundle, the slabs from the front and the side, and D̄ from the front, all at one scale.
 
     Raises:
-        InvalidInput: Other titles, no tip in a slab, or clouds of which only
-            some know L.
+        InvalidInput: Other titles, no tip in a slab, or clouds of which only some know L.
         MissingExtra: matplotlib is not installed.
     """
     clouds = as_mapping("clouds", clouds, a_cloud)
@@ -202,8 +201,7 @@ def plot_curvature(
     statistics do not know L, unless there is a unit.
 
     Args:
-        statistics: Label -> what `curvature_statistics` returned; the first is drawn to the left
-            of each station and the second to the right.
+        statistics: Label -> what `curvature_statistics` returned, left and right of each station.
         ax: Axes to draw in; None for a new figure.
         quantity: "bending", "torsion" or "extension".
         unit: Of lengths: "m", "cm", "mm" or "L"; None for L if the statistics know it, else m.

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from scipy.ndimage import binary_erosion
 
+from softreach import plot
 from softreach.arm.designs import minimal_trunk, redundant_trunk
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud
@@ -17,14 +18,6 @@ from softreach.cloud.redundancy import activation_distance, redundancy_summary, 
 from softreach.inverse import solve_inverse
 from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, Verdict, judged
 from softreach.paper.sections.sweep import swept_atlas
-from softreach.plot import (
-    DesignPanel,
-    plot_arm,
-    plot_designs,
-    plot_distance_histograms,
-    plot_metric_map,
-    plot_redundancy,
-)
 from softreach.rod.kinematics import configuration
 from softreach.support.arrays import Array
 from softreach.workspace import ReachableSet, reachable_set
@@ -47,16 +40,16 @@ def redundancy(settings: Settings, notes: Notebook) -> dict[str, Any]:
         distances[name] = activation_distance(clouds[name], _RADIUS, queries=settings.queries)
         numbers[name] = _found(clouds[name], distances[name])
     words = "The minimal and the redundant design, above their cross-sections at the base."
-    panels = [DesignPanel(name, arm) for name, arm in arms.items()]
-    notes.draw("4a", "figure_4a_designs", words, plot_designs(panels))
+    panels = [plot.DesignPanel(name, arm) for name, arm in arms.items()]
+    notes.draw("4a", "figure_4a_designs", words, plot.plot_designs(panels))
     words = (
         "Clouds colored by |γ| of the last longitudinal bundle (b), slices through the origin in "
         "the frontal and the right-facing plane (c), and the mean activation-space distance (d); "
         "isolated points are light gray."
     )
-    notes.draw("4b-d", "figure_4bcd_redundancy", words, plot_redundancy(clouds, distances))
+    notes.draw("4b-d", "figure_4bcd_redundancy", words, plot.plot_redundancy(clouds, distances))
     words = "Distribution of the mean activation-space distance in both clouds."
-    notes.draw("", "distances", words, plot_distance_histograms(distances))
+    notes.draw("", "distances", words, plot.plot_distance_histograms(distances))
     outline = arms["redundant"].outline(0.0)
     return numbers | {
         "samples": settings.redundant_samples,
@@ -212,8 +205,8 @@ def _draw(atlas: xr.Dataset, arm: Manipulator, activations: Array, notes: Notebo
         "Share of the reachable volume that more than one activation reaches, over revolution and "
         "taper: where it is 0, three fibers are single-valued."
     )
-    notes.draw("", "uniqueness", words, plot_metric_map(atlas, _LABEL))
+    notes.draw("", "uniqueness", words, plot.plot_metric_map(atlas, _LABEL))
     if len(activations):
         words = f"{len(activations)} activations of one three-fiber arm with the same tip."
         shapes = configuration(arm, activations)
-        notes.draw("", "same_tip", words, plot_arm(arm, shapes, view="oblique", rest=False))
+        notes.draw("", "same_tip", words, plot.plot_arm(arm, shapes, view="oblique", rest=False))
