@@ -45,10 +45,7 @@ class AxesBox(NamedTuple):
 
 
 def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf) -> Side:
-    """The side of a box, from its lowest to its highest corner [L], that a camera sees.
-
-    The camera is at a place [L]; by its focal length [pixel], numbers have room between each other.
-    """
+    """The side of a box [L] that a camera sees; numbers keep apart by its focal length [pixel]."""
     place = np.asarray(camera, float)
     visible = tuple(((place > high).astype(int) - (place < low)).tolist())
     toward = place - (low + high) / 2
@@ -107,10 +104,7 @@ def axes_box(
     focal: float = np.inf,
     label: Callable[[str], str] = "{} / L".format,
 ) -> AxesBox:
-    """The box around points [L], shapes (n, 3), without the edges that would run across them.
-
-    Camera and focal length are as in `seen_from`; the label names an axis, with its unit.
-    """
+    """The box around points [L], shapes (n, 3), without the edges that would run across them."""
     low, high = round_box(*points)
     side = seen_from(camera, low, high, focal)
     lines, labels = [*_edges(low, high, side)], []

@@ -1,8 +1,6 @@
 """A figure in space as one web page, which turns in a browser and asks nothing of a network.
 
-The page has its own few lines of WebGL. Arrays are in it as base64: a place in 16 bits of the box
-along each axis, a 65,536th of its side, a corner of a triangle in 16 bits where they suffice, and a
-color in 8 bits a channel.
+Arrays are base64: places in 16 bits of the box along each axis, colors in 8 bits a channel.
 """
 
 from __future__ import annotations

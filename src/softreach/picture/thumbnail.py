@@ -61,10 +61,7 @@ def html_card(text: str, *parts: Skin | Dots) -> str:
 
 
 def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) -> bytes | None:
-    """A small PNG, transparent around parts in common units, as wide as high [pixels].
-
-    It is None if there is nothing finite to show.
-    """
+    """A small square PNG of parts in common units; None if there is nothing finite to show."""
     parts = tuple(_thinned(part) if isinstance(part, Dots) else part for part in parts)
     seen = [project(np.reshape(part[0], (-1, 3)), view) for part in parts]
     flat = np.concatenate([np.empty((0, 2)), *(points[:, :2] for points in seen)])

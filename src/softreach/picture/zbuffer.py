@@ -171,10 +171,7 @@ def draw_mesh(
     view: View,
     fade: float = 0.0,
 ) -> None:
-    """Draw a shaded mesh of vertices in the units of the buffer, (v, 3), and faces, (f, 3).
-
-    The color is RGB from 0 to 1; `fade` is how far the lit colors go toward white.
-    """
+    """Draw a lit mesh, shapes (v, 3) and (f, 3), in a color from 0 to 1 that fades toward white."""
     points, faces = project(vertices, view), np.asarray(faces)
     colors = shade(vertex_normals(points, faces), color)
     colors += fade * (255 - colors)
@@ -182,10 +179,7 @@ def draw_mesh(
 
 
 def shade(normals: Array, color: ArrayLike) -> Array:
-    """RGB from 0 to 255 of surface elements, lit alike from both sides, shape (n, 3).
-
-    Unit normals are right, up and toward the camera, shape (n, 3); the color is RGB from 0 to 1.
-    """
+    """RGB from 0 to 255 for unit normals as seen, shapes (n, 3), lit alike from both sides."""
     facing = np.where(normals[:, 2:] < 0, -normals, normals)
     # from 0 to 1 all around, so that the dark side has a shape too
     light = (0.5 + 0.5 * (facing @ _LAMP) / np.linalg.norm(_LAMP))[:, None] ** 1.5

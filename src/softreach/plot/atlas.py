@@ -157,10 +157,7 @@ def box_over_length(atlas: xr.Dataset) -> Array:
 
 
 def panel_extent(box: Array, view: View) -> Extent:
-    """Extent of a panel: tighter than a box in space, whose corners are empty.
-
-    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; clouds bulge beyond it.
-    """
+    """Extent of the ellipsoid in a box, √Σ(hᵢ eᵢ)² along a unit vector e, and a fifth more."""
     middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
     limits = view_extent(box, view)
     axes = view_axes(view)[:2]

@@ -34,10 +34,7 @@ _UNIT_MARK = "_counted in "  # the label of an image, which no legend shows
 
 
 def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
-    """Draw the walls of a box, shape (2, 3), behind what it holds, and label its edges.
-
-    The frame of the axes, which hold an orthographic image of the inside, is hidden.
-    """
+    """Draw the walls of a box, shape (2, 3), behind the image of its inside; label its edges."""
     from matplotlib.collections import LineCollection
 
     edges = [_outer_edge(box, view, axis) for axis in range(3)]

@@ -88,9 +88,6 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
             stand for all beyond them; or RGB from 0 to 1 per sample.
 
     Unstable equilibria of arms under loads are always magenta.
-
-    Raises:
-        InvalidInput: No such bundle, or an array of another length.
     """
     coloring = _colored(cloud, color)
     unstable = cloud["status"].values == 1 if "status" in cloud else np.zeros(0, bool)

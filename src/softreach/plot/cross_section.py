@@ -151,10 +151,7 @@ def _bundle_entries(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[t
 
 
 def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
-    """Layers; what is empty is white.
-
-    In a section of one material the core is paler than the rings; rings above others are clear.
-    """
+    """Layers: of one material the core is paler than the rings; rings above others are clear."""
     from matplotlib.patches import Circle
 
     materials = [*_materials(section)]

@@ -1,7 +1,4 @@
-"""Pictures of reachable sets and hulls: lit surfaces, volumes over α, and slices.
-
-A slice shows how many activations reach each place, and where the map folds.
-"""
+"""Pictures of reachable sets and hulls: lit surfaces, volumes over α, slices by multiplicity."""
 
 from __future__ import annotations
 

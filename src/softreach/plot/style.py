@@ -117,8 +117,8 @@ def place_panels(
 ) -> tuple[Figure, NDArray[np.object_]]:
     """A figure of a width [inch], and its panels at one scale, shape (rows, columns).
 
-    Columns and rows are what each shows in width and in height, in one unit; `around` all panels
-    there is room at the left, right, bottom and top, and gaps are between columns and rows [inch].
+    Columns and rows are what each shows in width and in height, in one unit; `around` is the room
+    at the left, right, bottom and top, and `gaps` that between columns and between rows [inch].
     """
     (left, right, bottom, top), (beside, between) = around, gaps
     scale = (width - left - right - beside * (len(columns) - 1)) / sum(columns)
