@@ -288,8 +288,7 @@ def _unchanged(text: str) -> sr.Manipulator:
     hint = did_you_mean(text, names)
     if suffix == ".json":
         hint = f"if it is a filament: softreach import {text} {text[:-5]}.toml"
-    allowed = f"a .toml file, or one of {', '.join(names)}"
-    raise InvalidInput("design", text, allowed, hint)
+    raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(names)}", hint)
 
 
 def read_mass(name: str, text: str) -> float:

@@ -194,8 +194,7 @@ def gradient(
         for name, (values, symbol) in numbers.items():
             label = f"{name.removesuffix(ERROR)} by {parameter}{ERROR * name.endswith(ERROR)}"
             kind = as_read((), symbol.removesuffix(" per unit"))[1]
-            per = kind if unit == "1" else f"{kind or '1'}/{unit}"
-            rows[label] = (values[k], per)
+            rows[label] = (values[k], kind if unit == "1" else f"{kind or '1'}/{unit}")
     console.rows(f"derivatives of what {design} reaches", rows, json)
 
 

@@ -222,8 +222,7 @@ def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
     if size >= _MAT_LIMIT:
         raise InvalidInput("cloud", f"{size} bytes", "below 2 GiB for MAT", "use .parquet or .npz")
     bundle = np.array(table.bundles, dtype=object)
-    content = {**_arrays(table), "bundle": bundle, "metadata": table.metadata}
-    savemat(file, content, oned_as="row")
+    savemat(file, {**_arrays(table), "bundle": bundle, "metadata": table.metadata}, oned_as="row")
 
 
 def _arrays(table: CloudTable) -> dict[str, NDArray[Any]]:

@@ -162,8 +162,7 @@ def _write_ply(scene: Scene, file: BufferedWriter) -> None:
     colors = np.concatenate([_colors(part) for part in scene.parts])
     columns = dict(zip("xyz", surface.vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    units = {"units": scene.unit.name}
-    write_ply(file, len(surface.vertices), [columns], units, surface.faces)
+    write_ply(file, len(surface.vertices), [columns], {"units": scene.unit.name}, surface.faces)
 
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
@@ -232,8 +231,7 @@ def _write_3mf(scene: Scene, file: BufferedWriter) -> None:
 def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
     surface = joined(scene.parts)
     number = np.repeat(np.arange(len(scene.parts)), [len(part.faces) for part in scene.parts])
-    cells = [("triangle", surface.faces)]
-    write_vtu(file, surface.vertices, cells, cell_data={"part": [number]})
+    write_vtu(file, surface.vertices, [("triangle", surface.faces)], cell_data={"part": [number]})
 
 
 def _said_unit(scene: Scene) -> str:

@@ -72,8 +72,7 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
 
 def _seen(ends: Array, toward: Array, picture: Array) -> Array:
     """Distances of two points to the right and up, in focal lengths, shape (2,)."""
-    depth = np.maximum(-ends @ toward, 1e-3)
-    first, last = ends @ picture.T / depth[:, None]
+    first, last = ends @ picture.T / np.maximum(-ends @ toward, 1e-3)[:, None]
     return np.abs(last - first)
 
 

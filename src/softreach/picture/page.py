@@ -112,8 +112,7 @@ def web_page(
 
 def script_text(content: Any) -> str:
     """A value as JSON, no text of which can end the script that it stands in."""
-    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def packed(part: PagePart, box: Array) -> PackedPart:

@@ -75,6 +75,5 @@ def view_angles(view: View) -> tuple[float, float]:
     if isinstance(view, str) and view in VIEWS:
         return VIEWS[view]
     if isinstance(view, str) or np.shape(view) != (2,) or not np.isfinite(view).all():
-        known = f"{', '.join(VIEWS)}, or (azimuth, elevation) in radians"
-        raise InvalidInput("view", view, known)
+        raise InvalidInput("view", view, f"{', '.join(VIEWS)}, or (azimuth, elevation) in radians")
     return view[0], view[1]

@@ -112,8 +112,7 @@ def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
     out = (outline.outer_ratio > _BULGE) & outline.acts
     surfaces = [arm_surface(arm, shape, _SIDES)]
     if out.any():
-        skins = bundle_skins(arm, shape)
-        surfaces += [skin for k, skin in enumerate(skins) if out[:, k].any()]
+        surfaces += [skin for k, skin in enumerate(bundle_skins(arm, shape)) if out[:, k].any()]
     points = [surface.vertices for surface in surfaces]
     return unit.of(np.concatenate([*points, marker_points(arm.markers, shape)]))
 
@@ -336,14 +335,11 @@ def plot_equilibria(
         for k, shape in enumerate(shapes):
             follows, ring = k == equilibria.followed, " ring" * bool(equilibria.is_ring[k])
             kind = ("stable" if stable[k] else "unstable") + ring
-            panel.plot(
-                counted.of(shape["position"].values),
-                color=_FOLLOWED if follows else _STABLE if stable[k] else _UNSTABLE,
-                linestyle="-" if stable[k] else "--",
-                linewidth=1.4 if stable[k] or follows else 1.0,
-                solid_capstyle="round",
-                label=f"{kind}, the posture" if follows else kind,
-            )
+            look = {"color": _FOLLOWED if follows else _STABLE if stable[k] else _UNSTABLE}
+            look |= {"linestyle": "-" if stable[k] else "--", "solid_capstyle": "round"}
+            look |= {"label": f"{kind}, the posture" if follows else kind}
+            wide = 1.4 if stable[k] or follows else 1.0
+            panel.plot(counted.of(shape["position"].values), linewidth=wide, **look)
         panel.plot(rim, color="0.2", linewidth=2.0, solid_capstyle="round")
         _gravity_arrow(panel, equilibria)
         _add_legend(panel.ax, own_figure=ax is None)
@@ -458,14 +454,11 @@ def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
     right, up = on_paper(equilibria.rod.pose.directions_to_world(tables.axes[0]), panel.view)
     if np.hypot(right, up) < _SHORTEST_ARROW:
         return
+    word, tail = "g" if any(tables.loads.gravity) else "force", (-_ARROW * right, -_ARROW * up)
     place = {"xycoords": "axes fraction", "textcoords": "offset points", "zorder": 4}
-    panel.ax.annotate(
-        "g" if any(tables.loads.gravity) else "force",
-        (0.09, 0.86),
-        (-_ARROW * right, -_ARROW * up),
-        **{"ha": "center", "va": "center", "fontsize": 8, **place},
-        arrowprops={"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0},
-    )
+    look = {"ha": "center", "va": "center", "fontsize": 8, **place}
+    arrow = {"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0}
+    panel.ax.annotate(word, (0.09, 0.86), tail, arrowprops=arrow, **look)
 
 
 def _add_legend(ax: Axes, *, own_figure: bool) -> None:

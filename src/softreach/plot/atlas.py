@@ -341,7 +341,7 @@ def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
     if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
         return ax.pcolormesh(_edges(across), _edges(up), values, cmap=coloring.COLORMAP)
     filled = ax.contourf(across.values, up.values, values, 14, cmap=coloring.COLORMAP)
-    _draw_contours(ax, across, up, values, np.asarray(filled.levels))
+    _contour(ax, across, up, values, np.asarray(filled.levels))
     return filled
 
 
@@ -354,9 +354,7 @@ def _edges(axis: SheetAxis) -> Array:
     return np.array([2 * values[0] - middle[0], *middle, 2 * values[-1] - middle[-1]])
 
 
-def _draw_contours(
-    ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array
-) -> None:
+def _contour(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array) -> None:
     ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(0, len(levels), 2)]
     lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
     low = np.array([across.values[0], up.values[0]])

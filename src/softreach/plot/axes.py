@@ -39,15 +39,13 @@ def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
 
     edges = [_outer_edge(box, view, axis) for axis in range(3)]
     ticks = _ticks(ax, box, view, edges)
-    camera = view_axes(view)[2]
-    far, lines = np.where(camera > 0, box[0], box[1]), []
+    far, lines = np.where(view_axes(view)[2] > 0, box[0], box[1]), []
     for along, across in permutations(range(3), 2):
         for value in (*ticks[across], *box[:, across]):
             line = np.tile(far, (2, 1))
             line[:, along], line[:, across] = box[:, along], value
             lines.append(project(line, view)[:, :2])
-    walls = LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False)
-    ax.add_collection(walls)
+    ax.add_collection(LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False))
     for axis in range(3):
         _label_edge(ax, box, view, edges[axis], ticks[axis], unit.label("xyz"[axis]))
     ax.set_axis_off()

@@ -81,8 +81,7 @@ def plot_cloud(
 
 def cloud_image(panel: Panel, tips: Array, rgb: NDArray[np.uint8], size: float | None) -> ZBuffer:
     """The image in a panel of tips in its unit, shape (n, 3), with RGB from 0 to 255, (n, 3)."""
-    spread = point_size(len(tips), panel.box) * panel.pixels_per_unit
-    pixels = size or min(_LARGEST, spread)
+    pixels = size or min(_LARGEST, point_size(len(tips), panel.box) * panel.pixels_per_unit)
     # small points gain nothing from smoothing; fine steps of color drown in their noise
     buffer = panel.buffer(oversample=1 if pixels < 3.5 else 2, color_step=8)
     buffer.draw_points(tips, rgb, pixels, view=panel.view)
@@ -96,8 +95,7 @@ def drawn_tips(cloud: xr.Dataset, unit: LengthUnit) -> Array:
 
 def point_size(samples: int, box: Array) -> float:
     """A diameter that closes the surface of a cloud without blurring it, in units of the box."""
-    spacing = np.ptp(box, axis=0).max() / np.cbrt(max(samples, 1))
-    return 0.45 * float(spacing)
+    return 0.45 * float(np.ptp(box, axis=0).max() / np.cbrt(max(samples, 1)))
 
 
 def plot_slab(

@@ -76,7 +76,7 @@ def plot_cross_section(
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     counted = unit_for(arm.length, unit)
     outer = float(counted.of(arm.profile.radius(z)))
-    placed = _placed_bundles(arm, z, outer, some_bundles(arm, bundles))
+    placed = _placed(arm, z, outer, some_bundles(arm, bundles))
     entries = [*_material_entries(arm.section), *_bundle_entries(arm, placed)] if legend else []
     labels = [label for _, label in entries[:_MOST]]
     if len(entries) > _MOST:
@@ -256,9 +256,7 @@ class _Placed:
         return LineCollection(list(np.stack(points, axis=1)), colors=ink, linewidths=0.7)
 
 
-def _placed_bundles(
-    arm: Manipulator, z: float, outer: float, bundles: Collection[int]
-) -> list[_Placed]:
+def _placed(arm: Manipulator, z: float, outer: float, bundles: Collection[int]) -> list[_Placed]:
     outline = arm.outline(z)
     ratios = outline.inner_ratio[0], outline.outer_ratio[0]
     sizes = outline.center[0], outline.extent, *(outer * ratio for ratio in ratios)

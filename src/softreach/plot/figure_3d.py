@@ -86,15 +86,9 @@ def plot_3d(
     scene = Scene(shown_in, color, kinds)
     scene.add(things)
     box = bounding_box(*scene.points())
-    page = web_page(
-        scene.parts,
-        box,
-        shown_in,
-        keys=scene.keys,
-        caption=". ".join(scene.captions) if said is None else said,
-        note=". ".join([*scene.notes, _HELP]),
-        view=view,
-    )
+    said = ". ".join(scene.captions) if said is None else said
+    words = {"caption": said, "note": ". ".join([*scene.notes, _HELP])}
+    page = web_page(scene.parts, box, shown_in, keys=scene.keys, view=view, **words)
     return Figure3D(page, "; ".join(scene.notes))
 
 
@@ -283,8 +277,7 @@ def page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
     if not isinstance(key, ScalarKey):
         return [] if key is None else [Swatches(marks, key.title)]
     scale = color_map(key)
-    shares = np.linspace(0.0, 1.0, 17)
-    colors = [css_color(rgb[:3]) for rgb in scale.cmap(shares)]
+    colors = [css_color(rgb[:3]) for rgb in scale.cmap(np.linspace(0.0, 1.0, 17))]
     values = np.asarray(scale.norm.inverse(np.array([0.0, 0.5, 1.0])), float)
     low, middle, high = (f"{value:.3g}" for value in values)
     ends = (f"≤ {low}", middle, f"≥ {high}") if key.clipped else (low, middle, high)

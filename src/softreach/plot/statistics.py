@@ -116,8 +116,7 @@ def plot_distance_histograms(distances: Mapping[str, xr.DataArray]) -> Figure:
             if len(finite):
                 median, isolated = float(np.median(finite)), 1 - len(finite) / distance.size
                 ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
-                text = f"median {median:.3f}\nisolated {isolated:.2%}"
-                style.write_note(ax, text, 0.98, 0.98)
+                style.write_note(ax, f"median {median:.3f}\nisolated {isolated:.2%}", 0.98, 0.98)
         grid[0, 0].set_ylabel("share of points per bin / %")
     return figure
 

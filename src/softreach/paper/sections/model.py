@@ -193,8 +193,7 @@ def _rotation_errors(arm: Manipulator, angle: float) -> dict[str, float]:
     slope, limit = np.tan(angle) * np.hypot(1, np.tan(_TAPER)), np.tan(angle) * z / radius
 
     def printed(taper: float) -> float:  # Θ̃2 of Appendix B [rad]
-        ratio = 1 - z * np.tan(taper) / radius
-        return -np.tan(angle) / np.sin(taper) * np.log(ratio)
+        return -np.tan(angle) / np.sin(taper) * np.log(1 - z * np.tan(taper) / radius)
 
     integral = quad(lambda s: slope / float(rod.radius(s)), 0, z)[0]
     return {

@@ -130,8 +130,7 @@ def growth(n: Numbers) -> Finding:
         f"the volume of the α-shapes grows in {_rises(n, 'volume', 0)} steps of Ω, the exact "
         f"one in {_rises(n, 'exact_volume', 0)}"
     )
-    rises = np.greater(n.volume[-1], n.volume[0]).all()
-    return judged(words, _share(n, "volume", 0) > 0.95, rises)
+    return judged(words, _share(n, "volume", 0) > 0.95, np.greater(n.volume[-1], n.volume[0]).all())
 
 
 def maximum(n: Numbers) -> Finding:
