@@ -15,6 +15,7 @@ from cyclopts import Group, Parameter, Token
 
 import softreach as sr
 from softreach.cli.console import console
+from softreach.support import quantity
 from softreach.support.arguments import POSITIVE, as_one_of
 from softreach.support.errors import (
     InvalidDesign,
@@ -28,13 +29,6 @@ from softreach.support.errors import (
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
 from softreach.support.files.text import MEGABYTE, read_text
-from softreach.support.quantity import (
-    numbers_in,
-    read_number,
-    read_quantity,
-    read_whole_number,
-    unit_names,
-)
 from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
 if TYPE_CHECKING:
@@ -67,8 +61,8 @@ def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
     return Parameter(converter=convert)
 
 
-Whole = Annotated[int, _read_by(read_whole_number, "a whole number such as 20000 or 2e4")]
-Number = Annotated[float, _read_by(read_number, "a finite number such as 0.5 or 1e-3")]
+Whole = Annotated[int, _read_by(quantity.read_whole_number, "a whole number such as 20000 or 2e4")]
+Number = Annotated[float, _read_by(quantity.read_number, "a finite number such as 0.5 or 1e-3")]
 
 
 def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, str]:
@@ -293,18 +287,18 @@ def _unchanged(text: str) -> sr.Manipulator:
 
 def read_mass(name: str, text: str) -> float:
     """A mass [kg] that was written with its unit."""
-    allowed = f"a mass >= 0 with its unit ({', '.join(unit_names('kg'))}), such as 200g"
-    return read_as(name, text, lambda text: read_quantity(text, "kg"), allowed, Range(0.0))
+    allowed = f"a mass >= 0 with its unit ({', '.join(quantity.unit_names('kg'))}), such as 200g"
+    return read_as(name, text, lambda text: quantity.read_quantity(text, "kg"), allowed, Range(0.0))
 
 
 def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:
     """Three numbers x,y,z, in the SI unit if none follows the last."""
-    names = unit_names(unit)
+    names = quantity.unit_names(unit)
 
     def read(text: str) -> tuple[float, ...]:
-        written = max((name for name in names if text.endswith(name)), key=len, default="")
+        written = max((name for name in names if text.endswith(name)), key=len, default=names[0])
         x, y, z = text.removesuffix(written).split(",")
-        return tuple(read_quantity(f"{part}{written or names[0]}", unit) for part in (x, y, z))
+        return tuple(quantity.read_quantity(f"{part}{written}", unit) for part in (x, y, z))
 
     allowed = f"{others}three finite numbers x,y,z in {unit} ({', '.join(names)})"
     return read_as(name, text.rstrip(), read, allowed)
@@ -359,7 +353,7 @@ def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.input_bounds[:, 0].tolist()
-    if (values := numbers_in(text, arm.inputs)) is not None:
+    if (values := quantity.numbers_in(text, arm.inputs)) is not None:
         return values
     allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
     raise InvalidInput(name, text, allowed)

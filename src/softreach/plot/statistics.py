@@ -15,14 +15,7 @@ from softreach.plot import coloring, style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.clouds import drawn_tips, plot_cloud, plot_slab
 from softreach.schema import a_cloud
-from softreach.support.arguments import (
-    POSITIVE,
-    as_dataset,
-    as_flag,
-    as_mapping,
-    as_number,
-    as_one_of,
-)
+from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number, as_one_of
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -71,7 +64,7 @@ def plot_distance(
         MissingExtra: matplotlib is not installed.
     """
     cloud, distance = a_cloud("cloud", cloud), _a_distance("distance", distance)
-    high = largest_distance([distance]) if high is None else as_number("high", high, POSITIVE)
+    high = largest_distance([distance]) if high is None else as_number("high", high, style.POSITIVE)
     key, values = as_flag("key", key), distance.values
     counted = style.unit_of(cloud["tip"], unit)
     tips = drawn_tips(cloud, counted)[distance["sample"].values]
