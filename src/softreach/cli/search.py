@@ -163,8 +163,7 @@ def _searched(asked: dict[str, Any], storage: Path) -> sr.optimization.Search:
 
 
 class _Watch:
-    def __init__(self) -> None:
-        self._met, self._excess = 0, math.inf
+    _met, _excess = 0, math.inf
 
     def __call__(self, candidate: sr.optimization.Candidate) -> None:
         self._met += candidate.is_feasible
