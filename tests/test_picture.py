@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import base64
+import io
 import re
-import zlib
 
 import numpy as np
 import pytest
@@ -190,17 +190,9 @@ def test_light_falls_alike_on_both_sides(rng):
 
 
 def pixels_of(png: bytes) -> np.ndarray:
-    """The image in a PNG file of unfiltered rows, as the format specifies it."""
-    assert png.startswith(b"\x89PNG\r\n\x1a\n")
-    columns, rows = (int.from_bytes(png[k : k + 4], "big") for k in (16, 20))
-    assert png[25] == 6  # RGBA
-    start = png.index(b"IDAT")
-    size = int.from_bytes(png[start - 4 : start], "big")
-    content = png[start + 4 : start + 4 + size]
-    assert int.from_bytes(png[start + 4 + size :][:4], "big") == zlib.crc32(b"IDAT" + content)
-    lines = np.frombuffer(zlib.decompress(content), np.uint8).reshape(rows, -1)
-    assert not lines[:, 0].any()
-    return lines[:, 1:].reshape(rows, columns, 4)
+    """The image in a PNG file, RGBA from 0 to 255, as another reader finds it."""
+    plt = pytest.importorskip("matplotlib.pyplot")
+    return np.rint(255 * plt.imread(io.BytesIO(png)))
 
 
 class TestThumbnails:
@@ -209,12 +201,6 @@ class TestThumbnails:
         rng = np.random.default_rng(seed)
         drawn = rng.integers(0, 256, (*rng.integers(1, 9, 2), 4), np.uint8)
         np.testing.assert_array_equal(pixels_of(png_bytes(drawn)), drawn)
-
-    def test_other_readers_read_the_png(self, rng, tmp_path):
-        plt = pytest.importorskip("matplotlib.pyplot")
-        drawn = rng.integers(0, 256, (5, 7, 4), np.uint8)
-        (tmp_path / "a.png").write_bytes(png_bytes(drawn))
-        np.testing.assert_array_equal(np.rint(255 * plt.imread(tmp_path / "a.png")), drawn)
 
     @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
     def test_a_ball_is_a_disc_in_the_middle_at_any_scale(self, rng, scale):
