@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import Rows, console, to_degrees
 from softreach.cli.options import UNCHANGED, Changes, design_from
 from softreach.support.errors import NotPossible, no_warnings
-
-if TYPE_CHECKING:
-    from softreach.rest import Rest
 
 
 def design(
@@ -187,7 +184,7 @@ def _rest_rows(arm: sr.Manipulator) -> Rows:
     }
 
 
-def _rest(arm: sr.Manipulator) -> Rest | None:
+def _rest(arm: sr.Manipulator) -> sr.rest.Rest | None:
     """The arm at rest; None under loads too large to compute it."""
     from softreach.rod.tip_map import InvalidLoads
 

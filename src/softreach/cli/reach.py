@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -18,9 +18,6 @@ from softreach.support.arguments import as_number
 from softreach.support.errors import NotPossible, Range, counted
 from softreach.support.files.formats import PAGES, PICTURES
 from softreach.support.memory import check_memory
-
-if TYPE_CHECKING:
-    from softreach.geometry.hull import Hull
 
 HULL_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
 
@@ -289,7 +286,7 @@ def volume(
         console.written(out, written)
 
 
-def volume_rows(concave: Hull, convex: Hull) -> Rows:
+def volume_rows(concave: sr.volume.Hull, convex: sr.volume.Hull) -> Rows:
     """The size of a cloud and the trust that it deserves."""
     share = 1 - concave.volume / convex.volume if convex.volume else None
     return {

@@ -131,12 +131,9 @@ def search(
         "minimize": None if minimize is None else minimize.split(","),
         "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2") or None,
         "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4") or None,
-        "polish": polish,
-        "designs": designs,
-        "seed": seed,
-        "accuracy": accuracy,
-        "sampler": sampler,
     }
+    asked_for |= {"polish": polish, "designs": designs, "seed": seed}
+    asked_for |= {"accuracy": accuracy, "sampler": sampler}
     given = {name: value for name, value in asked_for.items() if value is not None}
     text = read_text("requirements", needs, LONGEST)
     designs_from = partial(design_from, changes=Changes(point=point))

@@ -13,7 +13,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.manipulator import a_manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import arm_surface, bundle_surfaces, inside
 from softreach.export.formats import write_by_suffix, write_ply, write_vtu
 from softreach.geometry.surface import SurfaceMesh, parted
@@ -28,8 +28,6 @@ from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.arm.manipulator import Manipulator
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 _CORE_3MF = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.material import Material
+from softreach.arm.section import Section
 from softreach.plot.style import LENGTH, PLACE, Unit, some_bundles, styled_axes, unit_for
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
@@ -20,9 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Patch, Wedge
-
-    from softreach.arm.material import Material
-    from softreach.arm.section import Section
 
 _MOST = 12  # entries
 _HANDLE, _LETTER = 0.5, 0.056  # inches
