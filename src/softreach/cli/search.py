@@ -66,14 +66,10 @@ def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
     return {
         **for_machines(fields, result.arm.length),
-        "findings": [_finding(finding) for finding in result.findings],
+        "findings": [{**vars(each), "met": each.met} for each in result.findings],
         "payloads_kg": result.payloads,
         "coverages": [coverage._asdict() for coverage in result.coverages],
     }
-
-
-def _finding(finding: sr.requirements.Finding) -> dict[str, Any]:
-    return {**vars(finding), "met": finding.met}
 
 
 def search(
@@ -179,7 +175,7 @@ def _found(result: sr.optimization.Search, out: Path) -> dict[str, Any]:
     return {
         **{name: getattr(result, name) for name in names},
         "front": [_design(result, each) for each in result.front],
-        "findings": [_finding(finding) for finding in result.findings],
+        "findings": [{**vars(each), "met": each.met} for each in result.findings],
         "folder": str(out),
     }
 

@@ -27,7 +27,17 @@ _TAPER = np.radians(2)  # φ of the minimal trunk
 def model(settings: Settings, notes: Notebook) -> dict[str, Any]:
     """The design, its angles, its symmetry."""
     arm = minimal_trunk(taper=np.radians(3))
-    _draw(arm, notes)
+    words = "A helical fiber of the tapered arm, and its cross-section at the base and halfway."
+    helix = [DesignPanel("Ω = 108°, left", arm, "left", [1])]
+    figure = plot_designs(helix, stations_over_length=(0.0, 0.5), width=1.8)
+    notes.draw("1b", "figure_1b_fiber", words, figure)
+    words = "The three architectures alone, each above its bundle's place in the cross-section."
+    sides = enumerate(("back", "back", "front"))
+    singles = [DesignPanel(f"{arm.bundle_names[k]}, {side}", arm, side, [k]) for k, side in sides]
+    notes.draw("1c", "figure_1c_architectures", words, plot_designs(singles))
+    words = "The minimal design from the front and the back, above its cross-section at the base."
+    both = [DesignPanel("front", arm), DesignPanel("back", arm, "back")]
+    notes.draw("1d", "figure_1d_design", words, plot_designs(both))
     facts = describe(arm)
     # between the right-handed bundle and the longitudinal one at the tip
     angles = arm.outline(arm.length).center[0]
@@ -62,20 +72,6 @@ def _asymmetry(arm: Manipulator, seed: int) -> float:
     gamma = np.random.default_rng(seed).uniform(low, high, (2_000, 3))
     tips, others = tip_positions(arm, gamma), tip_positions(arm, gamma[:, [1, 0, 2]])
     return float(np.abs(tips * [-1, 1, 1] - others).max() / arm.length)
-
-
-def _draw(arm: Manipulator, notes: Notebook) -> None:
-    words = "A helical fiber of the tapered arm, and its cross-section at the base and halfway."
-    helix = [DesignPanel("Ω = 108°, left", arm, "left", [1])]
-    figure = plot_designs(helix, stations_over_length=(0.0, 0.5), width=1.8)
-    notes.draw("1b", "figure_1b_fiber", words, figure)
-    words = "The three architectures alone, each above its bundle's place in the cross-section."
-    sides = enumerate(("back", "back", "front"))
-    singles = [DesignPanel(f"{arm.bundle_names[k]}, {side}", arm, side, [k]) for k, side in sides]
-    notes.draw("1c", "figure_1c_architectures", words, plot_designs(singles))
-    words = "The minimal design from the front and the back, above its cross-section at the base."
-    both = [DesignPanel("front", arm), DesignPanel("back", arm, "back")]
-    notes.draw("1d", "figure_1d_design", words, plot_designs(both))
 
 
 def misprints(settings: Settings, notes: Notebook) -> dict[str, Any]:

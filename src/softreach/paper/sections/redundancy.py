@@ -11,7 +11,6 @@ from scipy.ndimage import binary_erosion
 
 from softreach import plot
 from softreach.arm.designs import minimal_trunk, redundant_trunk
-from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.dexterity import solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
@@ -147,7 +146,16 @@ def uniqueness(settings: Settings, notes: Notebook) -> dict[str, Any]:
     paper, clearest = (reachable_set(arm, accuracy=settings.accuracy) for arm in arms)
     tip, activations = _clearest_pair(clearest)
     mapped = atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")})
-    _draw(mapped, arms[1], activations, notes)
+    words = (
+        "Share of the reachable volume that more than one activation reaches, over revolution and "
+        "taper: where it is 0, three fibers are single-valued."
+    )
+    notes.draw("", "uniqueness", words, plot.plot_metric_map(mapped, _LABEL))
+    if len(activations):
+        words = f"{len(activations)} activations of one three-fiber arm with the same tip."
+        shapes = configuration(arms[1], activations)
+        ax = plot.plot_arm(arms[1], shapes, view="oblique", rest=False)
+        notes.draw("", "same_tip", words, ax)
     # two fibers, and one: areas and lengths for L = 1 m
     fewer = [arms[0].replace(actuators=arms[0].actuators[:count]) for count in (2, 1)]
     surface, curve = (reachable_set(arm) for arm in fewer)
@@ -198,15 +206,3 @@ def _clearest_pair(reached: ReachableSet) -> tuple[Array, Array]:
         return np.zeros(3), np.empty((0, 3))
     best = max(solutions, key=lambda s: np.linalg.norm(s.activations[0] - s.activations[-1]))
     return best.target, best.activations
-
-
-def _draw(atlas: xr.Dataset, arm: Manipulator, activations: Array, notes: Notebook) -> None:
-    words = (
-        "Share of the reachable volume that more than one activation reaches, over revolution and "
-        "taper: where it is 0, three fibers are single-valued."
-    )
-    notes.draw("", "uniqueness", words, plot.plot_metric_map(atlas, _LABEL))
-    if len(activations):
-        words = f"{len(activations)} activations of one three-fiber arm with the same tip."
-        shapes = configuration(arm, activations)
-        notes.draw("", "same_tip", words, plot.plot_arm(arm, shapes, view="oblique", rest=False))
