@@ -20,7 +20,7 @@ from softreach.picture.projection import View, view_axes
 from softreach.picture.zbuffer import Extent, ZBuffer, draw_mesh
 from softreach.plot import coloring
 from softreach.plot.axes import view_extent
-from softreach.plot.clouds import drawn_tips, plot_opposite_sides, point_size
+from softreach.plot.reach import drawn_tips, plot_opposite_sides, point_size
 from softreach.plot.statistics import SIDES, plot_curvature
 from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes, unit_of
 from softreach.schema import is_stable

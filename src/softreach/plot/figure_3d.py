@@ -20,8 +20,8 @@ from softreach.picture.projection import View, view_angles
 from softreach.picture.thumbnail import Dots, Skin
 from softreach.plot.arm import shapes_of
 from softreach.plot.axes import bounding_box
-from softreach.plot.clouds import drawn_tips, point_size
 from softreach.plot.coloring import BundleKey, ScalarKey, color_map, color_samples, key_entries
+from softreach.plot.reach import drawn_tips, point_size
 from softreach.plot.style import Unit, a_surface, unit_for
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from softreach.picture.projection import View, project
 from softreach.plot import coloring, style
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.clouds import drawn_tips, plot_cloud, plot_slab
+from softreach.plot.reach import drawn_tips, plot_cloud, plot_slab
 from softreach.schema import a_cloud
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number, as_one_of
 from softreach.support.errors import InvalidInput
