@@ -430,8 +430,8 @@ def plot_payload_curve(
         look = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
         ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **look)
         for point in largest:
-            sides = [point.payload, point.payload, 0.0], [0.0, point.share, point.share]
-            ax.plot(*sides, color="0.3", linewidth=0.8, linestyle=":")
+            ax.vlines(point.payload, 0.0, point.share, color="0.3", linewidth=0.8, linestyle=":")
+            ax.hlines(point.share, 0.0, point.payload, color="0.3", linewidth=0.8, linestyle=":")
             ax.plot(point.payload, point.share, "o", markersize=4, mfc="white", color="0.3")
         ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
         ax.set(xlim=(0.0, None), ylim=(0.0, None))
