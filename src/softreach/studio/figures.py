@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, plane_of
-from softreach.plot.sets import plot_slice
+from softreach.plot.reach import plot_slice
 from softreach.studio import markup
 from softreach.studio.reach import Quality, Reach, exact_set
 from softreach.studio.shown_parameters import ShownParameter, known_parameters, slider_parameters

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
-from softreach.picture.shading import vertex_normals
+from softreach.picture.zbuffer import vertex_normals
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.sampling import cube_blocks
 from softreach.studio.state import TOL, solvable_rod

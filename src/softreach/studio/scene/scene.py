@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
-from softreach.picture.shading import vertex_normals
+from softreach.picture.zbuffer import vertex_normals
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.kinematics import configuration, rest_configuration
 from softreach.rod.tip_map import TipStatus
