@@ -17,7 +17,7 @@ from softreach.studio.captions import size_text
 from softreach.studio.found import Found
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.colors import sample_values
-from softreach.studio.scene.surfaces import in_slice
+from softreach.studio.scene.scene import in_slice
 from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
 from softreach.studio.state import Slice, StudioState
 from softreach.studio.tabs.export import FILES, content_of, state_from

@@ -38,8 +38,7 @@ from softreach.studio.scene.colors import (
     sample_values,
     surface_colors,
 )
-from softreach.studio.scene.scene import Scene
-from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
+from softreach.studio.scene.scene import Scene, Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.studio.tabs.design import (
     base_field,

@@ -16,8 +16,7 @@ from softreach.studio.found import Found, Known
 from softreach.studio.jobs import Given, Job, what_follows
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, picked_point
-from softreach.studio.scene.scene import Scene, shows_cloud
-from softreach.studio.scene.surfaces import in_slice
+from softreach.studio.scene.scene import Scene, in_slice, shows_cloud
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import Dropped, Latest, StaleCheck, rest, return_memory_soon

@@ -145,15 +145,11 @@ def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
     return distance.values[np.argsort(np.argsort(shown))]
 
 
-def _multiplicity(reach: Reach, rows: NDArray[np.int64]) -> Array:
-    """Number of activations; none is found where a set is thinner than a boundary looks inside."""
-    return np.maximum(count_activations(reach, rows), 1.0)
-
-
 _SCALES = {
     "manipulability": ("manipulability [{unit}]", _manipulability),
     "activation distance": ("activation distance D̄ [-]", _activation_distance),
-    "multiplicity": ("multiplicity", _multiplicity),
+    # none is found where a set is thinner than a boundary looks inside
+    "multiplicity": ("multiplicity", lambda *shown: np.maximum(count_activations(*shown), 1.0)),
 }
 """Colors that are numbers: label of the key, and values of samples."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -19,9 +20,9 @@ from softreach.rod.tip_map import TipStatus
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import NumberedBox, way_to
 from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
-from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support.palette import bundle_color, eight_bit
+from softreach.workspace.sheets import clipped
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -41,6 +42,7 @@ _BODY: Color = (158, 153, 148)  # stands out through the surface from a light an
 _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST = 0.35
+_SHADOWLESS: Any = {"cast_shadow": False, "receive_shadow": False}
 _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which the arm is seen
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
@@ -111,14 +113,6 @@ class Scene:
     def ball(self, path: str, radius: float, color: Color, place: Array) -> None:
         """A ball at a place, with a radius [L]."""
         self.api.add_icosphere(path, radius, color, position=place)
-
-    def _mesh(
-        self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
-    ) -> Any:
-        look: Any = {"opacity": opacity, "side": "double"}
-        look |= {"cast_shadow": False, "receive_shadow": False}
-        corners, faces = vertices.astype(np.float32), faces.astype(np.uint32)
-        return self.api.add_mesh_simple(path, corners, faces, color=color, **look)
 
     # Clouds, of which the half in front of the arm is cut away.
 
@@ -196,7 +190,7 @@ class Scene:
         drawn = in_slice(lines.reshape(-1, 3), cut).reshape(-1, 2).all(axis=1) & (ink is not None)
         opened = cut.axis != "none" or reach.exact is None or reach.exact.dimension < 3
         data = glb(skin, opacity, lines[drawn], ink or DARK, both_sides=opened)
-        self.api.add_glb(path, data, cast_shadow=False, receive_shadow=False)
+        self.api.add_glb(path, data, **_SHADOWLESS)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
         """Another reach, pale: at "/free" that without loads, at "/reference" of the kept design.
@@ -276,18 +270,25 @@ class Scene:
             return np.full(3, np.nan)
         if path == "/arm":
             self.pointing = shape["directors"].values[-1, 2]
-        meshes, known = _arm_meshes(arm, shape), self._arms.get(path)
+        skins = [arm_surface(arm, shape, _SIDES)]
+        if arm.bundles <= MOST_BUNDLES:
+            skins += bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)
+        corners = [(skin.vertices / length).astype(np.float32) for skin in skins]
+        known = self._arms.get(path)
         if known is not None and known.arm is arm:
             handles = known.meshes
-            for handle, (vertices, _, _) in zip(handles, meshes, strict=True):
-                handle.vertices = (vertices / length).astype(np.float32)
+            for handle, vertices in zip(handles, corners, strict=True):
+                handle.vertices = vertices
         else:
             self.remove(path)
-            ghost = path.startswith(("/ghosts", "/sample"))
-            usual = [_GHOST] * len(meshes) if ghost else _opacities(arm, len(meshes))
+            ghost, faces = path.startswith(("/ghosts", "/sample")), [skin.faces for skin in skins]
+            clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
+            colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
+            add = partial(self.api.add_mesh_simple, side="double", **_SHADOWLESS)
+            parts = enumerate(zip(corners, faces, colors, clear, strict=True))
             handles = [
-                self._mesh(f"{path}/{k}", vertices / length, faces, color, usual[k])
-                for k, (vertices, faces, color) in enumerate(meshes)
+                add(f"{path}/{k}", v, f.astype(np.uint32), color=color, opacity=opacity)
+                for k, (v, f, color, opacity) in parts
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
         markers = marker_points(arm.markers, shape) / length
@@ -318,15 +319,80 @@ def _point_size(count: int) -> float:
     return float(np.clip(_POINT * (_USUAL / max(count, 1)) ** (1 / 3), *_POINTS))
 
 
-def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:
-    """Vertices [m], faces and color of the body and of every bundle."""
-    skins = [arm_surface(arm, shape, _SIDES)]
-    if arm.bundles <= MOST_BUNDLES:
-        skins += bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)
-    colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
-    return [(s.vertices, s.faces, color) for s, color in zip(skins, colors, strict=True)]
-
-
 def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
     hidden = any(inside(arm)) or arm.markers
     return [_CLEAR if hidden else None, *[None] * (meshes - 1)]
+
+
+# Slices of a surface, and the file that a page draws a surface from.
+
+
+class Skin(NamedTuple):
+    """A surface and the color of its vertices."""
+
+    vertices: Array  # [L], shape (v, 3)
+    faces: NDArray[Any]
+    colors: Array  # RGB from 0 to 255, shape (v, 3)
+
+
+def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
+    """Mask of the points [L], shape (n, 3), that a slice shows."""
+    if cut.axis == "none":
+        return np.ones(len(points), bool)
+    return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
+
+
+def sliced(skin: Skin, cut: Slice) -> Skin:
+    """The part of a surface that a slice shows, cut at its planes."""
+    if cut.axis == "none":
+        return skin
+    vertices, faces, colors = skin
+    for side in (-1.0, 1.0):
+        depth = cut.thickness / 2 - side * (vertices[:, "xyz".index(cut.axis)] - cut.center)
+        share = lambda pairs, depth=depth: depth[pairs[:, 0]] / -np.diff(depth[pairs])[:, 0]
+        faces, pairs, shares = clipped(faces, depth >= 0.0, share)
+        inside, outside, at = *pairs.T, shares[:, None]
+        vertices, colors = (
+            np.concatenate([values, values[inside] * (1 - at) + values[outside] * at])
+            for values in (vertices, colors)
+        )
+    return Skin(vertices, faces, colors)
+
+
+_UNLIT = "KHR_materials_unlit"
+_LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
+
+
+def glb(
+    skin: Skin, opacity: float, lines: Array, ink: tuple[int, int, int], *, both_sides: bool
+) -> bytes:
+    """A surface and lines on it as binary glTF, in their colors as they are.
+
+    viser's own meshes have one color each, its lines are slow, and so is light without a graphics
+    card. Lines have ends [L] of shape (n, 2, 3) and a color, RGB from 0 to 255. A surface that is
+    seen from inside too takes a page twice as long.
+    """
+    from trimesh import Scene, Trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    colors = _linear(np.column_stack([skin.colors, np.full(len(skin.colors), 255.0 * opacity)]))
+    parts = [Trimesh(skin.vertices, skin.faces, vertex_colors=colors, process=False)]
+    if count := len(lines):  # pairs of corners, which trimesh takes for triples
+        pairs = np.resize(np.arange(2 * count), (2 * -(-count // 3), 3))
+        colors = _linear(np.tile([*ink, 255.0], (2 * count, 1)))
+        parts.append(Trimesh(lines.reshape(-1, 3), pairs, vertex_colors=colors, process=False))
+
+    def unlit(tree: dict[str, Any]) -> None:
+        look = {"alphaMode": "BLEND", "doubleSided": both_sides, "extensions": {_UNLIT: {}}}
+        tree |= {"extensionsUsed": [_UNLIT], "materials": [look]}
+        for mesh, mode in zip(tree["meshes"], (_TRIANGLES, _LINES), strict=False):
+            mesh["primitives"][0] |= {"material": 0, "mode": mode}
+
+    return export_glb(Scene(parts), include_normals=False, tree_postprocessor=unlit)
+
+
+def _linear(colors: Array) -> NDArray[np.uint8]:
+    """Colors as glTF has them, shape (n, 4), from 0 to 255."""
+    colors = (colors / 255).clip(0, 1)
+    colors[:, :3] **= 2.2
+    return np.rint(255 * colors).astype(np.uint8)

@@ -21,7 +21,7 @@ from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.colors import sample_values
-from softreach.studio.scene.surfaces import in_slice
+from softreach.studio.scene.scene import in_slice
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState, design_of_text
