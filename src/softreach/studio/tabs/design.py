@@ -274,8 +274,7 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     panel.typed("turn [deg]", base_field("turn"), turn)
     gravity, names = load_field("gravity"), {name: name for name in GRAVITIES} | {"": "as typed"}
     fall = Attribute(
-        gravity_name,
-        lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
+        gravity_name, lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state
     )
     falls = "Direction of gravity in the world; the base says which way the arm points"
     panel.dropdown("gravity", names, fall, falls)
