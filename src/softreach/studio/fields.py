@@ -136,10 +136,7 @@ class Fields:
         words: Callable[[SoftreachError], str] = str,
         **looks: Any,
     ) -> None:
-        """A folder whose fields are made anew where their key differs.
-
-        By default that is whenever what stands at one of the paths is another object.
-        """
+        """A folder whose fields are made anew where their key differs, by default always."""
         fields, known = Fields(self.session), object()
         with self.folder(label, **looks) as folder:
             pass
@@ -228,11 +225,9 @@ class Fields:
         button.on_upload(lambda _: attempt(self.session, lambda: read(button.value)))
 
     def bind(self, widget: Any, at: Attribute, options: Options | None = None) -> Any:
-        """Bind a widget, and return it.
-
-        Events run at once and in any order: each reads what the widget holds by then, so that the
-        last one has it right. Widgets that we set ourselves also send events, without a client.
-        """
+        """Bind a widget, and return it."""
+        # Events run at once and in any order: each reads what the widget holds by then, so that the
+        # last one has it right. Widgets that we set ourselves also send events, without a client.
         binding = _Binding(self.session, widget, at, options)
         act = self.session.learn if at.of == "found" else lambda change: self.apply(change, widget)
         widget.on_update(self._by_hand(lambda: act(binding.write)))
@@ -338,9 +333,5 @@ def attempt(session: Session, action: Action) -> None:
 
 
 def file_text(name: str, content: bytes) -> str:
-    """The text in a file that a person opens; `name` is what errors call it.
-
-    Raises:
-        InvalidInput: It is too large, or no text.
-    """
+    """The text in a file that a person opens; `name` is what errors call it."""
     return text_of("file", name, content, LARGEST)

@@ -74,11 +74,7 @@ def _pixels(ax: Axes) -> NDArray[np.uint8]:
 
 
 def section_curves(reach: Reach, cut: Slice) -> list[Array]:
-    """The boundary of the reachable set in the middle plane of a slice [L], curves (n, 3).
-
-    Raises:
-        InvalidInput: There is no exact set with a surface.
-    """
+    """The boundary of a reachable set in the middle plane of a slice [L], curves (n, 3)."""
     if reach.exact is None or reach.exact.dimension < 2:
         raise InvalidInput("section", reach.refusal or "no volume", "a set with a surface to cut")
     plane, length = _plane(cut, reach.arm), reach.arm.length
@@ -88,13 +84,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
 
 
 def section_picture(reach: Reach, cut: Slice) -> Picture:
-    """The section and how many activations reach each place, in the unit of the arm.
-
-    It is by the middle plane of the slice; without one by that across y at the base.
-
-    Raises:
-        InvalidInput: As `section_curves`.
-    """
+    """Section and multiplicity by the plane of a slice; without one across y at the base."""
     from matplotlib.path import Path
 
     arm, plane = reach.arm, _plane(cut, reach.arm)
@@ -143,10 +133,7 @@ def _described(curves: list[Array], plane: Slice, arm: Manipulator) -> str:
 
 
 def enclosed_area(curves: list[Array], axis: int) -> float:
-    """Area within closed curves in a plane across an axis, holes left out.
-
-    A curve bounds a hole if an odd number of the others surround it.
-    """
+    """Area within closed curves in a plane across an axis, holes left out."""
     from matplotlib.path import Path
 
     flat = [np.delete(curve, axis, axis=1) for curve in curves]
@@ -189,10 +176,7 @@ def sweep_pictures(
 def swept_volumes(
     arm: Manipulator, parameter: ShownParameter, quality: Quality
 ) -> Iterator[tuple[float, float | None]]:
-    """Values of a slider over its range, what is nearest to the present one first, and volumes.
-
-    The volume [m³] is None where there is no design, or one that takes too long.
-    """
+    """Values of a slider, nearest to its own first, and volumes [m³]; None where none is known."""
     low, high = parameter.limits
     even = np.linspace(low, high, _VALUES)
     steps = np.clip(low + np.round((even - low) / parameter.step) * parameter.step, low, high)
@@ -214,7 +198,6 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
 
 
 # Bars under the sliders: change of the reachable volume by each, on one scale for all of them.
-
 
 PART = 0.01
 """Part of the range of a slider over which the change of the volume is told."""
@@ -240,10 +223,7 @@ class VolumeSlopes(NamedTuple):
 
 
 def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSlopes:
-    """Slopes of a design whose set is known, for as many sliders as can be moved continuously.
-
-    The check is called often, and raises to stop.
-    """
+    """Slopes of a design whose set is known, for all sliders that move continuously."""
     arm, solid, known = reach.arm, reach.exact, known_parameters(reach.arm)
     slopes = dict[str, Slope]()
     if solid is None or solid.dimension < 3 or not solid.volume > 0:
@@ -272,10 +252,7 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
 def slope_bars(
     found: VolumeSlopes, sliders: Mapping[str, tuple[ShownParameter, float]], *, old: bool
 ) -> dict[str, str]:
-    """A bar for each slider as HTML: by how much V changes over `PART` of its range.
-
-    Sliders are by names of parameters, with their ranges; old bars are of the design before.
-    """
+    """A bar for each slider as HTML: by how much V changes over `PART` of its range."""
     part = {name: PART * ends for name, (_, ends) in sliders.items() if name in found.slopes}
     percent = {name: 100 * step / found.volume for name, step in part.items()}  # per ∂V/∂p
     changes = {name: per * found.slopes[name].value for name, per in percent.items()}

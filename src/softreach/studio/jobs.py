@@ -207,7 +207,6 @@ def _sweep(given: Given) -> Results:
 
 # The arm
 
-
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 _LEVEL = 16  # of the cloud of another design

@@ -65,11 +65,7 @@ def alert(text: str) -> str:
 
 
 def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
-    """A bar from the middle of its track under a slider, behind a text, as HTML.
-
-    The share is its length over that of half of the track, to the right for positive ones; the
-    meaning is shown when it is pointed at.
-    """
+    """A bar as HTML, to the right for positive shares of half of its track; with its meaning."""
     side, meaning = ("left" if share > 0 else "right"), html.escape(meaning)
     return (
         f'<div role="img" class="sr-bar" title="{meaning}" aria-label="{inline(text)}: {meaning}" '

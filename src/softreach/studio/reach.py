@@ -273,12 +273,7 @@ def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
 
 
 def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
-    """The exact set alone, to a relative error of its volume and a largest tip error in L.
-
-    Raises:
-        InvalidInput: Some activation never comes to rest.
-        OverBudget: It takes more time or memory.
-    """
+    """The exact set, to a relative error of its volume and a largest tip error in L."""
     memory = budget.memory if solvable_rod(arm).box.dimension > 3 else None
     with no_warnings():  # the error is shown beside the volume
         return reachable_set(arm, accuracy=accuracy, tol=tol, memory=memory, progress=budget)
@@ -286,17 +281,13 @@ def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> 
 
 # Effort: the samples of an arm that there is time and memory for.
 
-
 _PILOT = 512
 _LOWEST = 10  # level below which a cloud shows no shape
 _COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
 
 
 def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
-
-    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
-    """
+    """The level of the largest cloud, at most wanted, that one core computes in time [s]."""
     return _level(max(seconds, 1e-9) / _seconds_each(rod), wanted)
 
 
@@ -337,10 +328,7 @@ def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 def count_activations(
     reach: Reach, rows: NDArray[np.int64], check: StaleCheck = lambda: None, report: Report = _quiet
 ) -> NDArray[np.float64]:
-    """Number of stable activations that put the tip where that of each sample is, shape (n,).
-
-    The arm has three free bundles. Counts are kept with the reach, also if `check` raises.
-    """
+    """Stable activations that reach each sample of three free bundles, shape (n,); kept."""
     from softreach.inverse import solve_inverse
 
     missing = uncounted(reach, rows)

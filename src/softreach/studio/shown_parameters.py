@@ -46,11 +46,7 @@ class ShownParameter(NamedTuple):
         return 0.0 if math.isnan(value) else value
 
     def write(self, arm: Manipulator, shown: float) -> Manipulator:
-        """The design with another value.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """The design with another value; InvalidDesign if no such arm can exist."""
         return with_values(arm, {known_parameters(arm)[self.name]: shown * self.scale})
 
 
@@ -66,7 +62,6 @@ def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
 
 
 # Sliders
-
 
 _Slider = tuple[str, float, float, float]
 """Label, ends and step."""
@@ -162,10 +157,7 @@ def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
 
 
 def _around_value(arm: Manipulator, parameter: Parameter) -> _Slider | None:
-    """From zero to twice the value, or all angles, within the range; None for a zero of no size.
-
-    Where the range itself does not end at zero, the slider stays off it by a hundredth.
-    """
+    """From zero to twice the value, or all angles, within the range; None for a zero of no size."""
     unit, scale = _unit(parameter, arm.length_unit)
     value, allowed = parameter.value(arm) / scale, parameter.range
     low, high = allowed.low / scale, allowed.high / scale
@@ -189,10 +181,7 @@ def owner_label(path: str) -> str:
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Parameter) -> bool:
-    """True if a parameter changes this arm, and no other slider does the same.
-
-    Only what is helical has a revolution to change; only what is not, its number of bundles.
-    """
+    """True if a parameter changes this arm, and no other slider does the same."""
     if parameter.owner and parameter.field in _ONE_FOR_ALL:
         of_all = known.get(parameter.field)
         if of_all is not None and not math.isnan(of_all.value(arm)):
@@ -316,10 +305,7 @@ def parts(arm: Manipulator) -> dict[str, Part]:
 
 
 def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
-    """The parameters of a part in the units in which they are typed.
-
-    Of those of the whole arm, what its parts differ in is typed with each of them.
-    """
+    """The parameters of a part in the units in which they are typed."""
     return _part_parameters(arm, part, typed_unit(arm))
 
 

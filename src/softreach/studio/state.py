@@ -27,20 +27,12 @@ LARGEST = 2_000_000  # bytes of a file that a person opens
 
 
 def rod_of(arm: Manipulator) -> TipMap:
-    """The tip map of a design, kept for the next call.
-
-    Raises:
-        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
-    """
+    """The tip map of a design, kept; InvalidDesign if some activation shortens it to nothing."""
     return as_tip_map(arm, TOL, warn=False)  # the page says whether samples are stable
 
 
 def design_of_text(text: str, source: str) -> Manipulator:
-    """A design that has a rod, from the text of a file; `source` is what errors call it.
-
-    Raises:
-        InvalidDesign: The arm cannot exist, or would be shortened to nothing.
-    """
+    """A design that has a rod, from the text of a file; `source` is what errors call it."""
     arm = Manipulator.from_toml(text, source)
     try:
         rod_of(arm)
@@ -53,11 +45,7 @@ _one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would bo
 
 
 def solvable_rod(arm: Manipulator) -> TipMap:
-    """The tip map of a design whose loads can be computed; slow the first time for a loaded arm.
-
-    Raises:
-        InvalidInput: The arm is loaded so heavily that no number of steps suffices.
-    """
+    """The tip map of a design whose loads can be computed; slow the first time if loaded."""
     if arm.loads is not None:
         with _one_at_a_time:
             solvable = _is_solvable(arm)
@@ -80,12 +68,7 @@ _MOST_PLACES = 300  # to reach, which are judged while a slider moves
 
 @lru_cache(maxsize=32)
 def requirements_of(text: str) -> Requirements:
-    """The requirements in the state of a tab; none for an empty text.
-
-    Raises:
-        InvalidDesign: The text is none of requirements, or names other files.
-        InvalidInput: It lists more places than can be shown.
-    """
+    """The requirements in the state of a tab; none for an empty text."""
     return needs_of_text(text) if text else Requirements()
 
 

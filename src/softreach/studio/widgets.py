@@ -98,11 +98,7 @@ def _parts(text: str) -> list[str]:
 
 
 def read_number(text: str, unit: str, length: float) -> float | None:
-    """The number that a text is in a unit, or with another one behind it; None for anything else.
-
-    What has no unit is in the one that is given, as is what is returned; "" is for plain numbers.
-    The length L [m] of the arm is a unit of lengths.
-    """
+    """The number that a text is in a unit, "" for none, or with another behind it; else None."""
     text, units = text.strip(), _units(unit, length)
     name = next((name for name in sorted(units, key=len)[::-1] if text.endswith(name)), "")
     number = number_of(text.removesuffix(name))

@@ -147,7 +147,6 @@ def return_memory_soon() -> None:
 
 # Budget of one computation: a share of the free memory, and some seconds.
 
-
 _SHARE = 0.2  # of the free memory that one computation may plan with: others hold their results
 _LEFT = 0.4  # of the memory that was free in the beginning: with less a computation ends
 _PAUSE = 0.2  # [s] between looks at the memory

@@ -45,10 +45,7 @@ _GRAY = 170, 170, 175  # of the axes
 
 
 def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
-    """Camera that sees all of a box between two corners [L], from a direction seen from its middle.
-
-    The aspect is the width of the picture over its height.
-    """
+    """Camera that sees all of a box [L] from a direction; the aspect is width over height."""
     room = _ROOM_UPRIGHT if aspect < UPRIGHT else _ROOM
     middle, radius = (low + high) / 2, room * float(np.linalg.norm(high - low)) / 2
     distance = radius / _half_sine(aspect)
@@ -119,12 +116,7 @@ class TabCamera:
         return False
 
     def picture(self) -> NDArray[np.uint8]:
-        """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
-
-        Raises:
-            InvalidInput: The tab does not answer: browsers stop drawing tabs in the background. Or
-                they would draw fewer pixels than that, and blow them up.
-        """
+        """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4)."""
         camera, client = self._client.camera, self._client
         size = {"height": FINER * camera.image_height, "width": FINER * camera.image_width}
         if max(size.values()) > LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
@@ -197,20 +189,14 @@ def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
 
 
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
-    """True if a ball stands between the camera and a point [L], other than those that touch it.
-
-    Balls have centers of shape (n, 3) and radii of shape (n,) [L].
-    """
+    """True if a ball, (n, 3) and (n,) [L], hides a point, other than those that touch it."""
     distance = float(np.linalg.norm(point - camera))
     ahead, aside = _beside(centers, camera, (point - camera) / distance)
     return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
 
 
 def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
-    """Way along a ray to the first ball that it meets [L]; infinite where it meets none.
-
-    Balls, as in `is_behind`, are met as if they were no thinner than a pointer.
-    """
+    """Way along a ray to the first ball, no thinner than a pointer [L]; infinite without one."""
     ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
     met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
     return float(ahead[met].min(initial=np.inf))

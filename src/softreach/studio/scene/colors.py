@@ -76,10 +76,7 @@ def sample_values(reach: Reach, level: int, color: str) -> str | int | xr.DataAr
 
 
 def sample_colors(reach: Reach, level: int, color: str, *, shares: bool = True) -> Coloring:
-    """Colors of the first 2^level samples; an unknown name colors by all activations.
-
-    A key of numbers of activations may have their shares of the samples.
-    """
+    """Colors of the first 2^level samples; the key to numbers of activations may have shares."""
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
     values = sample_values(reach, level, color)
     coloring = color_samples(cloud, values)

@@ -114,11 +114,7 @@ class DragBall:
 
 
 def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:
-    """Place on an axis that is nearest to a line of sight, as the distance from its origin.
-
-    The direction of the axis has length 1, the line of sight leads from the eye to a place that is
-    seen. The distance is 0 where the axis is seen end on.
-    """
+    """Way along an axis of length 1 to where a line of sight is nearest; 0 if seen end on."""
     sight = (seen - eye) / np.linalg.norm(seen - eye)
     across = axis - (axis @ sight) * sight
     steepness = float(across @ across)

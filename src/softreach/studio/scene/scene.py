@@ -193,10 +193,7 @@ class Scene:
         self.api.add_glb(path, data, **_SHADOWLESS)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
-        """Another reach, pale: at "/free" that without loads, at "/reference" of the kept design.
-
-        Points stand in for a surface that there is not; None takes it away.
-        """
+        """Another reach, pale, at "/free" or "/reference": its surface, else points, or nothing."""
         color, opacity = _BESIDE[path]
         self.remove(path)
         if reach is None:
@@ -224,10 +221,7 @@ class Scene:
         return (np.empty((0, 3)), np.empty(0)) if drawn is None else (drawn.centers, drawn.radii)
 
     def ghost_under(self, origin: Array, direction: Array) -> int | None:
-        """Number of the ghost that a ray meets before any other and before the arm.
-
-        Near their tips, where all shapes meet, ghosts are not met.
-        """
+        """Number of the ghost that a ray meets before others and the arm; near tips, of none."""
         met = []
         for path, ghost in list(self._arms.items()):
             if path.startswith("/ghosts"):

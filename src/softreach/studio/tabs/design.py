@@ -334,12 +334,7 @@ def base_field(name: str) -> Attribute:
 
 
 def load_field(name: str) -> Attribute:
-    """A load in the unit that is typed; other loads stay, and without any the arm has no loads.
-
-    Writing raises:
-        InvalidInput: A number that no load can have.
-        InvalidDesign: Matter that lacks what loads need, and where to give it.
-    """
+    """A load as it is typed; other loads stay, and without any the arm has no loads."""
     label, symbol, size, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
     scale = lambda arm: size or typed_unit(arm).size

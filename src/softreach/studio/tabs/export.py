@@ -65,12 +65,7 @@ def export(panel: Fields) -> None:
 
 
 def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
-    """The state in a file that was saved, or the present one with the design of a TOML file.
-
-    Raises:
-        InvalidInput: Neither of them.
-        InvalidDesign: The design in it cannot exist.
-    """
+    """The state in a file that was saved, or the present one with the design of a TOML file."""
     text = file_text(name, content)
     if name.lower().endswith(".toml"):
         return state.replace(design=design_of_text(text, name))

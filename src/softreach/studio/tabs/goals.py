@@ -338,7 +338,6 @@ def _summary(_: StudioState, found: Found) -> str:
 
 # Jobs
 
-
 _ACCURACY = 0.03  # of shares that are covered, and of distances between stations
 _PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
 _POSES = ("reach", "cover", "stay_inside", "avoid")

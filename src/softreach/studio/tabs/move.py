@@ -279,7 +279,6 @@ def _tip(state: StudioState) -> np.ndarray:
 
 # Jobs
 
-
 _FAMILY = 6  # shapes offered where infinitely many reach the target
 _DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
 _RESIDUAL = 1e-8  # [L]

@@ -109,7 +109,6 @@ def _work(session: Session) -> str:
 
 # Looks
 
-
 _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
