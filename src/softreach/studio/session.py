@@ -44,18 +44,20 @@ class Session:
         jobs: Iterable[Job] = (),
         *,
         work: KeptWork | None = None,
+        left: StudioState | None = None,
         compilation: CompilationWatch | None = None,
     ) -> None:
-        """Begin a session of a tab, whose state is kept in `work`; then it is furnished."""
+        """Begin where a tab left off, or at the start; the state is kept in `work`."""
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
         self.lock = threading.RLock()
         """Held while the state changes, and while that is shown."""
         self.history = History()
-        self.is_touched = False  # true once there is anything to keep
-        self.state: StudioState = start.state
-        self.found = Found(reach=start.reach)
+        self.is_touched = left is not None  # true once there is anything to keep
+        self.state = left or start.state
+        same = self.state.design == start.state.design
+        self.found = Found(reach=start.reach) if same else Found()
         self.panels: list[Callable[[], None]] = []
         """Each shows again what has changed."""
         self.revision = 0  # number of changes that widgets have to follow, whatever they hold
@@ -78,16 +80,10 @@ class Session:
     # The state, and what is known of it
 
     def update(self, change: Change, *, by_widget: bool = False, goes_on: bool = False) -> None:
-        """Replace the state, and start what follows from that.
+        """Replace the state, unless the next is not valid, and start what follows from that.
 
-        Args:
-            change: From the present state to the next.
-            by_widget: Whether a widget shows the change already. Others that hold something else
-                are left alone then: one that is dragged would jump back to where it was.
-            goes_on: Whether the change may be part of the step before, for who undoes it.
-
-        Raises:
-            SoftreachError: The change makes no valid state; nothing happens then.
+        `goes_on` lets the change be part of the step before. Where a widget shows it already,
+        others that hold something else are left alone: one that is dragged would jump back.
         """
         with self.lock:
             new = change(self.state)
@@ -125,19 +121,12 @@ class Session:
         if state.camera is not None:
             self.look_as(state.camera)
 
-    def take_up(self, state: StudioState) -> None:
-        """Go on where a tab left off, before anything is shown."""
-        self.state, self.is_touched = state, True
-        if state.design != self.start.state.design:
-            self.found = Found()
-
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""
         if self.work is not None and self.is_touched:
             self.work.keep(self.state_now())
 
     def _keep_soon(self, given: Given) -> tuple[()]:
-        """Once the state rests for a moment."""
         rest(given.check, _REST if self.is_touched else 0.0)
         self.keep()
         return ()
@@ -246,11 +235,7 @@ class Session:
         self.camera.look_from(camera)
 
     def aim(self, target: ArrayLike) -> None:
-        """Find every activation that reaches a target [m], and take the nearest to the present.
-
-        Raises:
-            SoftreachError: The target is no point.
-        """
+        """Find every activation that reaches a target [m], and take the nearest to the present."""
         self.learn({"takes_nearest": True})
         self.update(lambda state: state.replace(target=vector(np.asarray(target))))
         self.follow("inverse")  # also where the target is the one before
@@ -336,8 +321,7 @@ class Session:
         return_memory_soon()
 
     def _rested(self) -> None:
-        """Once all jobs have nothing left to do, nothing is said to be done."""
-        if not self.busy:
+        if not self.busy:  # nothing is said to be done
             self.doing = ""
             self.show()
             return_memory_soon()

@@ -128,21 +128,20 @@ def rest(check: StaleCheck, seconds: float) -> None:
     check()
 
 
-def _return_memory(check: StaleCheck) -> None:
-    """Return what work has freed; after a minute's rest also what is only kept to be quick."""
-    rest(check, _REST)
-    return_memory()
-    rest(check, LONG_REST)
-    forget_prepared()
-    return_memory()
-
-
 _returned = Latest(lambda _: None)
 
 
 def return_memory_soon() -> None:
-    """Return what has been freed in a moment, if no more work ends until then."""
-    _returned.submit(_return_memory)
+    """Return what work has freed in a moment; after a minute also what is only kept to be quick."""
+
+    def work(check: StaleCheck) -> None:
+        rest(check, _REST)
+        return_memory()
+        rest(check, LONG_REST)
+        forget_prepared()
+        return_memory()
+
+    _returned.submit(work)
 
 
 # Budget of one computation: a share of the free memory, and some seconds.
@@ -162,10 +161,7 @@ class Budget:
     def __init__(
         self, check: StaleCheck, seconds: float, report: Callable[[int], None] = lambda _: None
     ) -> None:
-        """Begin now; it may take some seconds [s].
-
-        At most some times a second, `report` is called with the number of items done in all.
-        """
+        """Begin now, for some seconds [s]; `report` is called at times with the number of items."""
         self._check, self._report, free = check, report, free_memory()
         self.memory, self._least = _SHARE * free, _LEFT * free
         """Memory that it may plan with, and that it leaves [bytes]."""
@@ -173,11 +169,7 @@ class Budget:
         self._next, self._done = 0.0, 0
 
     def __call__(self, done: int = 0) -> None:
-        """Go on with so many items done if that is wanted, and there is time and memory.
-
-        Raises:
-            OverBudget: There is not.
-        """
+        """Go on with so many items done if that is wanted, and there is time and memory."""
         self._check()
         self._done += done
         now = time.monotonic()
@@ -209,11 +201,9 @@ class CompilationWatch(event.Listener):
         event.unregister(_KIND, self)
 
     def on_start(self, event: Any) -> None:
-        del event
         self._count(1)
 
     def on_end(self, event: Any) -> None:
-        del event
         self._count(-1)
 
     def _count(self, change: int) -> None:
