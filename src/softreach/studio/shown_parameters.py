@@ -14,11 +14,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
-from softreach.studio.widgets import unit_in
+from softreach.studio.widgets import Ends, unit_in
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.units import METER, LengthUnit
-
-Ends = tuple[float, float]
 
 
 class ShownParameter(NamedTuple):

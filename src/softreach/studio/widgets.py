@@ -19,6 +19,8 @@ from softreach.support.quantity import sizes_in
 if TYPE_CHECKING:
     from viser import GuiApi
 
+Ends = tuple[float, float]
+
 _PRECISION = 12  # digits after the point that viser leaves of what a slider holds
 _UNAPPLIED = "Enter applies it."
 _UNIT_IN = re.compile(r"\[([^\]]+)\]$| / (L)$")
@@ -197,7 +199,7 @@ class Slider(TypedField):
         self,
         gui: GuiApi,
         label: str,
-        ends: tuple[float, float],
+        ends: Ends,
         step: float,
         value: float,
         hint: str,
@@ -211,12 +213,12 @@ class Slider(TypedField):
         self._slider.on_update(self._dragged)
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def ends(self) -> Ends:
         """Ends of the slider; beyond them a value is typed."""
         return self._ends
 
     @ends.setter
-    def ends(self, ends: tuple[float, float]) -> None:
+    def ends(self, ends: Ends) -> None:
         with self._lock:
             self._ends = ends
             self._slider.min, self._slider.max = ends

@@ -67,9 +67,12 @@ def _numbers(
         session.follow("slopes")
         return refusal(error, shown(arm()), arm())
 
+    def remake(fields: Fields, _: object) -> None:
+        fields.words = words
+        build(fields, shown(arm()))
+
     key = lambda state, _: [each[:2] for each in shown(state.design)]
-    remake = lambda fields, _: build(fields, shown(arm()))
-    panel.anew(label, "design", key=key, build=remake, words=words)
+    panel.anew(label, "design", key=key, build=remake)
 
 
 def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
@@ -157,14 +160,14 @@ def arm_parts(panel: Fields) -> None:
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
 
     def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
-        fields.message = message
+        fields.message, fields.words = message, words
         _part(fields, *chosen[:2])
 
     def words(error: SoftreachError) -> str:
         arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
         return refusal(error, part_parameters(arm, known[label]), arm)
 
-    panel.anew("part", "design", "found.part", key=_chosen, build=build, words=words)
+    panel.anew("part", "design", "found.part", key=_chosen, build=build)
     message = panel.kept(Line(panel.gui))
     panel.message, panel.words = message, words
 
