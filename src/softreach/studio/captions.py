@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
+from softreach.studio.found import Found
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.reach import shown_samples
+from softreach.studio.reach import Reach, Size, shown_samples
 from softreach.studio.scene.colors import FAINT
 from softreach.studio.scene.scene import shows_cloud
+from softreach.studio.state import Appearance
 from softreach.support.units import LengthUnit, as_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from softreach.arm.manipulator import Manipulator
-    from softreach.studio.found import Found
-    from softreach.studio.reach import Reach, Size
-    from softreach.studio.state import Appearance
 
 UNREACHABILITY = (
     "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "

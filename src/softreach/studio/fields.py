@@ -10,17 +10,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from operator import attrgetter, is_
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part
+from softreach.studio.session import Session
 from softreach.studio.state import LARGEST, StudioState
 from softreach.studio.widgets import Ends, Line, Slider, TextKind, TypedField, number_kind, unit_in
 from softreach.support.errors import SoftreachError
 from softreach.support.files.text import text_of
-
-if TYPE_CHECKING:
-    from softreach.studio.session import Session
 
 Action = Callable[[], object]
 Change = Callable[[StudioState], StudioState]
@@ -28,6 +26,8 @@ Names = Mapping[Any, str]
 Options = Callable[[StudioState], Names]
 Kind = Callable[[str, Callable[[], float]], TextKind]
 """What is typed, by its unit and by L [m], which may be typed as one."""
+Build = Callable[["Fields", Any], object]
+"""Declares fields for a key."""
 Shown = Callable[[StudioState, Found], Any]
 """Something of the state and of what is known."""
 Where = Shown | str
@@ -62,10 +62,6 @@ def of_design(read: Callable[[Any], Any], write: Callable[[Any, Any], Any]) -> A
         lambda state: read(state.design),
         lambda state, value: state.replace(design=write(state.design, value)),
     )
-
-
-Build = Callable[["Fields", Any], object]
-"""Declares fields for a key."""
 
 
 class Fields:

@@ -21,6 +21,7 @@ from softreach.studio.shown_parameters import ShownParameter, known_parameters, 
 from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.widgets import unit_in
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
 from softreach.support.parallel import undivided
 from softreach.support.quantity import quantity
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
 _LINE, _HERE = "#2f6db5", "#d9731a"

@@ -7,25 +7,22 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.calibration.calibration import Calibration
+from softreach.calibration.measurements import Measurements
+from softreach.inverse import Solution
+from softreach.inverse.drag import Drag, Dragged
+from softreach.plot.coloring import BundleKey, ScalarKey
+from softreach.requirements import Check
 from softreach.rod.tip_map import TipStatus
+from softreach.studio.figures import Picture, VolumeSlopes
+from softreach.studio.reach import Reach
 from softreach.studio.state import StudioState
+from softreach.support.arrays import Array
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.calibration.calibration import Calibration
-    from softreach.calibration.measurements import Measurements
-    from softreach.inverse import Solution
-    from softreach.inverse.drag import Drag, Dragged
-    from softreach.plot.coloring import BundleKey, ScalarKey
-    from softreach.requirements import Check
-    from softreach.studio.figures import Picture, VolumeSlopes
-    from softreach.studio.reach import Reach
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

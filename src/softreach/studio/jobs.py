@@ -14,10 +14,10 @@ import numpy as np
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Found, Known, in_session
-from softreach.studio.reach import Reach, count_activations, shown_samples, stages
-from softreach.studio.scene.camera import is_behind
+from softreach.studio.reach import Quality, Reach, count_activations, shown_samples, stages
+from softreach.studio.scene.camera import TabCamera, is_behind
 from softreach.studio.scene.colors import shown_color
-from softreach.studio.scene.scene import shows_cloud
+from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.serve import theme
 from softreach.studio.shown_parameters import slider_ends
 from softreach.studio.state import StudioState, solvable_rod
@@ -26,10 +26,6 @@ from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from viser import ClientHandle
-
-    from softreach.studio.reach import Quality
-    from softreach.studio.scene.camera import TabCamera
-    from softreach.studio.scene.scene import Scene
 
 
 class Given(NamedTuple):

@@ -20,6 +20,7 @@ from softreach.sampling import cube_blocks
 from softreach.studio.state import TOL, solvable_rod
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput, no_warnings
 from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.sheets import Sheets
@@ -74,7 +75,7 @@ class Reach:
     refusal: str = ""  # reason why there is no exact set
     notes: tuple[str, ...] = ()  # parts that are left out or coarser than wanted, and why
     wanted: int = 0  # number of samples; there are fewer where each costs much
-    order: NDArray[np.int64] | None = field(default=None, repr=False)
+    order: Index | None = field(default=None, repr=False)
     """An order whose prefixes are even subsamples, where the cloud's own is not."""
 
     @property
@@ -115,7 +116,7 @@ class Reach:
         return np.where(lost, TipStatus.UNDECIDED, status).astype(np.int8)
 
     @cached_property
-    def counts(self) -> NDArray[np.float64]:
+    def counts(self) -> Array:
         """Number of activations at the place of each sample; NaN before `count_activations`."""
         return np.full(self.samples, np.nan)
 
@@ -155,7 +156,7 @@ class Reach:
         return float((self.status == status).mean())
 
 
-def shown_samples(reach: Reach, level: int) -> NDArray[np.int64]:
+def shown_samples(reach: Reach, level: int) -> Index:
     """Numbers of the samples that a picture of 2^level points shows: those that have a tip."""
     rows = np.arange(min(1 << level, reach.samples))
     if reach.order is not None:
@@ -163,7 +164,7 @@ def shown_samples(reach: Reach, level: int) -> NDArray[np.int64]:
     return rows[has_tip(reach.status[rows])]
 
 
-def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int64]:
+def nearest_samples(reach: Reach, points: Array) -> Index:
     """Places of the nearest to points [m] among `shown_samples(reach, 15)`, shape (n, k)."""
     from scipy.spatial import KDTree
 
@@ -172,7 +173,7 @@ def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int
     return KDTree(tips).query(points, count)[1].reshape(len(points), count)
 
 
-def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
+def cloud_points(reach: Reach, level: int) -> Array:
     """Tips that a picture of 2^level points shows [L], shape (n, 3)."""
     return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
 
@@ -318,7 +319,7 @@ def _seconds_each(rod: TipMap) -> float:
 # the exact set counts too, but not near folds, where half of the samples of a folded set are.
 
 
-def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+def uncounted(reach: Reach, rows: Index) -> Index:
     """Those of the samples whose number of activations is not known yet."""
     if reach.exact is not None and reach.exact.route == "flux":
         reach.counts[:] = 1.0  # proved one to one
@@ -326,8 +327,8 @@ def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def count_activations(
-    reach: Reach, rows: NDArray[np.int64], check: StaleCheck = lambda: None, report: Report = _quiet
-) -> NDArray[np.float64]:
+    reach: Reach, rows: Index, check: StaleCheck = lambda: None, report: Report = _quiet
+) -> Array:
     """Stable activations that reach each sample of three free bundles, shape (n,); kept."""
     from softreach.inverse import solve_inverse
 

@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Known
@@ -19,13 +19,19 @@ from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, pi
 from softreach.studio.scene.scene import Scene, in_slice, shows_cloud
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import Dropped, Latest, StaleCheck, rest, return_memory_soon
+from softreach.studio.work import (
+    CompilationWatch,
+    Dropped,
+    Latest,
+    StaleCheck,
+    rest,
+    return_memory_soon,
+)
+from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
-
-    from softreach.studio.work import CompilationWatch
 
 Change = Callable[[StudioState], StudioState]
 
@@ -206,7 +212,7 @@ class Session:
 
     # The scene
 
-    def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> NDArray[np.float64] | None:
+    def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
         """Place of the tip [m], shape (3,), in the sample that a ray from the camera [L] meets.
 
         None beside all. It is computed anew: a point is rounded, at the rim perhaps out of reach.

@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.picture.axes_box import axes_box, round_box, seen_from
 from softreach.studio.state import Camera, vector
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.units import in_lengths
 
 if TYPE_CHECKING:
     from viser import ClientHandle, SceneApi
 
-    from softreach.arm.manipulator import Manipulator
-
-Array = NDArray[np.float64]
 
 FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
 FINER = 2

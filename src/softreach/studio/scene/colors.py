@@ -19,11 +19,11 @@ from softreach.studio import markup
 from softreach.studio.reach import Reach, count_activations, nearest_samples, shown_samples
 from softreach.studio.state import LEVELS, rod_of
 from softreach.studio.work import all_cores
+from softreach.support.arrays import Array, Index
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 FAINT = (196, 198, 206)
 """Gray, of the cloud without loads."""
@@ -125,14 +125,14 @@ def key_html(key: BundleKey | ScalarKey | None) -> str:
     )
 
 
-def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
+def _manipulability(reach: Reach, rows: Index) -> Array:
     """√det(J Jᵀ) with J = ∂r/∂γ [L per input]; of fewer than three bundles an area or a length."""
     with all_cores:
         volume = dexterity(reach.cloud.isel(sample=rows)).manipulability.values
     return volume / reach.arm.length ** min(reach.arm.inputs, 3)
 
 
-def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
+def _activation_distance(reach: Reach, rows: Index) -> Array:
     """D̄ of the samples that are shown, among all that have a tip; NaN where isolated."""
     settled = np.flatnonzero(has_tip(reach.status))
     cloud = reach.cloud if len(settled) == reach.samples else reach.cloud.isel(sample=settled)

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.studio.scene.camera import add_label
+from softreach.support.arrays import Array
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
-Array = NDArray[np.float64]
 OnDrag = Callable[[str, Array], None]
 """(phase "start", "update" or "end"; where the ball should be [L])."""
 

@@ -14,23 +14,20 @@ from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.shading import vertex_normals
-from softreach.plot.coloring import UNSTABLE
+from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
 from softreach.rod.kinematics import configuration, rest_configuration
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import NumberedBox, way_to
 from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
+from softreach.support.arrays import Array, Mask
 from softreach.support.palette import bundle_color, eight_bit
 from softreach.workspace.sheets import clipped
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
-    from softreach.plot.coloring import BundleKey, ScalarKey
-    from softreach.rod.tip_map import TipMap
-
-Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
 MOST_BUNDLES = 100
@@ -74,7 +71,7 @@ class Scene:
         self.pointing: Array = np.full(3, np.nan)
         """Direction d3 of the tip of the arm, as it is drawn."""
         self._arms: dict[str, _Arm] = {}
-        self._clouds: dict[str, tuple[NDArray[np.bool_], Any]] = {}
+        self._clouds: dict[str, tuple[Mask, Any]] = {}
         self._lock = threading.RLock()
         self._ahead: Array | None = None
         self._base = np.zeros(3)
@@ -131,13 +128,13 @@ class Scene:
                 if not np.array_equal(kept, self._kept(dots[0])):
                     self._cut_dots(path, *dots)
 
-    def hidden(self, points: Array) -> NDArray[np.bool_]:
+    def hidden(self, points: Array) -> Mask:
         """Mask of the points [L], shape (n, 3), that are cut away."""
         if self._ahead is None:
             return np.zeros(len(points), bool)
         return (points - self._base) @ self._ahead < 0.0
 
-    def _kept(self, points: Array) -> NDArray[np.bool_]:
+    def _kept(self, points: Array) -> Mask:
         return ~self.hidden(points) & (np.arange(len(points)) < (self._most or len(points)))
 
     def _cut_dots(self, path: str, points: Array, colors: NDArray[np.uint8], *look: Any) -> None:
@@ -329,7 +326,7 @@ class Skin(NamedTuple):
     colors: Array  # RGB from 0 to 255, shape (v, 3)
 
 
-def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
+def in_slice(points: Array, cut: Slice) -> Mask:
     """Mask of the points [L], shape (n, 3), that a slice shows."""
     if cut.axis == "none":
         return np.ones(len(points), bool)
