@@ -124,7 +124,7 @@ def walked(states, times=None):
     history = History()
     for k, (old, new) in enumerate(pairwise(states)):
         now = 10.0 * k if times is None else times[k]
-        history = history.after(old, new, goes_on=True, clock=lambda now=now: now)
+        history = history.after(old, new, goes_on=True, now=now)
     return history
 
 
@@ -149,7 +149,7 @@ def test_where_there_is_nothing_to_go_to_the_state_stays(back):
 
 def test_a_change_after_a_step_back_forgets_what_was_undone():
     history, state = walked(STEPS).step(STEPS[-1], back=True)
-    history = history.after(state, posed(state, -0.1), goes_on=True)
+    history = history.after(state, posed(state, -0.1), goes_on=True, now=0.0)
     assert history.future == ()
     assert history.step(posed(state, -0.1), back=True)[1] == state
 
@@ -162,10 +162,14 @@ def test_changes_of_one_kind_in_short_order_are_one_step():
 
 def test_a_change_that_does_not_go_on_is_a_step_of_its_own():
     one, two = tapered(START, 0.01), tapered(START, 0.02)
-    history = History().after(START, one, goes_on=True)
-    assert history.after(one, two, goes_on=False).step(two, back=True)[1] == one
-    assert history.after(one, two, goes_on=True).step(two, back=True)[1] == START
-    assert replace(history, kind="").after(one, two, goes_on=True).step(two, back=True)[1] == one
+    history = History().after(START, one, goes_on=True, now=0.0)
+
+    def before(history, goes_on):
+        return history.after(one, two, goes_on=goes_on, now=0.1).step(two, back=True)[1]
+
+    assert before(history, goes_on=False) == one
+    assert before(history, goes_on=True) == START
+    assert before(replace(history, kind=""), goes_on=True) == one
 
 
 def test_changes_of_different_kinds_are_steps_of_their_own():

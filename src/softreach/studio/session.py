@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import fields, replace
@@ -95,7 +96,7 @@ class Session:
             new = change(self.state)
             if by_widget and new == self.state:  # a page reports what was only drawn anew
                 return
-            history = self.history.after(self.state, new, goes_on=goes_on)
+            history = self.history.after(self.state, new, goes_on=goes_on, now=time.monotonic())
             self.is_touched = self.is_touched or new != self.state
             self._become(new, history, by_widget=by_widget)
 

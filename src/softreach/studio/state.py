@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
@@ -73,13 +72,8 @@ def requirements_of(text: str) -> Requirements:
 
 
 def needs_of_text(text: str, *, length: float | None = None, source: str = "") -> Requirements:
-    """Requirements from the text of a file that comes from a page, as `Requirements.from_toml`.
-
-    Raises:
-        InvalidDesign: The text is none of requirements, or names other files: those that lie beside
-            it are not sent with it, and files of this machine are not for users of the page.
-        InvalidInput: It lists more places than can be shown.
-    """
+    """Requirements from the text of a file that comes from a page, as `Requirements.from_toml`."""
+    # what lies beside the file is not sent with it, and this machine's files are not for the page
     needs = Requirements.from_toml(text, folder=None, length=length, source=source)
     if (count := len(needs.places)) > _MOST_PLACES:
         allowed = f"at most {_MOST_PLACES} in the studio"
@@ -313,29 +307,17 @@ class History:
     kind: str = ""  # of the latest change; "" after a step back or forth
     at: float = field(default=0.0, compare=False)  # time of that change [s]
 
-    def after(
-        self,
-        old: StudioState,
-        new: StudioState,
-        *,
-        goes_on: bool,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> History:
-        """The history after a change.
+    def after(self, old: StudioState, new: StudioState, *, goes_on: bool, now: float) -> History:
+        """The history after a change at a time [s]; it stays the same if only the view differs.
 
-        Args:
-            old: Before the change.
-            new: After it. If only the view differs, the history stays.
-            goes_on: Whether it may be part of the step before, as while a slider is dragged: it is
-                if that was of the same kind, and a moment ago.
-            clock: The time [s].
+        A change that goes on, as of a dragged slider, is part of the step before if that was of the
+        same kind, and a moment ago.
         """
         differ = [name for name in (*_SETTINGS, *_POSE) if getattr(old, name) != getattr(new, name)]
         settings = [name for name in differ if name in _SETTINGS]
         kind = " ".join(settings) or ("pose" if differ else "")  # bounds may have moved activations
         if not kind:
             return self
-        now = clock()
         same = goes_on and kind == self.kind and now - self.at < _PAUSE
         past = self.past if same else (*self.past, old)[-_LONGEST:]
         return History(past=past, kind=kind, at=now)

@@ -74,13 +74,8 @@ def write_static(
 ) -> StaticPage:
     """Write a page with sliders that shows the reachable set of each design of a grid.
 
-    Args:
-        space: A grid of at most 1,000 designs.
-        folder: Where `index.html` and a folder of designs go.
-        unit: Of lengths: "m", "cm", "mm" or "L"; that of the design file if left out.
-        title: Of the page.
-        overwrite: Whether a page that is there, and files of its designs, may be replaced.
-        progress: Called with the number of designs done.
+    The folder gets `index.html` and a folder of designs. Lengths are in a unit, by default that of
+    the design file; `progress` is called with the number of designs done.
 
     Raises:
         InvalidInput: No grid, too many designs, no design that reaches anything, or other files
