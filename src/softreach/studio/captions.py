@@ -15,7 +15,7 @@ from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.reach import Reach, Size, shown_samples
 from softreach.studio.scene.colors import FAINT
 from softreach.studio.scene.scene import shows_cloud
-from softreach.studio.state import Appearance
+from softreach.studio.state import Appearance, StudioState
 from softreach.support.units import LengthUnit, as_unit
 
 UNREACHABILITY = (
@@ -89,10 +89,7 @@ def reach_text(reach: Reach, share: str = "") -> list[Part]:
 
 
 def legend_text(reach: Reach, *, free: bool) -> list[Part]:
-    """Legend of the marks: how many samples of a loaded arm have each, or are left out.
-
-    The reach without loads may be shown, too.
-    """
+    """Legend of the marks: how many samples of a loaded arm have each, or are left out."""
     if reach.arm.loads is None:
         return []
     parts: list[Part] = []
@@ -136,15 +133,17 @@ def loaded_share(found: Found, design: Manipulator) -> str:
     return f" under loads, {share} of {whole} without"
 
 
-def tip_text(found: Found, design: Manipulator) -> list[Part]:
+def tip_text(state: StudioState, found: Found) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
-    parts: list[Part] = []
+    texts = []
     if found.tip is not None:
         pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(found.pointing, 3))
-        parts.append(f"tip at {place_text(found.tip, design, 6)}, pointing along ({pointing})")
+        texts.append(
+            f"tip at {place_text(found.tip, state.design, 6)}, pointing along ({pointing})"
+        )
     if found.posture is not None:
-        parts.append(f"{' · ' if parts else ''}{_POSTURES[found.posture]}")
-    return parts
+        texts.append(_POSTURES[found.posture])
+    return [" · ".join(texts)] if texts else []
 
 
 def _percent(share: float) -> str:

@@ -26,15 +26,12 @@ Names = Mapping[Any, str]
 Options = Callable[[StudioState], Names]
 Kind = Callable[[str, Callable[[], float]], TextKind]
 """What is typed, by its unit and by L [m], which may be typed as one."""
-Build = Callable[["Fields", Any], object]
-"""Declares fields for a key."""
-Shown = Callable[[StudioState, Found], Any]
-"""Something of the state and of what is known."""
+Build = Callable[["Fields", Any], object]  # declares fields for a key
+Shown = Callable[[StudioState, Found], Any]  # something of the state and of what is known
 Where = Shown | str
 """True where something is shown, or the path of what is true there; "" for everywhere."""
 
-GRAY: Any = {"color": "gray"}
-"""Looks of a button that is not the first of its group."""
+GRAY: Any = {"color": "gray"}  # looks of a button that is not the first of its group
 
 
 class Attribute(NamedTuple):
@@ -71,8 +68,7 @@ class Fields:
         self.session, self.gui = session, session.client.gui
         self.message: Line | None = None
         """Where refusals of widgets stand that have no line of their own; else above all tabs."""
-        self.words: Callable[[SoftreachError], str] = str
-        """Says a refusal in words."""
+        self.words: Callable[[SoftreachError], str] = str  # says a refusal in words
         self._followers: list[list[Any]] = []
         """Each reads what it follows, what that was when it was shown last, and shows it."""
         self._anew: list[Callable[[], Fields]] = []

@@ -199,10 +199,8 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
 
 # Bars under the sliders: change of the reachable volume by each, on one scale for all of them.
 
-PART = 0.01
-"""Part of the range of a slider over which the change of the volume is told."""
-NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)
-"""Room for a bar."""
+PART = 0.01  # part of the range of a slider over which the change of the volume is told
+NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)  # room for a bar
 _FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
@@ -218,8 +216,7 @@ class VolumeSlopes(NamedTuple):
 
     arm: Manipulator
     volume: float  # [m³]
-    slopes: Mapping[str, Slope]
-    """By names of parameters; none where there is no volume, or loads tear the set."""
+    slopes: Mapping[str, Slope]  # by names of parameters; none without a volume that is whole
 
 
 def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSlopes:

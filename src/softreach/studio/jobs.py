@@ -71,13 +71,11 @@ class Job:
     """Attribute that is false where it is of no use; it is done once more when that begins."""
     makes: str = ""
     """Fields of `Found`, beside that of its name, that are forgotten where the work fails."""
-    draws: str = ""
-    """Nodes of the scene, beside that of its name, that are taken away then."""
+    draws: str = ""  # nodes of the scene, beside that of its name, that are taken away then
     at_once: bool = True
     """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
     that what computes while it draws is sent piece by piece."""
-    doing: str = ""
-    """What the reader is shown meanwhile."""
+    doing: str = ""  # what the reader is shown meanwhile
 
     @cached_property
     def _deciding(self) -> Callable[[Known], tuple[Any, ...]]:

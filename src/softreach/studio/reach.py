@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -28,8 +28,7 @@ from softreach.workspace.sheets import Sheets
 if TYPE_CHECKING:
     import xarray as xr
 
-Report = Callable[[str], object]
-"""Shows the reader what is being done."""
+Report = Callable[[str], object]  # shows the reader what is being done
 _quiet: Report = lambda doing: None
 
 _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
@@ -43,16 +42,12 @@ class Quality:
 
     coarse_level: int = 16
     fine_level: int = 19
-    coarse_accuracy: float = 0.02
-    """Relative error allowed in the volume."""
+    coarse_accuracy: float = 0.02  # relative error allowed in the volume
     fine_accuracy: float = 0.003
-    tol: float = TOL
-    """Largest tip error, in L."""
-    coarse_seconds: float = 0.25
-    """Time for the first cloud of a loaded arm; it has fewer points if they cost more."""
+    tol: float = TOL  # largest tip error, in L
+    coarse_seconds: float = 0.25  # time for the first cloud of a loaded arm, which bounds its size
     fine_seconds: float = 5.0
-    most_seconds: float = 30.0
-    """Time for an exact set, before the studio does without it."""
+    most_seconds: float = 30.0  # time for an exact set, before the studio does without it
 
 
 class Size(NamedTuple):
@@ -75,8 +70,7 @@ class Reach:
     refusal: str = ""  # reason why there is no exact set
     notes: tuple[str, ...] = ()  # parts that are left out or coarser than wanted, and why
     wanted: int = 0  # number of samples; there are fewer where each costs much
-    order: Index | None = field(default=None, repr=False)
-    """An order whose prefixes are even subsamples, where the cloud's own is not."""
+    order: Index | None = None  # one whose prefixes are even subsamples, if the cloud's is not
 
     @property
     def samples(self) -> int:
@@ -133,14 +127,11 @@ class Reach:
 
     @cached_property
     def boundary(self) -> Reach:
-        """The same with the vertices of `sheets`, a little inside, in place of the samples.
-
-        Where activations are not known they are the mean of those of the nearest samples.
-        """
+        """The same with the vertices of `sheets`, a little inside, in place of the samples."""
         sheets, given = self.sheets, self.cloud.activation
         inward = -_INSIDE * self.arm.length * vertex_normals(sheets.vertices, sheets.faces)
         activation = sheets.activation
-        if activation is None:
+        if activation is None:  # the mean of those of the nearest samples
             shown = given.values[shown_samples(self, _LEVEL)]
             activation = shown[nearest_samples(self, sheets.vertices)].mean(axis=1)
         plain = self.cloud[["tip", "activation"]].drop_vars("status", errors="ignore")
@@ -187,11 +178,7 @@ def stages(
     """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
 
     Where samples cost much, under loads and with more than three bundles, the first cloud comes
-    alone, and clouds are as large as there is time for. The fine one has at least 2^level points,
-    where there is time and memory for them. The check is called all the time, and raises to stop.
-
-    Raises:
-        InvalidInput: Loads that cannot be computed.
+    alone, and clouds are as large as there is time for; else the fine one has 2^level points.
     """
     rod, work = solvable_rod(arm), _Work(arm, level, quality, check, report)
     is_slow = arm.loads is not None or rod.box.dimension > 3
@@ -242,14 +229,12 @@ class _Work:
             return reach
         budget = self._budget(f"computing the exact set to {100 * accuracy:g} %")
         try:
-            exact = exact_set(reach.arm, accuracy, self.quality.tol, budget)
+            return replace(reach, exact=exact_set(reach.arm, accuracy, self.quality.tol, budget))
         except (InvalidInput, OverBudget, MemoryError) as error:
             if isinstance(error, InvalidInput) and error.name != "memory":
                 return replace(reach, exact=None, refusal=str(error))  # never at rest
             # or of so many bundles that no search fits
             reason = error if isinstance(error, OverBudget) else "more memory than is free"
-        else:
-            return replace(reach, exact=exact)
         needed = f"to {100 * accuracy:g} % it needs {reason}"
         if reach.exact is None:
             return replace(reach, refusal=needed)

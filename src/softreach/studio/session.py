@@ -58,15 +58,13 @@ class Session:
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
-        self.lock = threading.RLock()
-        """Held while the state changes, and while that is shown."""
+        self.lock = threading.RLock()  # held while the state changes, and while that is shown
         self.history = History()
         self.is_touched = left is not None  # true once there is anything to keep
         self.state = left or start.state
         same = self.state.design == start.state.design
         self.found = Found(reach=start.reach) if same else Found()
-        self.panels: list[Callable[[], None]] = []
-        """Each shows again what has changed."""
+        self.panels: list[Callable[[], None]] = []  # each shows again what has changed
         self.revision = 0  # number of changes that widgets have to follow, whatever they hold
         self.note, self.doing = "", ""  # for the reader, the second on the work that is being done
         self.canceled = False  # true if the reader stopped what was being computed of this state

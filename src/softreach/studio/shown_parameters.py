@@ -61,8 +61,7 @@ def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
 
 # Sliders
 
-_Slider = tuple[str, float, float, float]
-"""Label, ends and step."""
+_Slider = tuple[str, float, float, float]  # label, ends and step
 _OF_ARM: dict[str, _Slider] = {
     "revolution": ("revolution Ω [deg]", 1, 360, 1),
     "taper": ("taper φ [deg]", -2, 5, 0.05),

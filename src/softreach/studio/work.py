@@ -14,8 +14,7 @@ from numba.core import event
 from softreach.inverse.prepared import forget_prepared
 from softreach.support.memory import free_memory, return_memory
 
-StaleCheck = Callable[[], None]
-"""Raises `Dropped` if what is being done is no longer wanted."""
+StaleCheck = Callable[[], None]  # raises `Dropped` if what is being done is no longer wanted
 
 _PATIENCE = 0.1  # [s], after which work that waits checks whether it is still wanted
 _REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned

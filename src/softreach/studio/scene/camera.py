@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 
 FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
-FINER = 2
-"""Pixels of a saved picture for each of the page, along each side."""
+FINER = 2  # pixels of a saved picture for each of the page, along each side
 VIEWS: dict[str, Array] = {
     "oblique": np.array([2.1, -3.85, 1.17]),
     "front": np.array([0.0, -1.0, 0.0]),

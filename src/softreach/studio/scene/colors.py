@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-FAINT = (196, 198, 206)
-"""Gray, of the cloud without loads."""
+FAINT = (196, 198, 206)  # gray, of the cloud without loads
 
 _MOST_COUNTS = 8  # numbers of activations that the key tells apart
 _PERCENTILES = (1.0, 99.0)  # beyond which values look like the next ones

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
 Color = tuple[int, int, int]
 
-MOST_BUNDLES = 100
-"""With more the body alone is drawn: skins of hundreds take a minute."""
+MOST_BUNDLES = 100  # with more the body alone is drawn: skins of hundreds take a minute
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2

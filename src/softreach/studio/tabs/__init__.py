@@ -26,8 +26,7 @@ TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
     "Goals": (needs, measured),
     "Export": (export,),
 }
-JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)
-"""Every kind of work that a tab has done for it."""
+JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)  # every kind of work that a tab has done for it
 
 
 def furnish(session: Session) -> None:

@@ -288,7 +288,7 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     off, about = lambda s: s.replace(design=s.free or s.design), "Gravity, payload and all forces"
     panel.change("Take all loads off", off, about, "design.loads", **GRAY)
     follows = "design", "found.tip", "found.pointing", "found.posture"
-    rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+    rests = lambda state, found: tip_text(state, found) if state.design.loads else ()
     panel.text(*follows, content=rests)
     more = lambda s, _: ", ".join(other_loads(s.design))
     act = lambda *known: [f"The design file also has: {more(*known)}."] * bool(more(*known))

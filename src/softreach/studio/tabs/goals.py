@@ -340,8 +340,7 @@ def _summary(_: StudioState, found: Found) -> str:
 
 _ACCURACY = 0.03  # of shares that are covered, and of distances between stations
 _PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
-_POSES = ("reach", "cover", "stay_inside", "avoid")
-"""Kinds of findings that other poses may change."""
+_POSES = ("reach", "cover", "stay_inside", "avoid")  # kinds of findings that other poses may change
 VERDICTS = {
     "met": eight_bit(palette.MET),
     "missed": eight_bit(palette.MISSED),

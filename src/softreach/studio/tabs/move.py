@@ -81,15 +81,14 @@ def _gap(state: StudioState, found: Found) -> str:
 
 # Activations
 
-_KINDS = {"N": "tension", "Pa": "pressure"}
-"""Kinds of inputs by their units."""
+_KINDS = {"N": "tension", "Pa": "pressure"}  # kinds of inputs by their units
 _MOST = 40  # sliders: a page with hundreds takes minutes to build
 
 
 def activation(panel: Fields) -> None:
     """Activations of the bundles within their bounds, and the place of the tip."""
     follows = "design", "found.tip", "found.pointing", "found.posture"
-    panel.text(*follows, content=lambda state, found: tip_text(found, state.design))
+    panel.text(*follows, content=tip_text)
     panel.anew("activation", "design", key=_slider_ends, build=_sliders)
     rest = "Sets every activation to 0, or the nearest to it"
     panel.change("Rest", lambda state: state.replace(activation=()), rest, **GRAY)
