@@ -170,9 +170,6 @@ def _color_surface(given: Given) -> Results:
 
 
 def _draw_surface(given: Given) -> Mapping[str, Any] | None:
-    if given.found.reach is None:
-        given.scene.remove("/surface")
-        return None
     key = given.scene.draw_surface(given.found.reach, given.state.appearance)
     return None if key is None else {"key": key}
 

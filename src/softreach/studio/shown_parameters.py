@@ -95,7 +95,6 @@ _MORE = {
 _NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
 """Words of symbols on sliders."""
 _HALVINGS = 14
-_DEGREES = "deg", math.radians(1)
 
 
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
@@ -303,11 +302,7 @@ def parts(arm: Manipulator) -> dict[str, Part]:
 
 def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
     """The parameters of a part in the units in which they are typed."""
-    return _part_parameters(arm, part, typed_unit(arm))
-
-
-@lru_cache(maxsize=16)
-def _part_parameters(arm: Manipulator, part: Part, unit: LengthUnit) -> tuple[ShownParameter, ...]:
+    unit = typed_unit(arm)
     return tuple(
         _shown(arm, each, each.symbol, f"{each.meaning}: {each.name}", unit)
         for each in known_parameters(arm).values()
@@ -335,7 +330,7 @@ def _shown(
 
 def _unit(parameter: Parameter, lengths: LengthUnit | None) -> tuple[str, float]:
     """Unit of a number, and its size: where none of lengths is given, SI but for angles."""
-    units = {"rad": _DEGREES, "1": ("", 1.0)}
+    units = {"rad": ("deg", math.radians(1)), "1": ("", 1.0)}
     units |= {"m": (lengths.name, lengths.size), "Pa": ("kPa", 1e3)} if lengths else {}
     return units.get(parameter.unit, (parameter.unit, 1.0))
 

@@ -67,8 +67,7 @@ class Scene:
 
     def __init__(self, api: SceneApi) -> None:
         self.api, self.axes = api, NumberedBox(api)
-        self.pointing: Array = np.full(3, np.nan)
-        """Direction d3 of the tip of the arm, as it is drawn."""
+        self.pointing: Array = np.full(3, np.nan)  # direction d3 of the tip of the arm as drawn
         self._arms: dict[str, _Arm] = {}
         self._clouds: dict[str, tuple[Mask, Any]] = {}
         self._lock = threading.RLock()
@@ -115,8 +114,7 @@ class Scene:
     def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
-        Nothing is sent of a cloud that keeps its points. Of each the first `most` are drawn, which
-        stay the same until another number is wanted; None is for all, as for no cut.
+        Of each cloud the first `most` points are drawn; nothing is sent of one that keeps its own.
         """
         is_thin = most is not None and most == self._most
         self._ahead, self._base, self._most = ahead, base, most
@@ -159,9 +157,9 @@ class Scene:
 
     # Surfaces.
 
-    def draw_surface(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
+    def draw_surface(self, reach: Reach | None, look: Appearance) -> BundleKey | ScalarKey | None:
         """The exact boundary, if it is shown, slow the first time; the key to its own colors."""
-        if not (look.surface and reach.has_surface):
+        if reach is None or not (look.surface and reach.has_surface):
             self.remove("/surface")
             return None
         if shows_cloud(reach, look):  # whose colors it would hide
@@ -235,10 +233,9 @@ class Scene:
         length: float | None = None,
         rod: TipMap | None = None,
     ) -> Array:
-        """The body, its fibers and markers, moved if they are there; returns the tip, shape (3,).
+        """The body, its fibers and markers, over a length [m]; returns the tip, shape (3,).
 
-        Nothing is drawn of an arm without equilibrium, and the tip is NaN. Lengths are over
-        `length` [m], by default that of the arm; `rod` is its tip map in another posture.
+        Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
         shape = configuration(rod or solvable_rod(arm), np.asarray(activation), _STATIONS)
         return self._draw_shape(arm, shape, path, length or arm.length)
@@ -356,11 +353,10 @@ _LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
 def glb(
     skin: Skin, opacity: float, lines: Array, ink: tuple[int, int, int], *, both_sides: bool
 ) -> bytes:
-    """A surface and lines on it as binary glTF, in their colors as they are.
+    """A surface and lines, ends [L] of shape (n, 2, 3), as binary glTF in their colors as they are.
 
     viser's own meshes have one color each, its lines are slow, and so is light without a graphics
-    card. Lines have ends [L] of shape (n, 2, 3) and a color, RGB from 0 to 255. A surface that is
-    seen from inside too takes a page twice as long.
+    card. A surface that is seen from inside too takes a page twice as long.
     """
     from trimesh import Scene, Trimesh
     from trimesh.exchange.gltf import export_glb

@@ -49,21 +49,18 @@ def status(panel: Fields) -> None:
             cancel.label, cancel.visible = label, shown
 
     panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
-    toast: Any = None
+    toasts: list[Any] = []
 
-    def note(_: StudioState, __: Found) -> None:
-        nonlocal toast
-        if toast is not None:
-            toast.remove()
-        say = partial(session.client.add_notification, auto_close_seconds=_NOTE_SECONDS)
-        toast = say("", session.note) if session.note else None
+    def note(*_: object) -> None:
+        while toasts:
+            toasts.pop().remove()
+        if session.note:
+            say = session.client.add_notification
+            toasts.append(say("", session.note, auto_close_seconds=_NOTE_SECONDS))
 
     panel.follow("tab.note", show=note)
-    actions = {
-        "Undo": lambda: session.step(back=True),
-        "Redo": lambda: session.step(back=False),
-        "Reset": session.reset,
-    }
+    undo, redo = partial(session.step, back=True), partial(session.step, back=False)
+    actions = {"Undo": undo, "Redo": redo, "Reset": session.reset}
     panel.choices("history", actions, _HISTORY_HINT)
 
 
@@ -78,8 +75,8 @@ def _numbers(session: Session, found: Found) -> str:
             below.append([f"No exact volume: {reach.refusal}"])
         if reach.fine and reach.notes:
             below.append([f"{'; '.join(reach.notes)}."])
-    lines = [markup.paragraph(*line) for line in (*above, *below)]
-    return markup.status(*lines[:2], key_html(found.key), *lines[2:])
+    lines = lambda lines: [markup.paragraph(*line) for line in lines]
+    return markup.status(*lines(above), key_html(found.key), *lines(below))
 
 
 def is_behind(session: Session) -> bool:
@@ -97,14 +94,11 @@ def _reach_line(session: Session) -> list[Part]:
 
 
 def _work(session: Session) -> str:
-    if words := session.compiling:
-        return words
-    if session.doing:
-        return f"{session.doing} ..."
-    if not is_behind(session):
-        return ""
+    if session.compiling or session.doing:
+        return session.compiling or f"{session.doing} ..."
     idle = "canceled" if session.canceled else "not computed"
-    return "computing ..." if session.busy else idle
+    missing = "computing ..." if session.busy else idle
+    return missing if is_behind(session) else ""
 
 
 # Looks
