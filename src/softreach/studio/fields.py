@@ -173,9 +173,7 @@ class Fields:
 
         def show(state: StudioState, found: Found) -> None:
             value, last = at(state, found)
-            slider.max = max(last, 1)
-            if slider.value != value:
-                slider.value = value
+            slider.max, slider.value = max(last, 1), value
 
         last = lambda: at(session.state, session.found)[1]
         slider.on_update(self._by_hand(lambda: move(min(int(slider.value), last()))))
@@ -254,8 +252,7 @@ class Fields:
 
     def _seen_where(self, widget: Any, shown: Where) -> Any:
         def follow(state: StudioState, found: Found) -> None:
-            if widget.visible != (wanted := bool(at(state, found))):
-                widget.visible = wanted
+            widget.visible = bool(at(state, found))
 
         if shown:
             value = lambda path: attrgetter(in_session(path))(self.session)

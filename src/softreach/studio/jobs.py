@@ -101,9 +101,6 @@ def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job
     return [job for job in jobs if job.depends_on and is_due(job)]
 
 
-# The reach of the design
-
-
 def _compute_reach(given: Given) -> Results:
     state, level = given.state, given.state.appearance.level
     if (known := given.found.complete_reach(state.design)) is not None:
@@ -245,11 +242,8 @@ def _look(given: Given) -> None:
     scene.see_through_arm(found.sample is not None or hides)
 
 
-# The reach of another design: the one that is kept, or the present one without its loads
-
-
 def _compute_beside(given: Given, name: str) -> Results:
-    """Its reach, unless that is known; where the designs agree it is that of the present one."""
+    """The reach of the design that is kept, or of the present one without its loads."""
     design, known = getattr(given.state, name), getattr(given.found, name)
     is_known = known is not None and known.fine and known.arm == design
     present = known if is_known else given.found.complete_reach(design)

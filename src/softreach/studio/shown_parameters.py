@@ -240,9 +240,6 @@ def _decimals(value: float) -> int:
     return max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
 
 
-# Parts
-
-
 class Part(NamedTuple):
     """One thing that an arm consists of."""
 
@@ -337,9 +334,6 @@ def _unit(parameter: Parameter, lengths: LengthUnit | None) -> tuple[str, float]
 
 def _titled(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
-
-
-# Refusals
 
 
 def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipulator) -> str:

@@ -42,10 +42,7 @@ class Line:
 
     def show(self, content: str) -> None:
         """Show what `markup` made."""
-        if self._widget.content != content:
-            self._widget.content = content
-        if self._widget.visible != bool(content):
-            self._widget.visible = bool(content)
+        self._widget.content, self._widget.visible = content, bool(content)
 
     def remove(self) -> None:
         """Take the line away."""

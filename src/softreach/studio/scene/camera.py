@@ -91,11 +91,9 @@ class TabCamera:
             shown.position, shown.look_at = camera.position, camera.look_at
 
     def keep_width(self) -> bool:
-        """Step back as the picture gets narrower, and forth again: what was in sight stays so.
+        """Step back as the picture gets narrower, and forth again; True while the window changes.
 
-        Returns:
-            True if the window is changing, so that one has to look again: a layout passes through
-            widths that are gone before the page has heard of a step, that of a new page for long.
+        A layout passes through widths that are gone before the page has heard of a step.
         """
         now = self.aspect
         if now < _NARROWEST:
@@ -128,11 +126,8 @@ class TabCamera:
             raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
 
 
-# A box with numbers around everything; the camera decides which edges have them.
-
-
 class NumberedBox:
-    """One box, drawn into one scene."""
+    """A box with numbers around a scene; the camera decides which edges have them."""
 
     def __init__(self, api: SceneApi) -> None:
         self._api, self._lock = api, threading.RLock()
@@ -183,9 +178,6 @@ def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
     api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
 
 
-# What stands between the camera and a place.
-
-
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
     """True if a ball, (n, 3) and (n,) [L], hides a point, other than those that touch it."""
     distance = float(np.linalg.norm(point - camera))
@@ -205,9 +197,6 @@ def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
     offset = points - origin
     ahead = offset @ way
     return ahead, np.linalg.norm(offset - ahead[:, None] * way, axis=1)
-
-
-# Which point of a cloud a click means.
 
 
 def picked_point(

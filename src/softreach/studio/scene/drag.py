@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from viser import SceneApi
 
 OnDrag = Callable[[str, Array], None]
-"""(phase "start", "update" or "end"; where the ball should be [L])."""
+"""(phase "start", "update" or "end"; where the ball should be [L]), on the event loop: quick."""
 
 _HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
 _CLEAR = 0.4  # opacity of a ball that is seen through
@@ -30,21 +30,14 @@ class DragBall:
     """Nodes that move instead of being drawn anew: a node that is replaced is let go."""
 
     def __init__(self, api: SceneApi, on_drag: OnDrag, eye: Callable[[], Array]) -> None:
-        """Draw into a scene once there is a tip; `eye` tells where the camera is [L].
-
-        `on_drag` is called on the event loop, so that it must not take long.
-        """
+        """Draw into a scene once there is a tip; `eye` tells where the camera is [L]."""
         self._api, self._on_drag, self._eye = api, on_drag, eye
         self._nodes: tuple[Any, Any] | None = None
-        self._dark = False
 
     def move(
         self, tip: Array | None, radius: float = 0.0, *, dark: bool = False, clear: bool = False
     ) -> None:
-        """Put the ball on the tip [L], around an arm of this radius [L]; None hides it.
-
-        It is light on a dark page; what is inside a clear one is seen, such as where a path begins.
-        """
+        """Put the ball on the tip, around an arm of this radius [L], or hide it; some are clear."""
         if self._nodes is None and tip is not None:
             self._nodes = self._drawn(tip)
         if self._nodes is None:
@@ -55,11 +48,8 @@ class DragBall:
             return
         halo.position = tip
         ball.radius, halo.radius = max(1.2 * radius, _SMALLEST), max(1.6 * radius, _HALO)
-        if dark != self._dark:
-            self._dark = dark
-            halo.color = ball.color = _LIGHT if dark else _COLOR
-        if (opacity := _CLEAR if clear else None) != ball.opacity:
-            ball.opacity = opacity
+        halo.color = ball.color = _LIGHT if dark else _COLOR
+        ball.opacity = _CLEAR if clear else None
 
     def show_lag(self, ends: tuple[Array, Array] | None, gap: str) -> None:
         """A line between where the tip should be and is [L], and how long it is; "" for none."""

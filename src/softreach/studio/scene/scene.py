@@ -287,8 +287,7 @@ class Scene:
         if (drawn := self._arms.get("/arm")) is not None:
             usual = _opacities(drawn.arm, len(drawn.meshes))
             for handle, opacity in zip(drawn.meshes, usual, strict=True):
-                if handle.opacity != (target := _HIDING if clear else opacity):
-                    handle.opacity = target
+                handle.opacity = _HIDING if clear else opacity
 
 
 def pieces(line: Array) -> Array:
@@ -309,9 +308,6 @@ def _point_size(count: int) -> float:
 def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
     hidden = any(inside(arm)) or arm.markers
     return [_CLEAR if hidden else None, *[None] * (meshes - 1)]
-
-
-# Slices of a surface, and the file that a page draws a surface from.
 
 
 class Skin(NamedTuple):

@@ -87,9 +87,6 @@ def _reach(session: Session) -> Reach:
     return reach
 
 
-# Data, in the unit of the page
-
-
 def _write_design(session: Session, path: Path) -> None:
     path.write_text(session.state.design.file_text, encoding="utf-8")
 
@@ -116,9 +113,6 @@ def _write_arm(session: Session, path: Path) -> None:
 
 def _shape(state: StudioState) -> xr.Dataset:
     return configuration(state.design, np.asarray(state.activation))
-
-
-# Pictures
 
 
 def _write_views(session: Session, path: Path) -> None:
@@ -151,9 +145,8 @@ def _shown(session: Session) -> tuple[xr.Dataset, str | int | xr.DataArray]:
     cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))
     color = sample_values(reach, look.level, look.color)
     kept = in_slice(cloud_points(reach, look.level), look.slice)
-    return cloud.isel(sample=kept), (
-        color if isinstance(color, str | int) else color.isel(sample=kept)
-    )
+    color = color if isinstance(color, str | int) else color.isel(sample=kept)
+    return cloud.isel(sample=kept), color
 
 
 _PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}

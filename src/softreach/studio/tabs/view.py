@@ -43,10 +43,8 @@ def status(panel: Fields) -> None:
 
     def offer(_: StudioState, found: Found) -> None:
         lacking = is_behind(session) and not found.refusal
-        label = _GO_ON if lacking and not session.busy else _CANCEL
-        shown = lacking or session.busy
-        if (cancel.label, cancel.visible) != (label, shown):
-            cancel.label, cancel.visible = label, shown
+        cancel.label = _GO_ON if lacking and not session.busy else _CANCEL
+        cancel.visible = lacking or session.busy
 
     panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
     toasts: list[Any] = []
@@ -100,8 +98,6 @@ def _work(session: Session) -> str:
     missing = "computing ..." if session.busy else idle
     return missing if is_behind(session) else ""
 
-
-# Looks
 
 _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
