@@ -91,7 +91,7 @@ def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
 @pytest.mark.parametrize("design", designs.__all__)
 def test_sliders_end_where_the_design_ends_and_not_before(design):
     arm = getattr(designs, design)()
-    ends = slider_ends(arm)
+    ends = slider_ends(arm, {}, lambda: None)
     for control in slider_parameters(arm):
         for end, limit in zip(ends[control.name], control.limits, strict=True):
             made = changed(arm, {control.name: end * control.scale})
@@ -105,11 +105,11 @@ def test_sliders_end_where_the_design_ends_and_not_before(design):
 
 
 def test_ends_are_those_of_the_design_when_they_are_looked_for_near_others(trunk):
-    ends = slider_ends(trunk)
+    ends = slider_ends(trunk, {}, lambda: None)
     for taper in (0.02, 0.036, 0.05):
         arm = changed(trunk, {"taper": taper})
-        ends = slider_ends(arm, ends)
-        assert ends == slider_ends(arm)
+        ends = slider_ends(arm, ends, lambda: None)
+        assert ends == slider_ends(arm, {}, lambda: None)
 
 
 def test_refusals_use_the_words_of_the_panel(trunk):

@@ -137,10 +137,9 @@ def tip_text(state: StudioState, found: Found) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
     texts = []
     if found.tip is not None:
+        place = place_text(found.tip, state.design, 6)
         pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(found.pointing, 3))
-        texts.append(
-            f"tip at {place_text(found.tip, state.design, 6)}, pointing along ({pointing})"
-        )
+        texts.append(f"tip at {place}, pointing along ({pointing})")
     if found.posture is not None:
         texts.append(_POSTURES[found.posture])
     return [" · ".join(texts)] if texts else []

@@ -20,19 +20,14 @@ from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, pi
 from softreach.studio.scene.scene import Scene, in_slice, shows_cloud
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
-from softreach.studio.work import (
-    CompilationWatch,
-    Dropped,
-    Latest,
-    StaleCheck,
-    rest,
-    return_memory_soon,
-)
+from softreach.studio.work import Dropped, Latest, StaleCheck, rest, return_memory_soon
 from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import ClientHandle
+
+    from softreach.studio.work import CompilationWatch
 
 Change = Callable[[StudioState], StudioState]
 

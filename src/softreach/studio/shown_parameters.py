@@ -15,6 +15,7 @@ from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
 from softreach.studio.widgets import Ends, unit_in
+from softreach.studio.work import StaleCheck
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.units import METER, LengthUnit
 
@@ -27,8 +28,7 @@ class ShownParameter(NamedTuple):
     hint: str  # symbol, unit and meaning
     scale: float  # units of the parameter per shown unit
     shown: float  # the value in the shown unit; NaN where the design leaves it out
-    low: float = math.nan
-    """End of a slider in the shown unit, like all that follow; NaN without a slider."""
+    low: float = math.nan  # ends of a slider in the shown unit, and its step; NaN without one
     high: float = math.nan
     step: float = math.nan
     whole: bool = False  # it counts something
@@ -58,8 +58,6 @@ def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
     """The value over a scale, to twelve digits."""
     return float(f"{parameter.value(arm) / scale:.12g}")
 
-
-# Sliders
 
 _Slider = tuple[str, float, float, float]  # label, ends and step
 _OF_ARM: dict[str, _Slider] = {
@@ -100,8 +98,7 @@ _HALVINGS = 14
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
     """The parameters of a design that have sliders, those of the whole arm first.
 
-    What the design leaves open, such as a modulus that cancels, has none; all that actuators and
-    profiles outside softreach declare has one, but for a zero of unknown size.
+    What it leaves open has none; what parts outside softreach declare has one, but for zeros.
     """
     return _slider_parameters(arm, arm.length_unit)
 
@@ -188,18 +185,12 @@ def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Par
     return parameter.field != "bundles" or turn is None or turn.value(arm) == 0
 
 
-def slider_ends(
-    arm: Manipulator,
-    before: Mapping[str, Ends] | None = None,
-    check: Callable[[], object] = lambda: None,
-) -> dict[str, Ends]:
+def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck) -> dict[str, Ends]:
     """Ends of the sliders of a design: as far as each alone can go, to three digits.
 
-    Making an arm to see whether it exists costs a millisecond. So an end is looked for near that of
-    a design before, and a slider that ended at its own limit does so again. The check is called
-    often, and may raise.
+    An end is looked for near that of a design before: each trial makes an arm, in a millisecond.
     """
-    known, before = known_parameters(arm), before or {}
+    known = known_parameters(arm)
 
     def end(slider: ShownParameter, which: int) -> float:
         def exists(shown: float) -> bool:
@@ -275,12 +266,9 @@ _BODY_LABELS = {
 def body_numbers(arm: Manipulator) -> list[ShownParameter]:
     """The parameters of the body that have no slider, in the words of those that have one."""
     slid = {slider.name for slider in slider_parameters(arm)}
-    rest = (number for number in part_parameters(arm, _BODY) if number.name not in slid)
-    return [
-        each._replace(label=_titled(_BODY_LABELS.get(each.name) or symbol, unit_in(each.label)))
-        for each in rest
-        for symbol in (known_parameters(arm)[each.name].symbol,)
-    ]
+    rest = [number for number in part_parameters(arm, _BODY) if number.name not in slid]
+    titled = lambda one: one._replace(label=_titled(_BODY_LABELS[one.name], unit_in(one.label)))
+    return [titled(each) if each.name in _BODY_LABELS else each for each in rest]
 
 
 def parts(arm: Manipulator) -> dict[str, Part]:

@@ -15,7 +15,7 @@ from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
 from softreach.studio.captions import tip_text
-from softreach.studio.fields import GRAY, Attribute, Fields, of_design
+from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
 from softreach.studio.figures import NO_BAR, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import (
@@ -34,7 +34,7 @@ from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 from softreach.support.units import LengthUnit
 
-# Sliders, numbers that have none, and named designs to start from
+Numbers = Callable[[Manipulator], Sequence[ShownParameter]]
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
@@ -52,12 +52,7 @@ def design(panel: Fields) -> None:
     panel.dropdown("start from", names, named, _ABOUT_START)
 
 
-def _numbers(
-    panel: Fields,
-    label: str,
-    shown: Callable[[Manipulator], Sequence[ShownParameter]],
-    build: Callable[[Fields, Sequence[ShownParameter]], object],
-) -> None:
+def _numbers(panel: Fields, label: str, shown: Numbers, build: Build) -> None:
     """Fields of parameters, made anew for a design that has others."""
     session = panel.session
     arm = lambda: session.state.design
@@ -276,11 +271,9 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     turn = "ψ: turn of the base about the way the arm points"
     panel.typed("turn [deg]", base_field("turn"), turn)
     gravity, names = load_field("gravity"), {name: name for name in GRAVITIES} | {"": "as typed"}
-    fall = Attribute(
-        gravity_name, lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state
-    )
+    to = lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state
     falls = "Direction of gravity in the world; the base says which way the arm points"
-    panel.dropdown("gravity", names, fall, falls)
+    panel.dropdown("gravity", names, Attribute(gravity_name, to), falls)
     for name, (label, symbol, _, hint) in _LOADS.items():
         kind = number_kind if name == "payload" else vector_kind
         panel.typed(f"{label} [{symbol or unit.name}]", load_field(name), hint, kind)
@@ -300,8 +293,7 @@ def other_loads(arm: Manipulator) -> list[str]:
     loads = arm.loads or _NONE
     names = ("tip_moment", "follower_force", "follower_moment", "force_per_length")
     others = [name.replace("_", " ") for name in names if any(getattr(loads, name))]
-    count = len(loads.point_loads)
-    return others + ([f"point loads ({count})"] if count else [])
+    return others + [f"point loads ({len(loads.point_loads)})"] * bool(loads.point_loads)
 
 
 def setting_text(state: StudioState) -> str:
@@ -362,9 +354,8 @@ def _times(value: Any, scale: float) -> Any:
 
 
 def _over(value: Any, scale: float) -> Any:
-    if isinstance(value, tuple):
-        return vector(_over(each, scale) for each in value)
-    return value if scale == 1.0 else float(f"{value / scale:.10g}")
+    over = lambda number: number if scale == 1.0 else float(f"{number / scale:.10g}")
+    return vector(map(over, value)) if isinstance(value, tuple) else over(value)
 
 
 def _in_words(error: InvalidDesign) -> InvalidDesign:

@@ -27,9 +27,8 @@ from softreach.studio.session import Session
 from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
-from softreach.support import palette
 from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
-from softreach.support.palette import eight_bit
+from softreach.support.palette import MET, MISSED, eight_bit
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -341,11 +340,7 @@ def _summary(_: StudioState, found: Found) -> str:
 _ACCURACY = 0.03  # of shares that are covered, and of distances between stations
 _PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
 _POSES = ("reach", "cover", "stay_inside", "avoid")  # kinds of findings that other poses may change
-VERDICTS = {
-    "met": eight_bit(palette.MET),
-    "missed": eight_bit(palette.MISSED),
-    "undecided": (200, 130, 0),
-}
+VERDICTS = {"met": eight_bit(MET), "missed": eight_bit(MISSED), "undecided": (200, 130, 0)}
 """Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
 _BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
 _REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}

@@ -117,9 +117,8 @@ def view(panel: Fields) -> None:
     )
     about = "What the color of a point says; the key is above the tabs"
     panel.dropdown("color by", offered, color, about)
-    lengths = Attribute(
-        lambda state: state.design.length_unit.name, lambda state, name: state.showing(unit=name)
-    )
+    named = lambda state, name: state.showing(unit=name)
+    lengths = Attribute(lambda state: state.design.length_unit.name, named)
     about = "Unit of lengths, areas and volumes, here and in saved files"
     panel.dropdown("unit", {name: name for name in UNITS}, lengths, about)
     with panel.folder("show"):
