@@ -70,9 +70,6 @@ def _pixels(ax: Axes) -> NDArray[np.uint8]:
     return np.array(canvas.buffer_rgba())
 
 
-# The section of the reachable set by the plane of the slice.
-
-
 def section_curves(reach: Reach, cut: Slice) -> list[Array]:
     """The boundary of a reachable set in the middle plane of a slice [L], curves (n, 3)."""
     if reach.exact is None or reach.exact.dimension < 2:
@@ -143,9 +140,6 @@ def enclosed_area(curves: list[Array], axis: int) -> float:
         (x, y), sign = curve.T, -1.0 if around % 2 else 1.0
         total += sign * abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
     return total
-
-
-# The volume over the range of one slider.
 
 
 def swept_parameter(state: StudioState) -> ShownParameter | None:

@@ -27,6 +27,14 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     from viser import ClientHandle
 
+_SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
+_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
+_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
+_LEVEL = 16  # of the cloud of another design
+News = Mapping[str, Any] | Callable[[Found], Found]
+"""Fields of `Found` and their new values, or the next `Found` from the one before."""
+Results = Iterator["Learned"]
+
 
 class Given(NamedTuple):
     """What a job has to work with."""
@@ -44,14 +52,9 @@ class Given(NamedTuple):
 class Learned(NamedTuple):
     """One result of a job."""
 
-    found: Mapping[str, Any] | Callable[[Found], Found] | None = None
-    """Fields of `Found` and their new values, or the next `Found` from the one before."""
-    change: Callable[[StudioState], StudioState] | None = None
-    """Change of the state that comes of it, such as that of an arm that follows its tip."""
+    found: News | None = None
+    change: Callable[[StudioState], StudioState] | None = None  # of the state that comes of it
     ends_step: bool = False  # true if the next change is another step for who undoes it
-
-
-Results = Iterator[Learned]
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +114,8 @@ def _compute_reach(given: Given) -> Results:
             return
     try:
         for reach in stages(state.design, level, given.quality, given.check, given.report):
-            _count_cloud(given, reach)
+            if shows_cloud(reach, state.appearance):
+                _count(given, reach)
             yield Learned({"reach": reach, "refusal": ""})
         return
     except InvalidInput as error:
@@ -124,21 +128,17 @@ def _compute_reach(given: Given) -> Results:
 
 
 def _color_cloud(given: Given) -> Results:
-    _count_cloud(given, given.found.reach)
+    reach = given.found.reach
+    if reach is not None and shows_cloud(reach, given.state.appearance):
+        _count(given, reach)
     yield Learned()
 
 
-def _count_cloud(given: Given, reach: Reach | None) -> None:
-    if reach is not None and shows_cloud(reach, given.state.appearance):
-        _count(reach, given)
-
-
-def _count(reach: Reach, given: Given) -> None:
+def _count(given: Given, reach: Reach) -> None:
     """Count the activations of what is shown, where its colors say them."""
     look = given.state.appearance
     if reach.fine and shown_color(reach.arm, look.color) == "multiplicity":
-        rows = shown_samples(reach, look.level)
-        count_activations(reach, rows, given.check, given.report)
+        count_activations(reach, shown_samples(reach, look.level), given.check, given.report)
 
 
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
@@ -151,9 +151,6 @@ def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
     return {"key": key} if shows_cloud(reach, look) or not look.surface else None
 
 
-_SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
-
-
 def _color_surface(given: Given) -> Results:
     reach, look = given.found.reach, given.state.appearance
     if reach is not None and look.surface and reach.has_surface:
@@ -162,7 +159,7 @@ def _color_surface(given: Given) -> Results:
         if look.cloud:
             reach.sheets  # noqa: B018  slow the first time
         else:
-            _count(reach.boundary, given)
+            _count(given, reach.boundary)
     yield Learned()
 
 
@@ -173,31 +170,21 @@ def _draw_surface(given: Given) -> Mapping[str, Any] | None:
 
 def _differentiate(given: Given) -> Results:
     design, check = given.state.design, given.check
-    reach = given.found.complete_reach(design)
-    if reach is not None:
+    if (reach := given.found.complete_reach(design)) is not None:
         yield Learned({"ends": slider_ends(design, given.found.ends, check)})
         yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
 def _cut(given: Given) -> Results:
-    reach = given.found.complete_reach(given.state.design)
-    if reach is not None:
+    if (reach := given.found.complete_reach(given.state.design)) is not None:
         given.report("cutting the reachable set")
         yield Learned({"section": section_picture(reach, given.state.appearance.slice)})
 
 
 def _sweep(given: Given) -> Results:
-    parameter = swept_parameter(given.state)
-    if parameter is not None:
+    if (parameter := swept_parameter(given.state)) is not None:
         for picture in sweep_pictures(given.state.design, parameter, given.quality):
             yield Learned({"sweep": picture})
-
-
-# The arm
-
-_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
-_LEVEL = 16  # of the cloud of another design
 
 
 def _draw_arm(given: Given) -> Mapping[str, Any]:

@@ -14,17 +14,13 @@ from typing import Self
 class Strong(str):
     """Text in bold."""
 
-    __slots__ = ()
-
 
 class Term(str):
     """Text in bold that explains itself when pointed at."""
 
-    __slots__ = ("meaning",)
     meaning: str
 
     def __new__(cls, text: str, meaning: str) -> Self:
-        """Text, and its meaning."""
         term = super().__new__(cls, text)
         term.meaning = meaning
         return term
@@ -33,10 +29,7 @@ class Term(str):
 class Swatch(str):
     """A little square of a color, as CSS has it or RGB from 0 to 255."""
 
-    __slots__ = ()
-
     def __new__(cls, color: str | tuple[int, int, int]) -> Self:
-        """The color, as CSS has it."""
         text = color if isinstance(color, str) else "rgb({},{},{})".format(*color)
         return super().__new__(cls, text)
 

@@ -304,20 +304,15 @@ def _seconds_each(rod: TipMap) -> float:
 # the exact set counts too, but not near folds, where half of the samples of a folded set are.
 
 
-def uncounted(reach: Reach, rows: Index) -> Index:
-    """Those of the samples whose number of activations is not known yet."""
-    if reach.exact is not None and reach.exact.route == "flux":
-        reach.counts[:] = 1.0  # proved one to one
-    return rows[np.isnan(reach.counts[rows])]
-
-
 def count_activations(
     reach: Reach, rows: Index, check: StaleCheck = lambda: None, report: Report = _quiet
 ) -> Array:
     """Stable activations that reach each sample of three free bundles, shape (n,); kept."""
     from softreach.inverse import solve_inverse
 
-    missing = uncounted(reach, rows)
+    if reach.exact is not None and reach.exact.route == "flux":
+        reach.counts[:] = 1.0  # proved one to one
+    missing = rows[np.isnan(reach.counts[rows])]
     for block in parallel.blocks(len(missing), _BLOCK):
         check()
         with all_cores:

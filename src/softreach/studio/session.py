@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Known
-from softreach.studio.jobs import Given, Job, what_follows
+from softreach.studio.jobs import Given, Job, News, what_follows
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.scene import Scene, in_slice, shows_cloud
@@ -91,14 +91,12 @@ class Session:
                 return
             history = self.history.after(self.state, new, goes_on=goes_on, now=time.monotonic())
             self.is_touched = self.is_touched or new != self.state
-            self._become(new, history, by_widget=by_widget)
+            self.revision += not by_widget
+            self._become(new, history)
 
-    def _become(
-        self, state: StudioState, history: History, note: str = "", *, by_widget: bool = False
-    ) -> None:
+    def _become(self, state: StudioState, history: History, note: str = "") -> None:
         old = Known(self.state, self.found)
         self.state, self.history, self.note = state, history, note
-        self.revision += not by_widget
         self.canceled = False
         self._follow_change(old)
         self.show()
@@ -108,6 +106,7 @@ class Session:
         with self.lock:
             history, state = self.history.step(self.state, back=back)
             nothing = f"There is nothing to {'undo' if back else 'redo'}."
+            self.revision += 1
             self._become(state, history, nothing if state is self.state else "")
 
     def reset(self) -> None:
@@ -140,9 +139,7 @@ class Session:
         """The state with the camera, as it is saved."""
         return self.state.replace(camera=self.camera.actual())
 
-    def learn(
-        self, found: Mapping[str, Any] | Callable[[Found], Found] | None, *, quiet: bool = False
-    ) -> None:
+    def learn(self, found: News | None, *, quiet: bool = False) -> None:
         """Replace some fields of `Found`, or all, and start what follows; panels may hear later."""
         if not found:
             return
@@ -207,10 +204,7 @@ class Session:
     # The scene
 
     def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
-        """Place of the tip [m], shape (3,), in the sample that a ray from the camera [L] meets.
-
-        None beside all. It is computed anew: a point is rounded, at the rim perhaps out of reach.
-        """
+        """Place of the tip [m] in the sample that a ray from the camera [L] meets, if any."""
         reach, look = self.found.reach, self.state.appearance
         if reach is None or not (look.cloud or look.surface) or reach.arm != self.state.design:
             return None
@@ -221,6 +215,7 @@ class Session:
         if hit is None:
             return None
         sample = int(shown_samples(reach, look.level)[seen[hit]])
+        # computed anew, as a point is rounded, at the rim perhaps out of reach
         return tip_positions(reach.arm, [reach.cloud.activation.values[sample]])[0]
 
     def look_from(self, view: str) -> None:

@@ -17,6 +17,8 @@ from softreach.support.errors import SoftreachError
 from softreach.support.files.text import read_text, write_text
 
 USUAL = Quality()
+_STATE = {"win32": "~/AppData/Local", "darwin": "~/Library/Application Support"}
+"""Folder of a user for what programs keep, by system."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +56,6 @@ def start_on_cloud(path: str | PathLike[str], quality: Quality = USUAL) -> Start
 
     reach = reached(open_cloud(path), quality)
     return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
-
-
-_STATE = {"win32": "~/AppData/Local", "darwin": "~/Library/Application Support"}
-"""Folder of a user for what programs keep, by system."""
 
 
 class KeptWork:

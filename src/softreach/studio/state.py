@@ -18,11 +18,13 @@ from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_instance, as_integer, as_number, as_one_of
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidDesign, InvalidInput, Range
+from softreach.support.errors import InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.units import UNITS
 
 TOL = 1e-5  # [L], the largest tip error: far below a pixel
 LARGEST = 2_000_000  # bytes of a file that a person opens
+_MOST_PLACES = 300  # to reach, which are judged while a slider moves
+_one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
 
 
 def rod_of(arm: Manipulator) -> TipMap:
@@ -40,17 +42,13 @@ def design_of_text(text: str, source: str) -> Manipulator:
     return arm
 
 
-_one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
-
-
 def solvable_rod(arm: Manipulator) -> TipMap:
     """The tip map of a design whose loads can be computed; slow the first time if loaded."""
     if arm.loads is not None:
         with _one_at_a_time:
-            solvable = _is_solvable(arm)
-        if not solvable:
-            allowed = f"such that tips can be computed to {TOL:g} L"
-            raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
+            if not _is_solvable(arm):
+                allowed = f"such that tips can be computed to {TOL:g} L"
+                raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
     return rod_of(arm)
 
 
@@ -60,9 +58,6 @@ def _is_solvable(arm: Manipulator) -> bool:
         return rod_of(arm).steps > 0
     except InvalidInput:  # which a tip map does not keep
         return False
-
-
-_MOST_PLACES = 300  # to reach, which are judged while a slider moves
 
 
 @lru_cache(maxsize=32)
@@ -83,7 +78,6 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
 
 VERSION = 4
 LEVELS = range(12, 22)  # 2^level points: every such prefix of a Sobol sequence is even
-
 MOUSE = {
     "tip": "drags the tip",
     "target": "sets the target",
@@ -92,14 +86,11 @@ MOUSE = {
     "none": "turns the view alone",
 }
 """Uses of the mouse in the scene: name -> what the menu says."""
-
 MOST_POINTS = 2000  # of a path: each is followed, drawn and kept in the state
-
-Vector = tuple[float, float, float]
-
 AXES = ("none", "x", "y", "z")
 _FAR = 1e3  # [L], beyond which there is nothing to see
 _PLACES, _SIZES = Range(-_FAR, _FAR), Range(0.0, _FAR)
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,8 +156,7 @@ class TipPath:
     """A path of the tip, and how far along it the arm is."""
 
     points: tuple[Vector, ...]  # [m], in order
-    start: tuple[float, ...] | None = None
-    """Activation to begin with; None for the best-conditioned solution at the first point."""
+    start: tuple[float, ...] | None = None  # activation; None for the best at the first point
     at: int = 0  # the point where the arm is
 
     def __post_init__(self) -> None:
@@ -178,11 +168,7 @@ class TipPath:
 
     @classmethod
     def through(cls, points: Any, start: Sequence[float] | None = None, at: int = 0) -> Self:
-        """A path through points [m], shape (k, 3).
-
-        Raises:
-            InvalidInput: Points of another shape, too few or too many, or not finite.
-        """
+        """A path through points [m], shape (k, 3)."""
         values = as_floats("path", points)
         if values.ndim != 2 or values.shape[1] != 3:
             raise InvalidInput("path.shape", values.shape, "of shape (k, 3)")
@@ -256,20 +242,18 @@ class StudioState:
         allowed = f"a state that the studio saved, version {VERSION}"
         try:
             values = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise InvalidInput("state file", str(error), allowed) from None
-        version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
-        if version != VERSION:
-            raise InvalidInput("state file", f"version {version}", allowed)
-        try:
+            version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
+            if version != VERSION:
+                raise InvalidInput("state file", f"version {version}", allowed)
             read: dict[str, Any] = {k: v if v is None else _READ[k](v) for k, v in values.items()}
             return cls(**read)
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-            if type(error).__module__.startswith("softreach"):
+        except _WRONG as error:
+            if isinstance(error, SoftreachError):
                 raise
             raise InvalidInput("state file", str(error), allowed) from None
 
 
+_WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 _READ: dict[str, Callable[[Any], Any]] = {
     "design": lambda text: design_of_text(text, "state file"),
     "activation": lambda values: tuple(map(float, values)),

@@ -1,8 +1,7 @@
-"""Widgets that viser lacks: lines of text, pictures that change, and fields for typed numbers.
+"""Widgets that viser lacks: lines of text, and fields for typed numbers, which are texts in forms.
 
-Numbers are typed into texts: viser's own number fields drop the sign of "-0.5" and the exponent of
-"1e-5" while one types, and round to the step of a slider. Texts are sent as they are, and a form
-tells when Enter is pressed.
+viser's own number fields drop the sign of "-0.5" and the exponent of "1e-5" while one types, and
+round to the step of a slider.
 """
 
 from __future__ import annotations
@@ -125,7 +124,7 @@ class TypedField:
         self._kind, self._value = kind, value
         self._is_refused = False
         self._lock = threading.RLock()
-        self._callbacks: list[Callable[[Any], object]] = []
+        self._applied: Callable[[Any], object] = lambda _: None
         self._form = gui.add_form(None)
         with self._form:
             self._text = gui.add_text(label, kind.text(value), hint=hint)
@@ -150,7 +149,7 @@ class TypedField:
 
     def on_update(self, callback: Callable[[Any], object]) -> None:
         """Call back with the event when a person has applied a value."""
-        self._callbacks.append(callback)
+        self._applied = callback
 
     def warn(self, text: str) -> None:
         """Say under the field why its value is refused; "" for nothing."""
@@ -182,8 +181,7 @@ class TypedField:
 
     def _apply(self, event: Any) -> None:
         self._follow()
-        for callback in self._callbacks:
-            callback(event)
+        self._applied(event)
 
     def _follow(self) -> None:
         """Bring what else shows the value in line with it."""

@@ -17,6 +17,7 @@ from softreach.support.memory import free_memory, return_memory
 StaleCheck = Callable[[], None]  # raises `Dropped` if what is being done is no longer wanted
 
 _PATIENCE = 0.1  # [s], after which work that waits checks whether it is still wanted
+_KIND = "numba:compile"
 _REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
 
 
@@ -179,11 +180,6 @@ class Budget:
             if free_memory() < self._least:
                 raise OverBudget("more memory than is free")
             self._report(self._done)
-
-
-# Compilation of kernels, for which only the first use on a machine has to wait.
-
-_KIND = "numba:compile"
 
 
 class CompilationWatch(event.Listener):

@@ -150,11 +150,10 @@ _SCALES = {
 """Colors that are numbers: label of the key, and values of samples."""
 
 _LIGHT = np.array([0.35, -0.55, 0.76])  # from the front, the right and above
-_DARKEST, _BRIGHTEST = 0.62, 1.0
+_SHADE = 0.38  # of what looks away from it
 
 
 def shaded(colors: NDArray[Any], outward: Array) -> NDArray[np.uint8]:
     """Colors of a surface, shape (n, 3), as a lamp lights what looks outward, shape (n, 3)."""
     facing = np.clip(outward @ _LIGHT, -1.0, 1.0)
-    shade = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * 0.5 * (1.0 - facing)
-    return np.rint(colors * shade[:, None]).astype(np.uint8)
+    return np.rint(colors * (1.0 - _SHADE * 0.5 * (1.0 - facing))[:, None]).astype(np.uint8)

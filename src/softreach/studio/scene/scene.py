@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 Color = tuple[int, int, int]
 
+_UNLIT = "KHR_materials_unlit"
+_LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
 MOST_BUNDLES = 100  # with more the body alone is drawn: skins of hundreds take a minute
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
@@ -340,10 +342,6 @@ def sliced(skin: Skin, cut: Slice) -> Skin:
             for values in (vertices, colors)
         )
     return Skin(vertices, faces, colors)
-
-
-_UNLIT = "KHR_materials_unlit"
-_LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
 
 
 def glb(

@@ -40,6 +40,11 @@ _ABOUT = {
     "picture": "The scene as it is seen, with legend and design; three views and an oblique one of "
     "the points that are shown; or one web page with the scene, which turns without the studio",
 }
+_PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
+"""Of a light page and of a dark one."""
+_DPI = 100.0
+_KEY, _LINE, _EDGE = 62, 17, 14  # pixels: height of the key and of a line of text, margin
+_CHARACTER = 6.4  # pixels
 
 
 def export(panel: Fields) -> None:
@@ -147,13 +152,6 @@ def _shown(session: Session) -> tuple[xr.Dataset, str | int | xr.DataArray]:
     kept = in_slice(cloud_points(reach, look.level), look.slice)
     color = color if isinstance(color, str | int) else color.isel(sample=kept)
     return cloud.isel(sample=kept), color
-
-
-_PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
-"""Of a light page and of a dark one."""
-_DPI = 100.0
-_KEY, _LINE, _EDGE = 62, 17, 14  # pixels: height of the key and of a line of text, margin
-_CHARACTER = 6.4  # pixels
 
 
 def _write_picture(session: Session, path: Path) -> None:

@@ -34,7 +34,6 @@ from softreach.support.units import LengthUnit
 if TYPE_CHECKING:
     from viser import UploadedFile
 
-
 _EMPTY = {
     "place to reach": "x, y, z in {unit}; empty: where the tip is",
     "place at the target": "nothing: the target of the tab Move",
@@ -45,6 +44,7 @@ _EMPTY = {
 }
 """Kind of need -> contents of its field, in words."""
 _ALL = "everything"
+_SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
 
 
 def needs(panel: Fields) -> None:
@@ -102,9 +102,6 @@ def verdict(found: Found, state: StudioState) -> str:
     return "".join(markup.paragraph(*parts) for parts in lines)
 
 
-_SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
-
-
 def _reach_text(check: Check, finding: Finding) -> str:
     """A target in words: reached, or missed by its largest gap."""
     count, _, worst = finding.text.partition("; ")
@@ -124,9 +121,6 @@ def verdict_text(check: Check) -> str:
     worst = max(missed, key=lambda finding: finding.excess)
     more = f" {_reach_text(check, worst)}" if worst.kind == "reach" else ""
     return f"{text} · {worst.name}{more}{' undecided' * (worst.verdict == 'undecided')}"
-
-
-# Needs that are added and removed
 
 
 def add_need(session: Session, kind: str, text: str) -> None:
