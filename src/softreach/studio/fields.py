@@ -30,7 +30,6 @@ Build = Callable[["Fields", Any], object]  # declares fields for a key
 Shown = Callable[[StudioState, Found], Any]  # something of the state and of what is known
 Where = Shown | str
 """True where something is shown, or the path of what is true there; "" for everywhere."""
-
 GRAY: Any = {"color": "gray"}  # looks of a button that is not the first of its group
 
 
@@ -150,9 +149,8 @@ class Fields:
         """Add a menu; options say what each value is called, if need be in each state."""
         offered = options if callable(options) else lambda _: options
         names = offered(self.session.state)
-        widget = self.gui.add_dropdown(
-            label, tuple(names.values()), initial_value=names[self._read(at)], hint=hint
-        )
+        labels, shown = tuple(names.values()), names[self._read(at)]
+        widget = self.gui.add_dropdown(label, labels, initial_value=shown, hint=hint)
         return self.bind(widget, at, offered)
 
     def slider(self, label: str, ends: Ends, step: float, at: Attribute, hint: str) -> Slider:
@@ -210,14 +208,9 @@ class Fields:
         self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
         return self.kept(widget)
 
-    def _by_hand(self, action: Action) -> Callable[[Any], None]:
+    def _by_hand(self, action: Action) -> Callable[[Any], object]:
         """What acts where a person moved a widget, and not where the program did."""
-
-        def moved(event: Any) -> None:
-            if event.client_id is not None:
-                attempt(self.session, action)
-
-        return moved
+        return lambda event: event.client_id is not None and attempt(self.session, action)
 
     def apply(self, change: Change, widget: Any = None) -> None:
         """Change the state, or say below the widget why that cannot be."""

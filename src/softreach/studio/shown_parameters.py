@@ -19,6 +19,41 @@ from softreach.studio.work import StaleCheck
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.units import METER, LengthUnit
 
+_Slider = tuple[str, float, float, float]  # label, ends and step
+_OF_ARM: dict[str, _Slider] = {
+    "revolution": ("revolution Ω [deg]", 1, 360, 1),
+    "taper": ("taper φ [deg]", -2, 5, 0.05),
+    "radius_ratio": ("inner / outer radius", 0, 1, 0.01),
+    "outer_radius": ("outer radius", 0.02, 0.12, 5e-4),  # of L
+    "extent": ("extent σ [deg]", 2, 120, 1),
+    "lower": ("lowest γ", -4, 0, 0.01),
+    "upper": ("highest γ", -1, 2, 0.01),
+}
+_OF_PART: dict[str, _Slider] = {
+    "bundles": ("bundles of {owner}", 1, 6, 1),
+    "offset": ("offset of {owner} [deg]", 0, 360, 1),
+    "distance_ratio": ("distance of {owner} / outer radius", 0, 1, 0.01),
+    "radius_ratio": ("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
+    "extent": ("extent of {owner} [deg]", 2, 120, 1),
+    "revolution": ("revolution of {owner} [deg]", -360, 360, 1),
+}
+_ONE_FOR_ALL = ("extent", "revolution", "lower", "upper")
+"""Fields that have a slider of their own only where parts differ."""
+_AROUND_VALUE = ("lower", "upper", "young_modulus")
+"""Fields of any magnitude: their sliders end at multiples of what the design has."""
+_MORE = {
+    "extent": "; σ is the angle of the cross-section that the bundle covers",
+    "offset": "; the angle around the axis at which the bundle starts at the base",
+    "revolution": "; the angle that a fiber turns around the axis from base to tip",
+    "taper": "; the angle between the axis and the side of the body",
+    "bundles": "; how many equal bundles stand around the axis, each with its own activation",
+    "lower": "; the most that a bundle contracts",
+    "upper": "; the most that a bundle extends",
+}
+_NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
+"""Words of symbols on sliders."""
+_HALVINGS = 14
+
 
 class ShownParameter(NamedTuple):
     """A parameter of a design in the unit that a person reads."""
@@ -57,42 +92,6 @@ def known_parameters(arm: Manipulator) -> dict[str, Parameter]:
 def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
     """The value over a scale, to twelve digits."""
     return float(f"{parameter.value(arm) / scale:.12g}")
-
-
-_Slider = tuple[str, float, float, float]  # label, ends and step
-_OF_ARM: dict[str, _Slider] = {
-    "revolution": ("revolution Ω [deg]", 1, 360, 1),
-    "taper": ("taper φ [deg]", -2, 5, 0.05),
-    "radius_ratio": ("inner / outer radius", 0, 1, 0.01),
-    "outer_radius": ("outer radius", 0.02, 0.12, 5e-4),  # of L
-    "extent": ("extent σ [deg]", 2, 120, 1),
-    "lower": ("lowest γ", -4, 0, 0.01),
-    "upper": ("highest γ", -1, 2, 0.01),
-}
-_OF_PART: dict[str, _Slider] = {
-    "bundles": ("bundles of {owner}", 1, 6, 1),
-    "offset": ("offset of {owner} [deg]", 0, 360, 1),
-    "distance_ratio": ("distance of {owner} / outer radius", 0, 1, 0.01),
-    "radius_ratio": ("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
-    "extent": ("extent of {owner} [deg]", 2, 120, 1),
-    "revolution": ("revolution of {owner} [deg]", -360, 360, 1),
-}
-_ONE_FOR_ALL = ("extent", "revolution", "lower", "upper")
-"""Fields that have a slider of their own only where parts differ."""
-_AROUND_VALUE = ("lower", "upper", "young_modulus")
-"""Fields of any magnitude: their sliders end at multiples of what the design has."""
-_MORE = {
-    "extent": "; σ is the angle of the cross-section that the bundle covers",
-    "offset": "; the angle around the axis at which the bundle starts at the base",
-    "revolution": "; the angle that a fiber turns around the axis from base to tip",
-    "taper": "; the angle between the axis and the side of the body",
-    "bundles": "; how many equal bundles stand around the axis, each with its own activation",
-    "lower": "; the most that a bundle contracts",
-    "upper": "; the most that a bundle extends",
-}
-_NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
-"""Words of symbols on sliders."""
-_HALVINGS = 14
 
 
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:

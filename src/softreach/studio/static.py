@@ -38,7 +38,7 @@ from softreach.support.errors import (
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.progress import Progress, silent
 from softreach.support.quantity import quantity
-from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
+from softreach.support.units import LengthUnit, as_unit, readable_unit
 from softreach.workspace import reachable_set
 
 Entry = dict[str, Any]
@@ -89,8 +89,7 @@ def write_static(
         raise InvalidInput("designs", f"{space.size:,}", f"a grid of {_MOST:,} at most")
     index, base = place / "index.html", space.base
     check_place(index, overwrite=overwrite, name="static")
-    shown = base.display_unit if unit is None else unit
-    name = as_unit(handy_unit(base.length) if shown is None else shown, base.length).name
+    name = base.length_unit.name if unit is None else as_unit(unit, base.length).name
     paths = [place / _FOLDER / f"{number}.js" for number in range(space.size)]
     tasks = (partial(_design, space, k, name, path, overwrite) for k, path in enumerate(paths))
     entries = list[Entry]()

@@ -29,9 +29,7 @@ VIEWS: dict[str, Array] = {
     "top": np.array([0.0, -1e-3, 1.0]),  # not quite: z is the way up
 }
 """Directions from the middle to the camera."""
-
 UPRIGHT = 0.6  # aspect below which a window is that of a phone
-
 _PATIENCE = 30.0  # [s] for a picture
 LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
@@ -157,7 +155,6 @@ class NumberedBox:
                 self._draw()
 
     def _draw(self) -> None:
-        """Draw what is not there yet."""
         (camera, focal), scale, label = self._camera, self._scale, self._unit.label
         side = seen_from(scale * camera, *self._box, focal)
         before, self._drawn = self._drawn, (self._unit, scale, np.array(self._box).tolist(), side)

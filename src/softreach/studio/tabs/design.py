@@ -38,6 +38,34 @@ Numbers = Callable[[Manipulator], Sequence[ShownParameter]]
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
+_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
+_NEW_RING = "ring"
+_ABOUT_MADE_OF = (
+    "Material of all rings: tendons and chambers need its Young's modulus E, "
+    "which some arms leave open"
+)
+_NAME = TextKind("a name", lambda text: text.strip() or None, str)
+_ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
+_WAYS = {name: name for name in POINTS} | {
+    "up": "up (upright)",
+    "down": "down (hanging)",
+    "": "as the file says",
+}
+_NONE = Loads(gravity=GRAVITIES["none"])
+_MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
+_SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
+_LOADS = {
+    "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
+    "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
+    "payload_arm": (
+        "lever arm",
+        "",
+        0.0,
+        "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
+    ),
+    "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
+}
+"""Loads that are typed: field -> label, unit ("" for that of lengths), its size, and meaning."""
 
 
 def design(panel: Fields) -> None:
@@ -116,18 +144,6 @@ def _designs() -> dict[str, Manipulator]:
     return {name: getattr(designs, name)() for name in designs.__all__}
 
 
-# Rings and actuators
-
-_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
-_NEW_RING = "ring"
-_ABOUT_MADE_OF = (
-    "Material of all rings: tendons and chambers need its Young's modulus E, "
-    "which some arms leave open"
-)
-_NAME = TextKind("a name", lambda text: text.strip() or None, str)
-_ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
-
-
 def arm_parts(panel: Fields) -> None:
     """A list of parts, the fields of the one that is chosen, and new parts."""
     session = panel.session
@@ -168,7 +184,6 @@ def arm_parts(panel: Fields) -> None:
 
 
 def _listed(arm: Manipulator) -> dict[str, Part]:
-    """The parts that are edited here, by their labels."""
     return {label: part for label, part in parts(arm).items() if label != "body"}
 
 
@@ -180,7 +195,6 @@ def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, 
 
 
 def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
-    """The fields of the part that is chosen."""
     session, part, labels = panel.session, known[label], tuple(known)
     chosen = Attribute(
         lambda found: min(found.part, len(labels) - 1),
@@ -226,30 +240,6 @@ def _material(panel: Fields, label: str, none: str, at: Attribute) -> None:
     names = {"": none} | {name: name for name in material_names()}
     known = at._replace(read=lambda state: name if (name := at.read(state)) in names else "")
     panel.dropdown(label, names, known, _ABOUT_MATERIAL)
-
-
-# Base and loads
-
-_WAYS = {name: name for name in POINTS} | {
-    "up": "up (upright)",
-    "down": "down (hanging)",
-    "": "as the file says",
-}
-_NONE = Loads(gravity=GRAVITIES["none"])
-_MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
-_SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
-_LOADS = {
-    "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
-    "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
-    "payload_arm": (
-        "lever arm",
-        "",
-        0.0,
-        "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
-    ),
-    "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
-}
-"""Loads that are typed: field -> label, unit ("" for that of lengths), its size, and meaning."""
 
 
 def loads(panel: Fields) -> None:

@@ -144,7 +144,6 @@ def _write_page(session: Session, path: Path) -> None:
 
 
 def _shown(session: Session) -> tuple[xr.Dataset, str | int | xr.DataArray]:
-    """The points that are shown, and their colors."""
     reach, look = _reach(session), session.state.appearance
     known = [name for name in ("tip", "activation", "status") if name in reach.cloud]
     cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))

@@ -44,6 +44,15 @@ _EMPTY = {
 }
 """Kind of need -> contents of its field, in words."""
 _ALL = "everything"
+_ACCURACY = 0.03  # of shares that are covered, and of distances between stations
+_PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
+_POSES = ("reach", "cover", "stay_inside", "avoid")  # kinds of findings that other poses may change
+VERDICTS = {"met": eight_bit(MET), "missed": eight_bit(MISSED), "undecided": (200, 130, 0)}
+"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
+_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
+_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
+_MOST_LABELS = 20  # more would hide each other
+_MEASURED = 0.03  # edge of a dot [L]
 _SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
 
 
@@ -329,19 +338,6 @@ def _summary(_: StudioState, found: Found) -> str:
     return "".join([*tables, *map(markup.paragraph, lines)])
 
 
-# Jobs
-
-_ACCURACY = 0.03  # of shares that are covered, and of distances between stations
-_PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
-_POSES = ("reach", "cover", "stay_inside", "avoid")  # kinds of findings that other poses may change
-VERDICTS = {"met": eight_bit(MET), "missed": eight_bit(MISSED), "undecided": (200, 130, 0)}
-"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
-_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
-_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
-_MOST_LABELS = 20  # more would hide each other
-_MEASURED = 0.03  # edge of a dot [L]
-
-
 def _check(given: Given) -> Results:
     """By poses that are found in some milliseconds; by every pose where these miss something."""
     state = given.state
@@ -364,7 +360,6 @@ def _check(given: Given) -> Results:
 
 
 def _draw_needs(given: Given) -> None:
-    """The places and regions of a design that was judged."""
     check, scene = given.found.check, given.scene
     scene.remove("/needs")
     if check is None:

@@ -32,19 +32,26 @@ if TYPE_CHECKING:
     import xarray as xr
     from viser import UploadedFile
 
-
-# The tip, dragged
-
 _DRAG_HINT = (
     "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
     "solutions."
 )
+_KINDS = {"N": "tension", "Pa": "pressure"}  # kinds of inputs by their units
+_MOST = 40  # sliders: a page with hundreds takes minutes to build
+_HERE = "\N{CHECK MARK} "
+_NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
+_POINTS = 24  # of the straight line to each place that is clicked
+_FAMILY = 6  # shapes offered where infinitely many reach the target
+_DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
+_RESIDUAL = 1e-8  # [L]
+_STEP = 0.05  # [s] between points that are played
+_TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
+_PALE = (240, 175, 205)  # of a path, where the arm does not follow it
 
 
 def drag(panel: Fields) -> None:
     """Use of the mouse in the scene, and the ball on the tip that it may drag."""
     session = panel.session
-
     pull = lambda phase, wanted: {"pull": Pull(wanted, rests=phase == "end")}
     order = lambda *given: session.learn(pull(*given), quiet=True)  # only the latest is followed
     eye = lambda: np.array(session.camera.actual().position)
@@ -79,12 +86,6 @@ def _gap(state: StudioState, found: Found) -> str:
     return state.design.length_unit.rounded(short, digits=".3g") if short else ""
 
 
-# Activations
-
-_KINDS = {"N": "tension", "Pa": "pressure"}  # kinds of inputs by their units
-_MOST = 40  # sliders: a page with hundreds takes minutes to build
-
-
 def activation(panel: Fields) -> None:
     """Activations of the bundles within their bounds, and the place of the tip."""
     follows = "design", "found.tip", "found.pointing", "found.posture"
@@ -112,19 +113,12 @@ def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
 
 
 def _slider_ends(state: StudioState, _: Found) -> list[tuple[str, float, float]]:
-    """Label and bounds of every bundle."""
     arm, ends = state.design, []
     numbers = input_symbols(arm), arm.input_names, arm.input_units, rod_of(arm).box.bounds
     for symbol, name, unit, (low, high) in zip(*numbers, strict=True):
         label = f"{_KINDS[unit]} of {name}" if unit in _KINDS else f"{symbol} {name}"
         ends.append((label + (unit != "1") * f" [{unit}]", low, high))
     return ends
-
-
-# A target, and every activation that reaches it
-
-_HERE = "\N{CHECK MARK} "
-_NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
 
 
 def target(panel: Fields) -> None:
@@ -192,11 +186,6 @@ def _answer_text(state: StudioState, found: Found) -> list[str]:
         f"({', '.join(arm.input_names)}) to move the arm there, or click its shape; the one with a "
         "check mark is where it is."
     ]
-
-
-# A path
-
-_POINTS = 24  # of the straight line to each place that is clicked
 
 
 def path(panel: Fields) -> None:
@@ -274,16 +263,6 @@ def _tip(state: StudioState) -> np.ndarray:
     if not np.isfinite(tip).all():
         raise InvalidInput("activation", state.activation, "one with an equilibrium")
     return tip
-
-
-# Jobs
-
-_FAMILY = 6  # shapes offered where infinitely many reach the target
-_DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
-_RESIDUAL = 1e-8  # [L]
-_STEP = 0.05  # [s] between points that are played
-_TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
-_PALE = (240, 175, 205)  # of a path, where the arm does not follow it
 
 
 def _solve(given: Given) -> Sequence[Learned]:

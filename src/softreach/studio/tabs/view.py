@@ -31,6 +31,30 @@ _NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
 _ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
 _WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.canceled"
+_TOGGLES = {
+    "arm": ("arm", "The body and its bundles in the present activation"),
+    "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
+    "cloud": ("cloud", "Tips of sampled activations"),
+    "half": ("half of the cloud", "Cuts away the half in front of the arm"),
+    "dark": ("dark page", "Light on dark"),
+}
+_PLOTS_HINT = (
+    "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
+    "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
+)
+_PLOTS = {
+    "section": (
+        "section",
+        "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
+        "boundary, and how many activations reach each place",
+    ),
+    "sweep": (
+        "V against parameter",
+        "Volume of designs that differ from this one in one parameter, computed as you look",
+    ),
+}
+_WIDTH = 380  # pixels
+_NOTHING = np.zeros((1, 1, 4), np.uint8)
 
 
 def status(panel: Fields) -> None:
@@ -63,7 +87,6 @@ def status(panel: Fields) -> None:
 
 
 def _numbers(session: Session, found: Found) -> str:
-    """What is known, and whether it is about to change."""
     check, reach = found.check, found.reach
     above = [_reach_line(session), [verdict_text(check)] if check is not None else []]
     below: list[list[Part]] = []
@@ -97,15 +120,6 @@ def _work(session: Session) -> str:
     idle = "canceled" if session.canceled else "not computed"
     missing = "computing ..." if session.busy else idle
     return missing if is_behind(session) else ""
-
-
-_TOGGLES = {
-    "arm": ("arm", "The body and its bundles in the present activation"),
-    "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
-    "cloud": ("cloud", "Tips of sampled activations"),
-    "half": ("half of the cloud", "Cuts away the half in front of the arm"),
-    "dark": ("dark page", "Light on dark"),
-}
 
 
 def view(panel: Fields) -> None:
@@ -146,30 +160,9 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     panel.slider(unit.label("center"), ends, 0.01 * over, at, "Middle of the slab along the axis")
 
 
-# Plots beside the scene
-
-_HINT = (
-    "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
-    "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
-)
-_PLOTS = {
-    "section": (
-        "section",
-        "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
-        "boundary, and how many activations reach each place",
-    ),
-    "sweep": (
-        "V against parameter",
-        "Volume of designs that differ from this one in one parameter, computed as you look",
-    ),
-}
-_WIDTH = 380  # pixels
-_NOTHING = np.zeros((1, 1, 4), np.uint8)
-
-
 def plots(panel: Fields) -> None:
     """Check boxes in the tab; a folder for each plot in the window."""
-    panel.say(_HINT)
+    panel.say(_PLOTS_HINT)
     for name, (label, hint) in _PLOTS.items():
         panel.checkbox(label, attribute(f"appearance.{name}"), hint)
     about = "What changes in the plot of V against a parameter"
@@ -196,7 +189,6 @@ def plots(panel: Fields) -> None:
 
 
 def _figure(panel: Fields, name: str) -> None:
-    """A folder with a picture and a line on it."""
     known: Callable[[Found], Picture | None] = attrgetter(name)
 
     def draw(_: StudioState, found: Found) -> None:
