@@ -131,9 +131,9 @@ def test_a_slice_shows_what_lies_within_its_thickness(rng):
 
 def test_a_ray_picks_the_nearest_of_the_points_on_it():
     eye, points = np.zeros(3), np.array([[0, 0, 5.0], [0, 0, 2.0], [1, 0, 1.0], [0, 0, -1.0]])
-    assert picked_point(points, eye, (0, 0, 3), 0.01) == 1
-    assert picked_point(points, eye, (1, 0, 1), 0.01) == 2
-    assert picked_point(points, eye, (0, 1, 0), 0.01) is None
+    assert picked_point(points, eye, (0, 0, 3)) == 1
+    assert picked_point(points, eye, (1, 0, 1)) == 2
+    assert picked_point(points, eye, (0, 1, 0)) is None
 
 
 def test_the_box_holds_every_point_and_its_numbers_are_round(rng):

@@ -31,6 +31,7 @@ _SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place n
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 _LEVEL = 16  # of the cloud of another design
+DESIGN = "design design.display_unit"  # equal designs may be shown in other units
 News = Mapping[str, Any] | Callable[[Found], Found]
 """Fields of `Found` and their new values, or the next `Found` from the one before."""
 Results = Iterator["Learned"]
@@ -261,7 +262,7 @@ SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
     Job(
         "reach",
-        "design design.display_unit appearance.level",
+        f"{DESIGN} appearance.level",
         _compute_reach,
         _draw_cloud,
         makes="key slopes",
@@ -294,7 +295,7 @@ SCENE_JOBS = (
         _cut,
         wanted="appearance.section",
     ),
-    Job("sweep", "design design.display_unit appearance.swept", _sweep, wanted="appearance.sweep"),
+    Job("sweep", f"{DESIGN} appearance.swept", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
     Job(

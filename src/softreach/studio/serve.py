@@ -37,6 +37,7 @@ _NO_TOKEN = "The address lacks the token that softreach printed with it.\n"
 _FOREIGN = "This page is for its own server alone.\n"
 _ELSEWHERE = "This address names another server, to which the page may not connect.\n"
 _PLAIN_HOST = re.compile(r"[A-Za-z0-9.\-]+(:\d+)?|\[[0-9A-Fa-f:.]+\](:\d+)?")
+_CLOSED = "media-src", "frame-src", "object-src", "base-uri", "form-action", "frame-ancestors"
 _POLICY = {
     "default-src": "'self'",
     "script-src": "'self' 'unsafe-inline' 'unsafe-eval' blob:",
@@ -45,10 +46,7 @@ _POLICY = {
     "img-src": "'self' data: blob:",
     "font-src": "'self' data:",
     "worker-src": "'self' blob: data:",
-    **dict.fromkeys(
-        ("media-src", "frame-src", "object-src", "base-uri", "form-action", "frame-ancestors"),
-        "'none'",
-    ),
+    **dict.fromkeys(_CLOSED, "'none'"),
 }
 
 

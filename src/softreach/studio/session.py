@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 Change = Callable[[StudioState], StudioState]
 
-_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 _REST = 0.5  # [s] without changes, after which the state is kept
 
@@ -211,7 +210,7 @@ class Session:
         points = cloud_points(reach, look.level)
         hidden = self.scene.hidden(points) & shows_cloud(reach, look)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
-        hit = picked_point(points[seen], origin, direction, _CLICK)
+        hit = picked_point(points[seen], origin, direction)
         if hit is None:
             return None
         sample = int(shown_samples(reach, look.level)[seen[hit]])

@@ -35,6 +35,7 @@ LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blo
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
+_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
 _POINTER = 0.012  # radius of what is clicked [L]
 _ROOM, _ROOM_UPRIGHT = 1.12, 1.22  # times what would just fill the picture, with its numbers
 _GRAY = 170, 170, 175  # of the axes
@@ -196,19 +197,14 @@ def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
     return ahead, np.linalg.norm(offset - ahead[:, None] * way, axis=1)
 
 
-def picked_point(
-    points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float
-) -> int | None:
-    """Number of the point that a ray from the camera hits; None if it passes all of them by.
-
-    Of the points, shape (n, 3), within an angle [rad] of the ray it is the nearest to the camera.
-    """
+def picked_point(points: Array, origin: ArrayLike, direction: ArrayLike) -> int | None:
+    """Number of the point, shape (n, 3), that a ray hits nearest to the camera; None for none."""
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     depth, aside = _beside(points, np.asarray(origin, float), direction)
     with np.errstate(divide="ignore", invalid="ignore"):
         angle = np.where(depth > 0, aside / depth, np.inf)
-    near = np.flatnonzero(angle <= tolerance)
+    near = np.flatnonzero(angle <= _CLICK)
     if not len(near):
         return None
     # A little deeper but under the cursor is better than in front and beside it.
-    return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / tolerance))])
+    return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / _CLICK))])

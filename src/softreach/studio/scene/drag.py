@@ -34,9 +34,7 @@ class DragBall:
         self._api, self._on_drag, self._eye = api, on_drag, eye
         self._nodes: tuple[Any, Any] | None = None
 
-    def move(
-        self, tip: Array | None, radius: float = 0.0, *, dark: bool = False, clear: bool = False
-    ) -> None:
+    def move(self, tip: Array | None, radius: float, *, dark: bool, clear: bool) -> None:
         """Put the ball on the tip, around an arm of this radius [L], or hide it; some are clear."""
         if self._nodes is None and tip is not None:
             self._nodes = self._drawn(tip)
@@ -64,42 +62,34 @@ class DragBall:
         self._api.add_label("/lag/label", f"{gap} short", anchor="bottom-center")
 
     def _drawn(self, tip: Array) -> tuple[Any, Any]:
-        look: Any = {"cast_shadow": False}
-        halo = self._api.add_icosphere("/grip", _HALO, _COLOR, opacity=0.25, position=tip, **look)
-        ball = self._api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, **look)
-        offset = np.zeros(3)
-
-        @halo.on_drag("left")
-        async def _(event: Any) -> None:  # on the event loop, which keeps phases in order
-            nonlocal offset
-            if event.phase == "start":
-                offset = np.array(halo.position) - event.start_position
-            self._on_drag(event.phase, np.array(event.end_position) + offset)
-
-        for axis, name in enumerate(_AXES):
-            self._draw_axis(halo, axis, name)
-        return halo, ball
-
-    def _draw_axis(self, halo: Any, axis: int, name: str) -> None:
         from trimesh.creation import revolve
 
-        direction, mesh = np.eye(3)[axis], revolve(_ARROW, sections=12)
-        vertices = np.roll(mesh.vertices, axis + 1, axis=1).astype(np.float32)
-        arrow = self._api.add_mesh_simple(
-            f"/grip/{name}", vertices, mesh.faces, color=_AXES[name], cast_shadow=False
-        )
-        add_label(self._api, f"/grip/{name}/letter", name, _LETTER * direction)
-        begin, pressed = np.zeros(3), 0.0
+        api, mesh = self._api, revolve(_ARROW, sections=12)
+        look: Any = {"cast_shadow": False}
+        halo: Any = api.add_icosphere("/grip", _HALO, _COLOR, opacity=0.25, position=tip, **look)
+        ball = api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, **look)
+        self._grip(halo, halo, lambda _, seen: seen)
+        for axis, (name, color) in enumerate(_AXES.items()):
+            path, direction = f"/grip/{name}", np.eye(3)[axis]
+            vertices = np.roll(mesh.vertices, axis + 1, axis=1).astype(np.float32)
+            arrow = api.add_mesh_simple(path, vertices, mesh.faces, color=color, **look)
+            add_label(api, f"{path}/letter", name, _LETTER * direction)
+            way = lambda begin, seen, d=direction: along_axis(begin, d, self._eye(), seen) * d
+            self._grip(arrow, halo, way)
+        return halo, ball
 
-        @arrow.on_drag("left")
-        async def _(event: Any) -> None:
+    def _grip(self, node: Any, halo: Any, place: Callable[[Array, Array], Array]) -> None:
+        """Let a node be dragged: the ball goes as far as a place by where it began and is seen."""
+        begin, pressed = np.zeros(3), np.zeros(3)
+
+        @node.on_drag("left")
+        async def _(event: Any) -> None:  # on the event loop, which keeps phases in order
             nonlocal begin, pressed
-            eye = self._eye()
             if event.phase == "start":
                 begin = np.array(halo.position)
-                pressed = along_axis(begin, direction, eye, np.array(event.start_position))
-            reached = along_axis(begin, direction, eye, np.array(event.end_position))
-            self._on_drag(event.phase, begin + (reached - pressed) * direction)
+                pressed = place(begin, np.array(event.start_position))
+            reached = place(begin, np.array(event.end_position))
+            self._on_drag(event.phase, begin + reached - pressed)
 
 
 def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:

@@ -83,11 +83,9 @@ def _change_text(row: Row) -> str:
     before, now = row.errors
     if not row.change:
         return "–" if row.change is None else "="
-    if before is None or now is None:
-        return _digits(row.change, None, "+")
-    error = before + now
+    error = None if before is None or now is None else before + now
     text = _digits(row.change, error, "+")
-    if not row.kept:
+    if error is None or not row.kept:
         return text
     return f"{text} ({_digits(100 * row.change / row.kept, 100 * error / row.kept, '+')} %)"
 

@@ -111,13 +111,15 @@ def _write_surface(session: Session, path: Path) -> None:
 
 def _write_arm(session: Session, path: Path) -> None:
     arm = session.state.design
-    if not np.isfinite((shape := _shape(session.state)).position.values).all():
+    if not np.isfinite(
+        (shape := configuration(session.state.design, session.state.activation)).position.values
+    ).all():
         raise InvalidInput("activation", session.state.activation, "one with an equilibrium")
     export_arm(arm, shape, path, unit=arm.length_unit)
 
 
 def _shape(state: StudioState) -> xr.Dataset:
-    return configuration(state.design, np.asarray(state.activation))
+    return configuration(state.design, state.activation)
 
 
 def _write_views(session: Session, path: Path) -> None:

@@ -19,7 +19,7 @@ from softreach.requirements.checks import checked
 from softreach.studio import markup
 from softreach.studio.fields import GRAY, Attribute, Fields, file_text
 from softreach.studio.found import Bench, Found, Sample
-from softreach.studio.jobs import Given, Job, Learned, Results
+from softreach.studio.jobs import DESIGN, Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.camera import add_label
 from softreach.studio.scene.scene import DARK, MARK, MARKER, Scene, pieces
@@ -443,14 +443,7 @@ def _fit(given: Given) -> Results:
 
 
 JOBS = (
-    Job(
-        "needs",
-        "design design.display_unit needs",
-        _check,
-        _draw_needs,
-        wanted="needs",
-        makes="check",
-    ),
+    Job("needs", f"{DESIGN} needs", _check, _draw_needs, wanted="needs", makes="check"),
     Job("sample", "design activation found.bench", _predict, _draw_sample, wanted="found.bench"),
     Job("fit", "", _fit, doing="calibrating"),
 )
