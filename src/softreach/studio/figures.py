@@ -38,6 +38,9 @@ _INK = "#7d848b"  # legible on white and on black
 _WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
 _VALUES = 9  # of the parameter, beside that of the design
 _SECONDS = 10.0  # [s] for each volume
+PART = 0.01  # part of the range of a slider over which the change of the volume is told
+NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)  # room for a bar
+_FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
 class Picture(NamedTuple):
@@ -189,13 +192,6 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
     with all_cores:
         solvable_rod(design)
         return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
-
-
-# Bars under the sliders: change of the reachable volume by each, on one scale for all of them.
-
-PART = 0.01  # part of the range of a slider over which the change of the volume is told
-NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)  # room for a bar
-_FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
 class Slope(NamedTuple):

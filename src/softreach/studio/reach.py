@@ -33,6 +33,9 @@ _quiet: Report = lambda doing: None
 
 _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
 _LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
+_PILOT = 512  # samples, by which the cost of one is measured
+_LOWEST = 10  # level below which a cloud shows no shape
+_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
 _BLOCK = 1 << 13  # targets solved at a time: a tenth of a second, after which others have a turn
 
 
@@ -169,9 +172,6 @@ def cloud_points(reach: Reach, level: int) -> Array:
     return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
 
 
-# Stages: coarse first and then fine, within a budget of time and memory.
-
-
 def stages(
     arm: Manipulator, level: int, quality: Quality, check: StaleCheck, report: Report = _quiet
 ) -> Iterator[Reach]:
@@ -265,13 +265,6 @@ def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> 
         return reachable_set(arm, accuracy=accuracy, tol=tol, memory=memory, progress=budget)
 
 
-# Effort: the samples of an arm that there is time and memory for.
-
-_PILOT = 512
-_LOWEST = 10  # level below which a cloud shows no shape
-_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
-
-
 def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
     """The level of the largest cloud, at most wanted, that one core computes in time [s]."""
     return _level(max(seconds, 1e-9) / _seconds_each(rod), wanted)
@@ -300,14 +293,11 @@ def _seconds_each(rod: TipMap) -> float:
     return max(min(seconds), 1e-6) / _PILOT
 
 
-# Multiplicity: the number of activations that reach a place, as the inverse finds them. The grid of
-# the exact set counts too, but not near folds, where half of the samples of a folded set are.
-
-
 def count_activations(
     reach: Reach, rows: Index, check: StaleCheck = lambda: None, report: Report = _quiet
 ) -> Array:
     """Stable activations that reach each sample of three free bundles, shape (n,); kept."""
+    # by the inverse: the grid of the exact set is wrong near folds, where half of the samples are
     from softreach.inverse import solve_inverse
 
     if reach.exact is not None and reach.exact.route == "flux":

@@ -76,8 +76,6 @@ class Session:
         self._follow_change(None)
         self.show()
 
-    # The state, and what is known of it
-
     def update(self, change: Change, *, by_widget: bool = False, goes_on: bool = False) -> None:
         """Replace the state, unless the next is not valid, and start what follows from that.
 
@@ -149,8 +147,6 @@ class Session:
         if not quiet:
             self.show()
 
-    # What the reader is shown
-
     @property
     def compiling(self) -> str:
         """Words for what is being compiled; "" for nothing."""
@@ -200,8 +196,6 @@ class Session:
         size = f"{len(data) / 1e6:.1f} MB" if len(data) >= 1e5 else f"{len(data) / 1e3:.1f} kB"
         self.say(f"{name} is written: {size}.")
 
-    # The scene
-
     def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
         """Place of the tip [m] in the sample that a ray from the camera [L] meets, if any."""
         reach, look = self.found.reach, self.state.appearance
@@ -233,8 +227,6 @@ class Session:
         self.learn({"takes_nearest": True})
         self.update(lambda state: state.replace(target=vector(np.asarray(target))))
         self.follow("inverse")  # also where the target is the one before
-
-    # Jobs
 
     @property
     def busy(self) -> bool:

@@ -88,6 +88,10 @@ MOUSE = {
 """Uses of the mouse in the scene: name -> what the menu says."""
 MOST_POINTS = 2000  # of a path: each is followed, drawn and kept in the state
 AXES = ("none", "x", "y", "z")
+_LONGEST = 200  # steps back
+_PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
+_SETTINGS = ("design", "reference", "needs")
+_POSE = ("activation", "target")
 _FAR = 1e3  # [L], beyond which there is nothing to see
 _PLACES, _SIZES = Range(-_FAR, _FAR), Range(0.0, _FAR)
 Vector = tuple[float, float, float]
@@ -273,18 +277,9 @@ def vector(values: Iterable[float]) -> Vector:
     return x, y, z
 
 
-# History: states before and states undone, as values, so that going back is exact. Looks are no
-# part of it: whoever goes back to an earlier design keeps the view.
-
-_LONGEST = 200  # steps back
-_PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
-_SETTINGS = ("design", "reference", "needs")
-_POSE = ("activation", "target")
-
-
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """States to go back and forth to; a change makes a new history."""
+    """States to go back and forth to; a change makes a new history. Looks are no part of it."""
 
     past: tuple[StudioState, ...] = ()  # the latest last
     future: tuple[StudioState, ...] = ()  # the next last

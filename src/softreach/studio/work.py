@@ -17,6 +17,9 @@ from softreach.support.memory import free_memory, return_memory
 StaleCheck = Callable[[], None]  # raises `Dropped` if what is being done is no longer wanted
 
 _PATIENCE = 0.1  # [s], after which work that waits checks whether it is still wanted
+_SHARE = 0.2  # of the free memory that one computation may plan with: others hold their results
+_LEFT = 0.4  # of the memory that was free in the beginning: with less a computation ends
+_GLANCE = 0.2  # [s] between looks at the memory
 _KIND = "numba:compile"
 _REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
 
@@ -144,13 +147,6 @@ def return_memory_soon() -> None:
     _returned.submit(work)
 
 
-# Budget of one computation: a share of the free memory, and some seconds.
-
-_SHARE = 0.2  # of the free memory that one computation may plan with: others hold their results
-_LEFT = 0.4  # of the memory that was free in the beginning: with less a computation ends
-_PAUSE = 0.2  # [s] between looks at the memory
-
-
 class OverBudget(Exception):
     """A computation would need more than it may have; the text says of what."""
 
@@ -176,7 +172,7 @@ class Budget:
         if now > self._end:
             raise OverBudget(f"more than {self._seconds:g} s")
         if now >= self._next:
-            self._next = now + _PAUSE
+            self._next = now + _GLANCE
             if free_memory() < self._least:
                 raise OverBudget("more memory than is free")
             self._report(self._done)

@@ -157,8 +157,6 @@ class Scene:
         self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, "diamond")
         return coloring.key
 
-    # Surfaces.
-
     def draw_surface(self, reach: Reach | None, look: Appearance) -> BundleKey | ScalarKey | None:
         """The exact boundary, if it is shown, slow the first time; the key to its own colors."""
         if reach is None or not (look.surface and reach.has_surface):
@@ -207,8 +205,6 @@ class Scene:
         around = (cloud_points(source, 14) for source in clouds)
         straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
         self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm)
-
-    # Arms.
 
     @property
     def spine(self) -> tuple[Array, Array]:
