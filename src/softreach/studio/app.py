@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import suppress
-from typing import TYPE_CHECKING, Self
+from contextlib import AbstractContextManager, suppress
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,7 +27,7 @@ _GOES_ON = "This goes on where the last work on it ended; Reset leads back to th
 _PATIENCE = 3.0  # [s] for tabs that are closed
 
 
-class Studio:
+class Studio(AbstractContextManager):
     """A local page on a design; every tab has its own state."""
 
     def __init__(
@@ -91,9 +91,6 @@ class Studio:
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)
         serve.stop_server(self.server)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.stop()

@@ -40,6 +40,7 @@ _VALUES = 9  # of the parameter, beside that of the design
 _SECONDS = 10.0  # [s] for each volume
 PART = 0.01  # part of the range of a slider over which the change of the volume is told
 NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)  # room for a bar
+Swept = Iterator[tuple[float, float | None]]
 _FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
@@ -151,38 +152,34 @@ def swept_parameter(state: StudioState) -> ShownParameter | None:
     return sliders.get(state.appearance.swept) or next(iter(sliders.values()), None)
 
 
-def sweep_pictures(
-    arm: Manipulator, parameter: ShownParameter, quality: Quality
-) -> Iterator[Picture]:
+def sweep_pictures(arm: Manipulator, slider: ShownParameter, quality: Quality) -> Iterator[Picture]:
     """Volumes over the range of a slider, from the design's own value outwards, ever more."""
     unit, known = arm.length_unit, dict[float, float | None]()
-    for value, volume in swept_volumes(arm, parameter, quality):
+    for value, volume in swept_volumes(arm, slider, quality):
         known[value] = volume
         volumes = {each: known[each] for each in sorted(known) if known[each] is not None}
         ax = _axes(3.0)
         ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
-        ax.axvline(parameter.shown, color=_HERE, lw=1.2, ls="--")
-        ax.set(xlabel=parameter.label, ylabel=unit.label("V", 3), xlim=parameter.limits)
-        here, missing = volumes.get(parameter.shown), len(known) - len(volumes)
-        text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
+        ax.axvline(slider.shown, color=_HERE, lw=1.2, ls="--")
+        ax.set(xlabel=slider.label, ylabel=unit.label("V", 3), xlim=slider.limits)
+        here, missing = volumes.get(slider.shown), len(known) - len(volumes)
+        text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {slider.shown:g}"
         if missing:
             text += f" · {missing} values make no design or take too long"
         yield Picture(arm, _pixels(ax), text)
 
 
-def swept_volumes(
-    arm: Manipulator, parameter: ShownParameter, quality: Quality
-) -> Iterator[tuple[float, float | None]]:
+def swept_volumes(arm: Manipulator, slider: ShownParameter, quality: Quality) -> Swept:
     """Values of a slider, nearest to its own first, and volumes [m³]; None where none is known."""
-    low, high = parameter.limits
+    low, high = slider.limits
     even = np.linspace(low, high, _VALUES)
-    steps = np.clip(low + np.round((even - low) / parameter.step) * parameter.step, low, high)
-    values = {round(float(value), 9) for value in steps} | {parameter.shown}
-    for value in sorted(values, key=lambda value: abs(value - parameter.shown)):
+    steps = np.clip(low + np.round((even - low) / slider.step) * slider.step, low, high)
+    values = {round(float(value), 9) for value in steps} | {slider.shown}
+    for value in sorted(values, key=lambda value: abs(value - slider.shown)):
         check_wanted()
         volume = None
         with suppress(SoftreachError, OverBudget, MemoryError):
-            design = changed(arm, {parameter.name: value * parameter.scale})
+            design = changed(arm, {slider.name: value * slider.scale})
             volume = _volume(design, quality.coarse_accuracy, quality.tol)
         yield value, volume
 

@@ -31,22 +31,17 @@ class Found:
 
     reach: Reach | None = None  # of the design
     refusal: str = ""  # reason why nothing can be computed of the design
-    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Ends of the sliders of a design, by the names of their parameters."""
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of its sliders, by name
     slopes: VolumeSlopes | None = None  # change of its volume by each slider
     free: Reach | None = None  # reach of a loaded design without its loads
     reference: Reach | None = None  # reach of the design that is kept
     key: BundleKey | ScalarKey | None = None  # to the colors of cloud or surface
-    tip: Array | None = None
-    """Place of the tip [L]; None before it is known, and without equilibrium."""
+    tip: Array | None = None  # its place [L]; None before it is known, and without equilibrium
     pointing: Array = field(default_factory=lambda: np.full(3, np.nan))  # direction d3 of the tip
-    posture: TipStatus | None = None
-    """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
+    posture: TipStatus | None = None  # of a loaded arm in its activation; None without loads
     answer: Solution | None = None  # every activation that reaches the target
-    takes_nearest: bool = False
-    """True if the arm moves to the nearest of them, as after a click or a typed target."""
-    pull: Pull | None = None
-    """The latest order of a person who drags the tip; None once it is followed to its end."""
+    takes_nearest: bool = False  # true if the arm moves to the nearest of them, as after a click
+    pull: Pull | None = None  # latest order of who drags the tip; None once it is followed
     drag: Drag | None = None  # what follows a dragged tip of the design
     lag: Lag | None = None  # how far the arm lags behind the pointer; None when nobody drags
     held: tuple[Manipulator, Dragged] | None = None  # an arm, and how the last drag left it

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -71,31 +71,25 @@ class Job:
     draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
     """Draws what is known after each result, and takes away what is not; returns what follows only
     from drawing, as fields of `Found`."""
-    wanted: str = ""
-    """Attribute that is false where it is of no use; it is done once more when that begins."""
-    makes: str = ""
-    """Fields of `Found`, beside that of its name, that are forgotten where the work fails."""
+    wanted: str = ""  # attribute that is false where it is of no use: once more when that begins
+    makes: str = ""  # fields of `Found`, beside that of its name, that are forgotten where it fails
     draws: str = ""  # nodes of the scene, beside that of its name, that are taken away then
     at_once: bool = True
     """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
     that what computes while it draws is sent piece by piece."""
     doing: str = ""  # what the reader is shown meanwhile
 
-    @cached_property
-    def _deciding(self) -> Callable[[Known], tuple[Any, ...]]:
-        return attrgetter("__class__", *map(in_session, self.depends_on.split()))
-
-    @cached_property
-    def is_wanted(self) -> Callable[[Known], bool]:
+    def is_wanted(self, known: Known) -> bool:
         """True if its result is of use."""
-        return attrgetter(in_session(self.wanted)) if self.wanted else lambda _: True
+        return not self.wanted or bool(attrgetter(in_session(self.wanted))(known))
 
     def is_stale(self, old: Known, new: Known) -> bool:
         """True if a change decides another result: of what is known, any other object."""
-        was, wanted = bool(self.is_wanted(old)), bool(self.is_wanted(new))
+        was, wanted = self.is_wanted(old), self.is_wanted(new)
         if not (was and wanted):
             return was != wanted
-        pairs = zip(self._deciding(old), self._deciding(new), strict=True)
+        read = attrgetter("__class__", *map(in_session, self.depends_on.split()))
+        pairs = zip(read(old), read(new), strict=True)
         return any(a is not b and (isinstance(b, np.ndarray) or bool(a != b)) for a, b in pairs)
 
 

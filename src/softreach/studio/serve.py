@@ -51,13 +51,7 @@ _POLICY = {
 
 
 def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
-    """Start serving the page; no port is for a free one, no token for pages that know none.
-
-    Raises:
-        InvalidInput: The port is none or taken, the host is none or not this machine's, or viser
-            is a version whose requests cannot be checked.
-        MissingExtra: viser is not installed.
-    """
+    """Start serving the page; no port is for a free one, no token for pages that know none."""
     check_installed("viser")
     import viser
 

@@ -76,12 +76,6 @@ def write_static(
 
     The folder gets `index.html` and a folder of designs. Lengths are in a unit, by default that of
     the design file; `progress` is called with the number of designs done.
-
-    Raises:
-        InvalidInput: No grid, too many designs, no design that reaches anything, or other files
-            in the way.
-        NotWritten: Nothing can be written there.
-        MissingExtra: matplotlib or scikit-image is not installed.
     """
     check_installed("matplotlib", "skimage")
     place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)

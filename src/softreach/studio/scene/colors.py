@@ -41,11 +41,8 @@ def color_names(arm: Manipulator) -> dict[str, str]:
         names["strongest"] = "strongest bundle"
     labels = zip(input_symbols(arm), box.names, strict=True)
     names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
-    names["manipulability"] = "manipulability"
-    names["activation distance"] = "activation distance D̄"
-    if box.dimension == 3:
-        names["multiplicity"] = "multiplicity"
-    return names
+    names |= {"manipulability": "manipulability", "activation distance": "activation distance D̄"}
+    return names | ({"multiplicity": "multiplicity"} if box.dimension == 3 else {})
 
 
 def shown_color(arm: Manipulator, color: str) -> str:

@@ -201,8 +201,7 @@ class Scene:
 
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
-        clouds = [reach] if free is None else [reach, free]
-        around = (cloud_points(source, 14) for source in clouds)
+        around = [cloud_points(each, 14) for each in (reach, free) if each is not None]
         straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
         self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm)
 

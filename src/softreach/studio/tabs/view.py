@@ -91,11 +91,9 @@ def _numbers(session: Session, found: Found) -> str:
     above = [_reach_line(session), [verdict_text(check)] if check is not None else []]
     below: list[list[Part]] = []
     if reach is not None:
-        below.append(legend_text(reach, free=found.free is not None))
-        if reach.refusal:
-            below.append([f"No exact volume: {reach.refusal}"])
-        if reach.fine and reach.notes:
-            below.append([f"{'; '.join(reach.notes)}."])
+        refusal: list[Part] = [f"No exact volume: {reach.refusal}"] * bool(reach.refusal)
+        notes: list[Part] = [f"{'; '.join(reach.notes)}."] * bool(reach.fine and reach.notes)
+        below = [legend_text(reach, free=found.free is not None), refusal, notes]
     lines = lambda lines: [markup.paragraph(*line) for line in lines]
     return markup.status(*lines(above), key_html(found.key), *lines(below))
 
