@@ -54,10 +54,8 @@ def attribute(path: str) -> Attribute:
 
 def of_design(read: Callable[[Any], Any], write: Callable[[Any, Any], Any]) -> Attribute:
     """A value of the design, and the design with another one."""
-    return Attribute(
-        lambda state: read(state.design),
-        lambda state, value: state.replace(design=write(state.design, value)),
-    )
+    made = lambda state, value: state.replace(design=write(state.design, value))
+    return Attribute(lambda state: read(state.design), made)
 
 
 class Fields:

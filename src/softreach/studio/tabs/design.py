@@ -46,23 +46,16 @@ _ABOUT_MADE_OF = (
 )
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
-_WAYS = {name: name for name in POINTS} | {
-    "up": "up (upright)",
-    "down": "down (hanging)",
-    "": "as the file says",
-}
+_WAYS = {name: name for name in POINTS} | {"up": "up (upright)", "down": "down (hanging)"}
+_WAYS[""] = "as the file says"
 _NONE = Loads(gravity=GRAVITIES["none"])
 _MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
 _SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
+_LEVER = "From the tip to the center of the payload's mass, as x, y, z in the tip's directors"
 _LOADS = {
     "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
     "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
-    "payload_arm": (
-        "lever arm",
-        "",
-        0.0,
-        "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
-    ),
+    "payload_arm": ("lever arm", "", 0.0, _LEVER),
     "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
 }
 """Loads that are typed: field -> label, unit ("" for that of lengths), its size, and meaning."""
@@ -73,11 +66,9 @@ def design(panel: Fields) -> None:
     _numbers(panel, "design", slider_parameters, _sliders)
     _numbers(panel, "body", body_numbers, _typed)
     names = {"": "this design"} | {name: name for name in designs.__all__}
-    named = Attribute(
-        lambda state: next((name for name, arm in _designs().items() if arm == state.design), ""),
-        lambda state, name: state.replace(design=_designs()[name]) if name else state,
-    )
-    panel.dropdown("start from", names, named, _ABOUT_START)
+    read = lambda state: next((name for name, arm in _designs().items() if arm == state.design), "")
+    write = lambda state, name: state.replace(design=_designs()[name]) if name else state
+    panel.dropdown("start from", names, Attribute(read, write), _ABOUT_START)
 
 
 def _numbers(panel: Fields, label: str, shown: Numbers, build: Build) -> None:
@@ -193,11 +184,8 @@ def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, 
 
 def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     session, part, labels = panel.session, known[label], tuple(known)
-    chosen = Attribute(
-        lambda found: min(found.part, len(labels) - 1),
-        lambda found, number: replace(found, part=number),
-        "found",
-    )
+    read = lambda found: min(found.part, len(labels) - 1)
+    chosen = Attribute(read, lambda found, number: replace(found, part=number), "found")
     hint = "The part whose numbers are below"
     panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
     own = part.ring is not None or bool(part.actuator)
@@ -215,21 +203,17 @@ def _add_matter(panel: Fields, part: Part) -> None:
     """What a ring is made of, and the ring that an actuator is in."""
     ring, arm = part.ring, panel.session.state.design
     if ring is not None:
-        of_ring = of_design(
-            lambda arm: arm.section.rings[ring].material.name,
-            lambda arm, name: part.changed(arm, material=name) if name else arm,
-        )
-        _material(panel, "material", _AS_TYPED, of_ring)
+        read = lambda arm: arm.section.rings[ring].material.name
+        write = lambda arm, name: part.changed(arm, material=name) if name else arm
+        _material(panel, "material", _AS_TYPED, of_design(read, write))
     if ring == 0:
         core = lambda arm: arm.section.core.name if arm.section.core else ""
         _material(panel, "core", _AS_INNERMOST, of_design(core, edits.with_core))
     if part.home is not None and len(arm.section.rings) > 1:
         rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}
         home = lambda arm: next(p.home for p in parts(arm).values() if p.actuator == part.actuator)
-        at = of_design(
-            lambda arm: arm.section.rings.index(arm.section.ring(home(arm) or 0)),
-            lambda arm, ring: part.changed(arm, ring=ring),
-        )
+        read = lambda arm: arm.section.rings.index(arm.section.ring(home(arm) or 0))
+        at = of_design(read, lambda arm, ring: part.changed(arm, ring=ring))
         panel.dropdown("in ring", rings, at, "The ring that it lies in")
 
 
@@ -247,12 +231,10 @@ def loads(panel: Fields) -> None:
 
 
 def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
-    points = of_design(
-        lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
-        lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
-    )
+    read = lambda arm: arm.base.points if isinstance(arm.base.points, str) else ""
+    write = lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm
     way = "Which way the straight arm points from its base, in the world"
-    panel.dropdown("base", _WAYS, points, way)
+    panel.dropdown("base", _WAYS, of_design(read, write), way)
     where = "r(0): where the arm is clamped, as x, y, z in the world"
     panel.typed(unit.label("base at"), base_field("position"), where, vector_kind)
     turn = "ψ: turn of the base about the way the arm points"
@@ -309,10 +291,9 @@ def gravity_name(state: StudioState) -> str:
 def base_field(name: str) -> Attribute:
     """Position in the unit of lengths that are typed, or turn in degrees."""
     scale = lambda arm: math.radians(1.0) if name == "turn" else typed_unit(arm).size
-    return of_design(
-        lambda arm: _over(getattr(arm.base, name), scale(arm)),
-        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale(arm))})),
-    )
+    read = lambda arm: _over(getattr(arm.base, name), scale(arm))
+    moved = lambda arm, value: arm.base.replace(**{name: _times(value, scale(arm))})
+    return of_design(read, lambda arm, value: arm.replace(base=moved(arm, value)))
 
 
 def load_field(name: str) -> Attribute:

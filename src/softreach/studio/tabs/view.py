@@ -42,16 +42,14 @@ _PLOTS_HINT = (
     "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
     "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
 )
+_ABOUT_SWEEP = "Volume of designs that differ from this one in one parameter, computed as you look"
 _PLOTS = {
     "section": (
         "section",
         "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
         "boundary, and how many activations reach each place",
     ),
-    "sweep": (
-        "V against parameter",
-        "Volume of designs that differ from this one in one parameter, computed as you look",
-    ),
+    "sweep": ("V against parameter", _ABOUT_SWEEP),
 }
 _WIDTH = 380  # pixels
 _NOTHING = np.zeros((1, 1, 4), np.uint8)
@@ -123,10 +121,8 @@ def _work(session: Session) -> str:
 def view(panel: Fields) -> None:
     """Fields of the appearance."""
     offered = lambda state: color_names(state.design)
-    color = Attribute(
-        lambda state: shown_color(state.design, state.appearance.color),
-        lambda state, name: state.showing(color=name),
-    )
+    colored = lambda state, name: state.showing(color=name)
+    color = Attribute(lambda state: shown_color(state.design, state.appearance.color), colored)
     about = "What the color of a point says; the key is above the tabs"
     panel.dropdown("color by", offered, color, about)
     named = lambda state, name: state.showing(unit=name)
@@ -150,10 +146,8 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     """The middle of the slab, in the unit of the design."""
     (unit, length), center = size, attribute("appearance.slice.center")
     over = length / unit.size
-    at = Attribute(
-        lambda state: float(f"{over * center.read(state):.9g}"),
-        lambda state, value: center.write(state, value / over),
-    )
+    read = lambda state: float(f"{over * center.read(state):.9g}")
+    at = Attribute(read, lambda state, value: center.write(state, value / over))
     ends = -1.5 * over, 1.5 * over
     panel.slider(unit.label("center"), ends, 0.01 * over, at, "Middle of the slab along the axis")
 
@@ -165,10 +159,8 @@ def plots(panel: Fields) -> None:
         panel.checkbox(label, attribute(f"appearance.{name}"), hint)
     about = "What changes in the plot of V against a parameter"
     offered = lambda state: {s.name: s.label for s in slider_parameters(state.design)} or {"": ""}
-    swept = Attribute(
-        lambda state: one.name if (one := swept_parameter(state)) is not None else "",
-        lambda state, name: state.showing(sweep=True, swept=name),
-    )
+    read = lambda state: one.name if (one := swept_parameter(state)) is not None else ""
+    swept = Attribute(read, lambda state, name: state.showing(sweep=True, swept=name))
     panel.dropdown("parameter", offered, swept, about)
     window = panel.gui.add_panel(visible=False)
 
