@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
 _LINE, _HERE = "#2f6db5", "#d9731a"
 _INK = "#7d848b"  # legible on white and on black

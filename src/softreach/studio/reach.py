@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 Report = Callable[[str], object]  # shows the reader what is being done
 _quiet: Report = lambda doing: None
-
 _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
 _LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
 _PILOT = 512  # samples, by which the cost of one is measured

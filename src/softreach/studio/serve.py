@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 LOOPBACK, LOCAL = "127.0.0.1", ("localhost", "127.0.0.1", "::1")
 ANYWHERE = ("0.0.0.0", "::")
-
 _LAST_PORT = 65535
 _COOKIE = "softreach_token"
 _NO_TOKEN = "The address lacks the token that softreach printed with it.\n"

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from softreach.studio.work import CompilationWatch
 
 Change = Callable[[StudioState], StudioState]
-
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 _REST = 0.5  # [s] without changes, after which the state is kept
 

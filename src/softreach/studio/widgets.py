@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from viser import GuiApi
 
 Ends = tuple[float, float]
-
 _PRECISION = 12  # digits after the point that viser leaves of what a slider holds
 _UNAPPLIED = "Enter applies it."
 _UNIT_IN = re.compile(r"\[([^\]]+)\]$| / (L)$")

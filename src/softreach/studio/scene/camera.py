@@ -19,7 +19,6 @@ from softreach.support.units import in_lengths
 if TYPE_CHECKING:
     from viser import ClientHandle, SceneApi
 
-
 FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
 FINER = 2  # pixels of a saved picture for each of the page, along each side
 VIEWS: dict[str, Array] = {

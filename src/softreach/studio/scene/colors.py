@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 
 FAINT = (196, 198, 206)  # gray, of the cloud without loads
-
 _MOST_COUNTS = 8  # numbers of activations that the key tells apart
 _PERCENTILES = (1.0, 99.0)  # beyond which values look like the next ones
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
