@@ -27,7 +27,7 @@ _GOES_ON = "This goes on where the last work on it ended; Reset leads back to th
 _PATIENCE = 3.0  # [s] for tabs that are closed
 
 
-class Studio(AbstractContextManager):
+class Studio(AbstractContextManager["Studio"]):
     """A local page on a design; every tab has its own state."""
 
     def __init__(

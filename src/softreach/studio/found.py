@@ -36,7 +36,7 @@ class Found:
     free: Reach | None = None  # reach of a loaded design without its loads
     reference: Reach | None = None  # reach of the design that is kept
     key: BundleKey | ScalarKey | None = None  # to the colors of cloud or surface
-    tip: Array | None = None  # its place [L]; None before it is known, and without equilibrium
+    tip: Array | None = None  # its place [L]; None before it is known, and without an equilibrium
     pointing: Array = field(default_factory=lambda: np.full(3, np.nan))  # direction d3 of the tip
     posture: TipStatus | None = None  # of a loaded arm in its activation; None without loads
     answer: Solution | None = None  # every activation that reaches the target

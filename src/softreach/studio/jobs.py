@@ -71,7 +71,7 @@ class Job:
     draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
     """Draws what is known after each result, and takes away what is not; returns what follows only
     from drawing, as fields of `Found`."""
-    wanted: str = ""  # attribute that is false where it is of no use: once more when that begins
+    wanted: str = ""  # attribute that is false where it is of no use; it is done once more then
     makes: str = ""  # fields of `Found`, beside that of its name, that are forgotten where it fails
     draws: str = ""  # nodes of the scene, beside that of its name, that are taken away then
     at_once: bool = True

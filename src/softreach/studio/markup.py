@@ -58,7 +58,7 @@ def alert(text: str) -> str:
 
 
 def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
-    """A bar as HTML, to the right for positive shares of half of its track; with its meaning."""
+    """A bar as HTML, as long as its share of half of the track, to the right if positive."""
     side, meaning = ("left" if share > 0 else "right"), html.escape(meaning)
     return (
         f'<div role="img" class="sr-bar" title="{meaning}" aria-label="{inline(text)}: {meaning}" '

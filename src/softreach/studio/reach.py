@@ -295,7 +295,7 @@ def _seconds_each(rod: TipMap) -> float:
 def count_activations(
     reach: Reach, rows: Index, check: StaleCheck = lambda: None, report: Report = _quiet
 ) -> Array:
-    """Stable activations that reach each sample of three free bundles, shape (n,); kept."""
+    """Number of stable activations that reach each sample, shape (n,), kept with the reach."""
     # by the inverse: the grid of the exact set is wrong near folds, where half of the samples are
     from softreach.inverse import solve_inverse
 

@@ -139,7 +139,7 @@ def page_headers(host: str) -> dict[str, str]:
 
 @contextmanager
 def guarding(host: str, token: str) -> Iterator[list[Any]]:
-    """A server that starts in the block checks each request; yields those that took the checks."""
+    """Servers that start in the block check each request; yields those that do."""
     import websockets.asyncio.server as sockets
 
     plain, guarded = sockets.serve, list[Any]()

@@ -176,7 +176,7 @@ def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
 
 
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
-    """True if a ball, (n, 3) and (n,) [L], hides a point, other than those that touch it."""
+    """True if one of the balls, (n, 3) and (n,) [L], hides a point that it does not touch."""
     distance = float(np.linalg.norm(point - camera))
     ahead, aside = _beside(centers, camera, (point - camera) / distance)
     return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
@@ -197,7 +197,7 @@ def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
 
 
 def picked_point(points: Array, origin: ArrayLike, direction: ArrayLike) -> int | None:
-    """Number of the point, shape (n, 3), that a ray hits nearest to the camera; None for none."""
+    """Number of the first of the points (n, 3) that a ray from the camera hits, if any."""
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     depth, aside = _beside(points, np.asarray(origin, float), direction)
     with np.errstate(divide="ignore", invalid="ignore"):

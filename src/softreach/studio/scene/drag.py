@@ -35,7 +35,7 @@ class DragBall:
         self._nodes: tuple[Any, Any] | None = None
 
     def move(self, tip: Array | None, radius: float, *, dark: bool, clear: bool) -> None:
-        """Put the ball on the tip, around an arm of this radius [L], or hide it; some are clear."""
+        """Put the ball on the tip of an arm of this radius [L], clear or not, or hide it."""
         if self._nodes is None and tip is not None:
             self._nodes = self._drawn(tip)
         if self._nodes is None:
@@ -79,7 +79,7 @@ class DragBall:
         return halo, ball
 
     def _grip(self, node: Any, halo: Any, place: Callable[[Array, Array], Array]) -> None:
-        """Let a node be dragged: the ball goes as far as a place by where it began and is seen."""
+        """Let a node be dragged: the ball moves as the place of its begin and what is seen."""
         begin, pressed = np.zeros(3), np.zeros(3)
 
         @node.on_drag("left")

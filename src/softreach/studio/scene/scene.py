@@ -116,7 +116,7 @@ class Scene:
     def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
-        Of each cloud the first `most` points are drawn; nothing is sent of one that keeps its own.
+        Of each cloud the first `most` points are drawn; one whose points stay is not sent again.
         """
         is_thin = most is not None and most == self._most
         self._ahead, self._base, self._most = ahead, base, most
@@ -212,7 +212,7 @@ class Scene:
         return (np.empty((0, 3)), np.empty(0)) if drawn is None else (drawn.centers, drawn.radii)
 
     def ghost_under(self, origin: Array, direction: Array) -> int | None:
-        """Number of the ghost that a ray meets before others and the arm; near tips, of none."""
+        """Number of the ghost that a ray meets before others and the arm, away from their tips."""
         met = []
         for path, ghost in list(self._arms.items()):
             if path.startswith("/ghosts"):

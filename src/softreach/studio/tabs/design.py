@@ -147,9 +147,9 @@ def arm_parts(panel: Fields) -> None:
 
         def add() -> None:
             before, is_ring, matter = session.state.design, kind.value == _NEW_RING, made_of.value
-            of_it = lambda arm: arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
-            more = edits.with_ring if is_ring else lambda arm: edits.with_actuator(arm, kind.value)
-            panel.apply(lambda state: state.replace(design=more(of_it(state.design))))
+            made = lambda arm: arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
+            grown = edits.with_ring if is_ring else lambda arm: edits.with_actuator(arm, kind.value)
+            panel.apply(lambda state: state.replace(design=grown(made(state.design))))
             if session.state.design != before:
                 known = _listed(session.state.design).values()
                 like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
