@@ -37,8 +37,6 @@ CHEAP = """
     });
 """
 """Seven pictures a second, with jagged edges and nothing that glides: there is no graphics card."""
-
-
 FLASH = """
     window.flashed = false;
     (function look() {
@@ -49,8 +47,6 @@ FLASH = """
     })();
 """
 """Notes whether a panel was seen before ours."""
-
-
 SCROLLED_UP = """
     for (const area of document.querySelectorAll(".mantine-ScrollArea-viewport")) {
         area.scrollTop = 0;
@@ -257,6 +253,20 @@ class Tab:
         canvas = self.page.locator("canvas").first.bounding_box()
         right, down = self.projected(point)
         return canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
+
+    def labels(self) -> list:
+        """Numbers and names along the axes of the scene."""
+        known = [self.drawn(f"/axes/label {k}") for k in range(60)]
+        return [label for label in known if label is not None]
+
+    def drag_tip(self, begin: np.ndarray, end: np.ndarray) -> None:
+        """Grab the ball at a point [L] and pull it to another; the button stays down."""
+        self.page.mouse.move(*self.screen(begin))
+        self.page.wait_for_timeout(100)
+        self.page.mouse.down()
+        for part in np.linspace(0, 1, 13)[1:]:
+            self.page.mouse.move(*self.screen(begin + part * (end - begin)))
+            self.page.wait_for_timeout(30)
 
     def click_at(self, point: np.ndarray) -> None:
         """Click where a point of the scene [L] appears."""

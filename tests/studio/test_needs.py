@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -13,23 +12,15 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
-from softreach.studio import Studio
 from softreach.studio.session import Session
 from softreach.studio.state import requirements_of
 from softreach.studio.tabs import click, goals
 from softreach.support.errors import SoftreachError
-from tests.studio.sockets import page
 
 ARM = designs.minimal_trunk(length=0.4)
 POSE = (-0.7, -0.4, -0.9)
 REACHED = tip_positions(ARM, [POSE])[0]
 FAR = (0.3, 0.1, 0.42)
-
-
-@pytest.fixture(scope="module")
-def opened(studio: Studio) -> Iterator[Session]:
-    with page(studio) as session:
-        yield session
 
 
 @pytest.fixture

@@ -26,18 +26,6 @@ def opened(tab):
     return opened
 
 
-def in_canvas(tab, points) -> np.ndarray:
-    """Places of points [L] in the page, pixels to the right and down, shape (n, 2)."""
-    canvas = tab.page.locator("canvas").first.bounding_box()
-    places = np.array([tab.projected(np.asarray(point)) for point in points])
-    return places * (canvas["width"], canvas["height"]) + (canvas["x"], canvas["y"])
-
-
-def labels(tab) -> list:
-    found = [tab.drawn(f"/axes/label {k}") for k in range(60)]
-    return [label for label in found if label is not None]
-
-
 @pytest.mark.large
 @pytest.mark.parametrize("kind", [pytest.param("laptop", marks=pytest.mark.large), "phone"])
 def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
@@ -62,7 +50,7 @@ def test_the_arm_is_in_sight_above_the_sheet_of_a_phone(opened):
     tab = opened("phone")
     tab.settle()
     sheet = tab.page.locator(SHEET).bounding_box()["y"]
-    places = in_canvas(tab, [np.zeros(3), np.array([0, 0, 1.0])])
+    places = np.array([tab.screen(point) for point in (np.zeros(3), np.array([0, 0, 1.0]))])
     assert (places > 0).all()
     assert (places < (390, sheet)).all()
 
@@ -160,8 +148,8 @@ def test_arm_and_numbers_stay_in_sight_where_the_scene_gets_narrow_and_wide_agai
 
     def in_sight() -> bool:
         canvas = tab.page.locator("canvas").first.bounding_box()
-        points = [(0, 0, 0), (0, 0, 1.0), *(one.position for one in labels(tab))]
-        right = in_canvas(tab, points)[:, 0] - canvas["x"]
+        points = [(0, 0, 0), (0, 0, 1.0), *(one.position for one in tab.labels())]
+        right = np.array([tab.projected(np.array(point))[0] for point in points]) * canvas["width"]
         return canvas["width"] < wide and bool(((right > 0) & (right < canvas["width"])).all())
 
     narrow(True)
