@@ -168,14 +168,10 @@ def test_forces_and_moduli_have_sliders_of_their_size():
     assert "[N]" in next(one.label for name, one in found.items() if name.endswith("upper"))
 
 
-def test_what_a_design_leaves_open_has_no_slider(trunk):
+def test_sliders_of_a_design_are_made_once_and_none_of_what_it_leaves_open(trunk):
+    same = changed(trunk, {"taper": find_parameter(trunk, "taper").value(trunk)})
+    assert slider_parameters(trunk) is slider_parameters(same)
     assert not [control for control in slider_parameters(trunk) if "modulus" in control.name]
-
-
-def test_sliders_of_a_design_are_made_once(trunk):
-    assert slider_parameters(trunk) is slider_parameters(
-        changed(trunk, {"taper": find_parameter(trunk, "taper").value(trunk)})
-    )
 
 
 @pytest.mark.parametrize("design", designs.__all__)

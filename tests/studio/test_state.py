@@ -140,11 +140,8 @@ def test_steps_back_and_forth_lead_through_every_state():
     for following in STEPS[1:]:
         history, state = history.step(state, back=False)
         assert state == following
-
-
-@pytest.mark.parametrize("back", [True, False])
-def test_where_there_is_nothing_to_go_to_the_state_stays(back):
-    assert History().step(START, back=back) == (History(), START)
+    for back in (True, False):  # where there is nothing to go to
+        assert History().step(START, back=back) == (History(), START)
 
 
 def test_a_change_after_a_step_back_forgets_what_was_undone():
@@ -154,10 +151,13 @@ def test_a_change_after_a_step_back_forgets_what_was_undone():
     assert history.step(posed(state, -0.1), back=True)[1] == state
 
 
-def test_changes_of_one_kind_in_short_order_are_one_step():
+def test_changes_in_short_order_are_one_step_if_they_are_of_one_kind():
     states = [START, *(tapered(START, 0.001 * k) for k in range(1, 6))]
     history = walked(states, times=[0.1 * k for k in range(5)])
     assert history.step(states[-1], back=True)[1] == START
+    states = [START, tapered(START, 0.01), posed(tapered(START, 0.01), -0.5)]
+    history = walked(states, times=[0.0, 0.1])
+    assert history.step(states[-1], back=True)[1] == states[1]
 
 
 def test_a_change_that_does_not_go_on_is_a_step_of_its_own():
@@ -170,12 +170,6 @@ def test_a_change_that_does_not_go_on_is_a_step_of_its_own():
     assert before(history, goes_on=False) == one
     assert before(history, goes_on=True) == START
     assert before(replace(history, kind=""), goes_on=True) == one
-
-
-def test_changes_of_different_kinds_are_steps_of_their_own():
-    states = [START, tapered(START, 0.01), posed(tapered(START, 0.01), -0.5)]
-    history = walked(states, times=[0.0, 0.1])
-    assert history.step(states[-1], back=True)[1] == states[1]
 
 
 def test_the_view_is_not_undone():
