@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -72,6 +73,7 @@ class Known(NamedTuple):
     found: Found
 
 
+@cache
 def in_session(path: str) -> str:
     """Place of "design" of a state, "found.tip" of what is known or "tab.busy" in a session."""
     root, _, rest = path.partition(".")
