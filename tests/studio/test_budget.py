@@ -182,18 +182,16 @@ def share_of(html: str) -> float:
 
 def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
     sliders = {each.name: (each, each.high - each.low) for each in slider_parameters(trunk)}
-    found = VolumeSlopes(
-        trunk, 0.7, {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
-    )
+    slopes = {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
+    found = VolumeSlopes(trunk, 0.7, slopes)
     bars = slope_bars(found, sliders, old=False)
     assert list(bars) == [name for name in sliders if name in found.slopes]
     changes = {name: found.slopes[name].value * sliders[name][1] for name in bars}
     shares = {name: share_of(html) for name, html in bars.items()}
     most = max(map(abs, changes.values()))
     assert max(map(abs, shares.values())) == 1
-    np.testing.assert_allclose(
-        list(shares.values()), [change / most for change in changes.values()], atol=1e-3
-    )
+    wanted = [change / most for change in changes.values()]
+    np.testing.assert_allclose(list(shares.values()), wanted, atol=1e-3)
     assert "\N{MINUS SIGN}1.00 ± 0.01 %" in bars["taper"]  # of V for 0.07 of its 7 degrees
     assert "∂V/∂(taper) = -0.100 ± 0.001 m³ per deg" in bars["taper"]
     assert "0.07 deg" in bars["taper"]

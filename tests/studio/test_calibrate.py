@@ -39,9 +39,8 @@ def shown(session, number=0, inputs=INPUTS) -> None:
         name.removesuffix("_N"): values.tolist()
         for name, values in table(PLACES, inputs, NAMES, MARKERS).items()
     }
-    bench = Bench(
-        data=read_measurements(ARM, columns), arm=ARM, number=number, free=("pose", "taper")
-    )
+    data = read_measurements(ARM, columns)
+    bench = Bench(data=data, arm=ARM, number=number, free=("pose", "taper"))
     session.update(bench.posed)
     session.learn({"bench": bench})
     session.settle()

@@ -89,16 +89,10 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
     added(session, "box to stay inside")
     added(session, "box to avoid", "-20, -20, 90, 20, 20, 140")
     inside, avoid = drawn(session, "/region 0"), drawn(session, "/region 1")
-    np.testing.assert_allclose(
-        [inside.points.min(axis=(0, 1)), inside.points.max(axis=(0, 1))],
-        session.scene.axes.corners,
-        atol=1e-5,
-    )
-    broken = [
-        tuple(np.asarray(node.colors).ravel()[:3]) == goals.VERDICTS["missed"]
-        for node in (inside, avoid)
-    ]
-    assert broken == [False, True]
+    corners = inside.points.min(axis=(0, 1)), inside.points.max(axis=(0, 1))
+    np.testing.assert_allclose(corners, session.scene.axes.corners, atol=1e-5)
+    colors = [tuple(np.asarray(node.colors).ravel()[:3]) for node in (inside, avoid)]
+    assert [color == goals.VERDICTS["missed"] for color in colors] == [False, True]
     assert "the arm keeps" in verdict(session)
     assert "inside or too near" in verdict(session)
 

@@ -193,9 +193,8 @@ def test_a_surface_is_read_back_from_its_file():
     scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
     surface, lines = scene.geometry.values()
     np.testing.assert_allclose(surface.vertices, vertices)
-    np.testing.assert_array_equal(
-        surface.visual.vertex_attributes["color"][0], (255, 255, 255, 128)
-    )
+    color = surface.visual.vertex_attributes["color"][0]
+    np.testing.assert_array_equal(color, (255, 255, 255, 128))
     np.testing.assert_allclose(lines.vertices, vertices[:2])
 
 

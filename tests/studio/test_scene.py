@@ -72,10 +72,8 @@ def test_a_path_ends_in_a_ball_where_the_arm_follows_it_no_further():
 
     def drawn(followed: int) -> dict:
         status = np.where(np.arange(11) < followed, PathStatus.FOLLOWED, PathStatus.FOLD)
-        values = {
-            "status": ("point", status),
-            "activation": (("point", "bundle"), np.zeros((11, 3))),
-        }
+        activation = ("point", "bundle"), np.zeros((11, 3))
+        values = {"status": ("point", status), "activation": activation}
         track = xr.Dataset(values | {"end_position": ("axis", end)})
         job.draw(SimpleNamespace(state=state, found=Found(track=track), scene=Scene(meshes)))
         return meshes.added
@@ -102,9 +100,9 @@ def test_numbers_along_the_axes_are_places_in_the_unit_of_the_design(unit, size)
     for label in labels:
         if label.text[0] in "xyz":
             axis += 1
-            continue
-        number = float(label.text.replace("\N{MINUS SIGN}", "-"))
-        assert number * size == pytest.approx(label.position[axis] * arm.length, abs=1e-12)
+        else:
+            number = float(label.text.replace("\N{MINUS SIGN}", "-"))
+            assert number * size == pytest.approx(label.position[axis] * arm.length, abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", MADE_ARMS)
@@ -123,8 +121,7 @@ def test_every_kind_of_arm_is_drawn_and_moves(kind):
 
 def test_a_body_is_clear_only_where_it_hides_a_bundle():
     def opacity(kind):
-        meshes = Meshes()
-        arm = MADE_ARMS[kind]()
+        meshes, arm = Meshes(), MADE_ARMS[kind]()
         Scene(meshes).draw_arm(arm, np.zeros(arm.bundles).tolist())
         return [meshes.added[path].opacity for path in sorted(meshes.added)]
 

@@ -161,14 +161,11 @@ def test_kept_work_that_is_none_of_ours_is_named_in_one_line(text, tmp_path):
     assert len(work.complaint.splitlines()) == 1
 
 
-def test_work_is_found_again(tmp_path):
+def test_work_is_found_again_and_a_folder_that_cannot_be_written_is_named(tmp_path):
     work = KeptWork(tmp_path / "new")
     work.keep(STATE.replace(activation=(-0.5, 0.0, 0.0)))
     assert KeptWork(tmp_path / "new").latest == work.latest
     assert KeptWork(tmp_path / "new", goes_on=False).latest is None
-
-
-def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     work = KeptWork(tmp_path / "file" / "below")
     work.keep(STATE)
