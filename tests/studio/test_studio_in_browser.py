@@ -92,6 +92,9 @@ def test_what_is_typed_may_have_a_unit_lie_beyond_the_slider_or_be_refused_below
     is_shown("90")
     tab.wait(lambda: alerts.count() == 0, "what was refused is given up")
     page.locator("input[value='2']").locator("visible=true").first.wait_for()
+    tab.open("Parts")
+    tab.type("name", "renamed")  # which makes the fields of the part anew
+    assert tab.session.note == ""
 
 
 def test_a_slider_follows_others_but_is_not_set_back_while_it_is_in_the_hand(tab):

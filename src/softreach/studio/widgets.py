@@ -40,7 +40,8 @@ class Line:
 
     def show(self, content: str) -> None:
         """Show what `markup` made."""
-        self._widget.content, self._widget.visible = content, bool(content)
+        if (self._widget.content, self._widget.visible) != (content, bool(content)):
+            self._widget.content, self._widget.visible = content, bool(content)
 
     def remove(self) -> None:
         """Take the line away."""
@@ -175,8 +176,9 @@ class TypedField:
             self._value = value
             self.warn("")
         self._apply(event)
-        if not self._is_refused and None in map(number_of, _parts(text)):  # it has units
-            self._text.value = self._kind.text(self._value)
+        has_units, plain = None in map(number_of, _parts(text)), self._kind.text(self._value)
+        if has_units and not self._is_refused and text != plain:
+            self._text.value = plain
 
     def _apply(self, event: Any) -> None:
         self._follow()

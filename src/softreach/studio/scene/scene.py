@@ -111,8 +111,6 @@ class Scene:
         """A ball at a place, with a radius [L]."""
         self.api.add_icosphere(path, radius, color, position=place)
 
-    # Clouds, of which the half in front of the arm is cut away.
-
     def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
@@ -284,7 +282,8 @@ class Scene:
         if (drawn := self._arms.get("/arm")) is not None:
             usual = _opacities(drawn.arm, len(drawn.meshes))
             for handle, opacity in zip(drawn.meshes, usual, strict=True):
-                handle.opacity = _HIDING if clear else opacity
+                if handle.opacity != (target := _HIDING if clear else opacity):
+                    handle.opacity = target  # which fails for one that is taken away meanwhile
 
 
 def pieces(line: Array) -> Array:
