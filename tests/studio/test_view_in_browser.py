@@ -55,19 +55,16 @@ def pixels_of(tab, **look) -> np.ndarray:
 
 @pytest.mark.large
 def test_buttons_look_from_the_front_the_side_and_the_top(tab):
+    def texts() -> set[str]:
+        return {label.text for label in tab.labels() if label.text.endswith("[m]")}
+
     tab.open("View")
     for view, axis in (("front", 1), ("side", 0), ("top", 2)):
         tab.press(view)
         tab.wait(lambda axis=axis: along(tab, axis) > 0.99, f"the {view} is seen")
         tab.settle()
         names = {f"{'xyz'[k]} [m]" for k in range(3) if k != axis}
-        tab.wait(lambda names=names: named_axes(tab) == names, f"{names} are named")
-
-
-def named_axes(tab) -> set[str]:
-    labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
-    texts = [label.text for label in labels if label is not None]
-    return {text for text in texts if text.endswith("[m]")}
+        tab.wait(lambda names=names: texts() == names, f"{names} are named")
 
 
 def along(tab, axis: int) -> float:
