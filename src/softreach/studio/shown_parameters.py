@@ -143,7 +143,7 @@ def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
         return None
     if parameter.unit != "m":
         return fixed
-    scale = float(f"{arm.length / arm.length_unit.size:.12g}")
+    scale = float(f"{arm.length / arm.length_unit.size:.3g}")
     low, high, step = (scale * end for end in fixed[1:])
     return arm.length_unit.label(fixed[0]), low, high, step
 
@@ -153,7 +153,7 @@ def _around_value(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     unit, scale = _unit(parameter, arm.length_unit)
     value, allowed = parameter.value(arm) / scale, parameter.range
     low, high = allowed.low / scale, allowed.high / scale
-    size = 2 * abs(value) or high - low
+    size = float(f"{2 * abs(value):.3g}") or high - low
     ends = (-size if value <= 0 else 0.0, size if value >= 0 else 0.0)
     if parameter.unit == "rad":
         size, ends = 200.0, (-360.0, 360.0)
