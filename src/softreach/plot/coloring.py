@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -26,6 +27,7 @@ UNSTABLE = (255, 0, 200)
 """Magenta, RGB from 0 to 255, of unstable equilibria: no scale of colors has it."""
 _LINE, _PAGE = 44, 100  # characters above axes of a column's width, and above a figure
 _AROUND, _ROW = 0.1, 0.15  # heights around the rows of a legend, and of each [inch]
+_LETTER = 0.09  # width of one of a label [inch]
 _MIXED = 3  # bundles whose lights can be told apart in a mixture
 POWERS = str.maketrans("23", "²³")
 _WIDE = 8.0  # ratio of the largest to the smallest value from which ratios are shown
@@ -173,13 +175,15 @@ def draw_key(ax: Axes, key: Key | None) -> None:
 
 def draw_figure_key(figure: Figure, key: Key | None, room: float) -> None:
     """Explain the colors once for a figure, in the room [inch] at its upper edge."""
-    top = room / figure.get_size_inches()[1]
+    width, height = figure.get_size_inches()
+    top = room / height
     place = (0.5, 1 - top / 2)
     if isinstance(key, ScalarKey):
         place = (0.88, 1 - 0.4 * top)
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
         figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=key.extend)
-        bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
+        label = textwrap.fill(key.label, int(0.38 * width / _LETTER))
+        bar.set_ylabel(label, rotation=0, ha="right", va="center")
     _draw_legend(figure, key, _PAGE, 4, loc="center", bbox_to_anchor=place)
 
 

@@ -162,6 +162,9 @@ def _write_picture(session: Session, path: Path) -> None:
 
     state, reach, key = session.state, _reach(session), session.found.key
     scene = session.camera.picture()
+    seen = np.flatnonzero(scene[..., 3].any(axis=1))  # rows that are not empty
+    if len(seen):
+        scene = scene[max(0, seen[0] - FINER * _EDGE) : seen[-1] + FINER * _EDGE]
     height, width = (size / FINER for size in scene.shape[:2])
     room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
     texts = *_caption(state, reach), picture_text(session.found, reach, state.appearance)
