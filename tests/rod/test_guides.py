@@ -164,6 +164,30 @@ def test_places_of_markers_change_with_numbers_as_in_differences(case):
         np.testing.assert_allclose(slope, difference, atol=2e-5 * np.abs(slope).max())
 
 
+def test_equilibria_far_below_buckling_are_found():
+    """Arcs that twist, several arcs under one chord, and large bends: each by its own chain."""
+    pulled = np.array([[5.54e-3, 2.70e-3, 0.49e-3]])
+    cables = arm_of(4, LengthTendon).actuators[1].replace(offset=0.0)
+    (tip,) = sr.tip_positions(arm_of(0, actuators=(cables,)), pulled, tol=1e-9)
+    passed = (0, 1, 2, 3, 4)
+    holes = [(AWAY * np.cos(a), AWAY * np.sin(a)) for a in np.radians(ANGLES[:3])]
+    three = replace(chain_of(4), tendons=tuple(GuidedTendon(passed, (h,) * 5) for h in holes))
+    places, _ = three.disks(three.at_pulled(pulled[0], 1e4))
+    np.testing.assert_allclose(tip, places[-1], atol=1e-6 * LENGTH)
+
+    most = 12.0 * MODULUS * np.pi * RADIUS**4 / 4 / LENGTH**2
+    pull = Tendon(name="pull", distance=AWAY, guides=1, activation_bounds=(0.0, 0.85 * most))
+    slack = Tendon(name="slack", distance=AWAY, guides=6, activation_bounds=(0.0, 0.0))
+    for beside, arcs, share in ((slack, 6, 0.4), (None, 1, 0.8)):
+        arm = arm_of(0, actuators=tuple(filter(None, (pull, beside))))
+        tension = [share * most, 0.0][: arm.inputs]
+        (tip,) = sr.tip_positions(arm, [tension], tol=1e-9)
+        one = GuidedTendon((0, arcs), ((AWAY, 0.0), (AWAY, 0.0)))
+        chain = replace(chain_of(arcs), tendons=(one,))
+        places, _ = chain.disks(chain.at_tensions(np.array(tension[:1])))
+        np.testing.assert_allclose(tip, places[-1], atol=2e-6 * LENGTH)
+
+
 def test_lengths_of_lines_are_those_of_chords_between_disks():
     arm, chain = arm_of(6), chain_of(6)
     lengths = sr.configuration(arm, TENSIONS[0])["line_length"].values
@@ -186,6 +210,7 @@ def test_guides_by_their_number_are_those_at_even_stations():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        ({"guide_stations": (0.1, 0.1 + 1e-12)}, "must rise between 0 m"),
         ({"guides": 2.5}, "guides = 2.5: must be a whole number"),
         ({"guides": 2, "guide_stations": (0.1,)}, "give exactly one of guide_stations and guides"),
         ({"guide_stations": (0.1, 0.05)}, "must rise between 0 m, where the tendon begins"),
@@ -197,12 +222,15 @@ def test_guides_that_cannot_be_are_refused(given, said):
         arm_of(0, actuators=(Tendon(distance=AWAY, activation_bounds=(0.0, 1.0), **given),))
 
 
-def test_an_arm_that_buckles_between_guides_has_no_tip():
+def test_an_arm_that_buckles_between_guides_is_refused():
     """One arc under P: w = P h ω/12 balances K ω/h, and more than 12 K/h² has no balance."""
-    second = np.pi * RADIUS**4 / 4
-    most = 12.0 * MODULUS * second / LENGTH**2
-    held = Tendon(distance=AWAY, guides=1, activation_bounds=(0.0, 2.0 * most))
-    arm = arm_of(0, actuators=(held,))
-    tips = sr.tip_positions(arm, [[0.2 * most], [1.1 * most]])
-    assert np.isfinite(tips[0]).all()
-    assert np.isnan(tips[1]).all()
+    most = 12.0 * MODULUS * np.pi * RADIUS**4 / 4 / LENGTH**2
+
+    def pulled(share, guides=1):
+        held = Tendon(distance=AWAY, guides=guides, activation_bounds=(0.0, share * most))
+        return sr.tip_positions(arm_of(0, actuators=(held,)), [[0.1 * most]])
+
+    assert np.isfinite(pulled(0.8)).all()
+    with pytest.raises(InvalidDesign, match="buckle between guides: narrow the bounds, or add"):
+        pulled(1.1)
+    assert np.isfinite(pulled(1.1, guides=2)).all()

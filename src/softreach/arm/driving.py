@@ -220,9 +220,11 @@ def _inner_arm(arm: Manipulator) -> Manipulator:
         return body.with_bounds(bounds)
     low, high = arm.input_bounds.T
     gamma = driving.activations(low + pilot(arm.inputs) * (high - low))
-    if not len(gamma := gamma[np.isfinite(gamma).all(axis=1)]):
-        allowed = "bend the arm so far that it buckles between guides: narrow them, or add guides"
+    known = np.isfinite(gamma).all(axis=1)
+    if not (known.any() if driving.law.columns.size else known.all()):
+        allowed = "let the arm buckle between guides: narrow the bounds, or add guides"
         raise InvalidDesign([Fault("activation_bounds", arm.input_bounds.tolist(), allowed)])
+    gamma = gamma[known]
     rates = tables(body, strain_stations(body)).extension
     least = float(1.0 + (gamma @ rates.T).min())
     if not least > 0.0:

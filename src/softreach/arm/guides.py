@@ -30,9 +30,8 @@ _TERMS = 13  # of series in θ²: exact to rounding to θ = π
 _AXIS = np.array([0.0, 0.0, 1.0])
 _APART = 1e-9  # of the length, below which two guides are one
 _COMPLEX = 1e-30  # step of a derivative by complex numbers, which has no cancellation
-_MOST_STEPS = 30
-_CONVERGED, _MOST_TURN = 1e-12, 3.0  # of a step, in rad
-_MOST_GAIN = 0.95
+_PLAIN_STEPS, _MOST_STEPS = 12, 40
+_CONVERGED, _LONGEST_STEP = 1e-12, 0.5  # in rad
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,8 +192,9 @@ class Guides:
     def settled(self, inner: Array, works_of: Callable[[Array], Array]) -> Array:
         """Activations with the loads of arcs at which the arcs are those that they make.
 
-        Each step is one of Newton's with the slopes of the straight arm; a sample stays once it has
-        settled, so that none depends on those beside it.
+        The first steps have the slopes of straight arcs, each by itself; what does not settle by
+        them takes Newton's method. A sample stays once it has settled, so that none depends on
+        those beside it.
 
         Args:
             inner: Activations with tensions, and loads of arcs to begin with, shape (n, bundle).
@@ -203,24 +203,33 @@ class Guides:
         Returns:
             Shape (n, bundle); NaN where nothing settles.
         """
-        inner, left = inner.copy(), np.arange(len(inner))
-        compliance = np.einsum("nii->ni", self.works.slopes(inner)[..., self.loads])
-        stiffening = np.full((len(self._edges) - 1, 4), 1.0 / 12.0) * np.diff(self._edges)[:, None]
-        stiffening[:, 0] = 0.0
+        slopes, start = self.works.slopes(inner), inner[:, self.loads]
+        every = np.broadcast_to(slopes, (len(inner), *slopes.shape[1:]))[..., self.loads]
+        own = np.einsum("nii->ni", every)
+        stiffening = np.kron(np.diff(self._edges) / 12.0, [0.0, 1.0, 1.0, 0.0])
         on_arc = self._on_arcs(np.ones((1, *self._chords.arc.shape, 4)))[0]
-        for _ in range(_MOST_STEPS):
-            tension = inner[left][:, self.columns]
-            gap = self.on_arcs(works_of(inner[left]), tension) - inner[np.ix_(left, self.loads)]
-            own = compliance[left] if len(compliance) > 1 else compliance
-            gain = (tension @ on_arc) * stiffening.ravel() * own  # 1 where the arc buckles
-            step = np.where(gain < 1.0, gap / (1.0 - np.minimum(gain, _MOST_GAIN)), np.nan)
-            inner[np.ix_(left, self.loads)] += step
-            strain = np.abs(step * own).max(axis=1)
-            inner[left[~(strain < _MOST_TURN)]] = np.nan  # buckled, or without equilibrium
-            left = left[(strain > _CONVERGED) & (strain < _MOST_TURN)]
+        gain = (inner[:, self.columns] @ on_arc) * stiffening * own  # 1 where an arc buckles
+        inner, left = inner.copy(), np.flatnonzero((gain < 1.0).all(axis=1))
+        settled = np.zeros(len(inner), bool)
+        for number in range(_MOST_STEPS):
+            if number == _PLAIN_STEPS:
+                left = np.flatnonzero((gain < 1.0).all(axis=1) & ~settled)
+                inner[np.ix_(left, self.loads)] = start[left]
             if not len(left):
-                return inner
-        inner[left] = np.nan
+                continue
+            works, tension = works_of(inner[left]), inner[left][:, self.columns]
+            gap = self.on_arcs(works, tension) - inner[np.ix_(left, self.loads)]
+            if number < _PLAIN_STEPS:
+                step = gap / (1.0 - gain[left])
+            else:
+                matrix = self.on_arcs_slopes(works, tension)[0] @ every[left]
+                step = np.linalg.solve(np.eye(len(self.loads)) - matrix, gap[..., None])[..., 0]
+            strain = np.abs(step * own[left]).max(axis=1)
+            limit = _LONGEST_STEP / np.maximum(strain, _LONGEST_STEP)
+            inner[np.ix_(left, self.loads)] += limit[:, None] * step
+            settled[left] = strain <= _CONVERGED
+            left = left[strain > _CONVERGED]
+        inner[~settled] = np.nan
         return inner
 
 

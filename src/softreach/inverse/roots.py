@@ -167,11 +167,10 @@ def _valley_floor(
     tip_map: TipMap, bounds: tuple[Array, Array], targets: Array, gamma: Array, steps: int
 ) -> tuple[Array, Array, Array]:
     """Activations after steps along the way in which tips move most, what they miss, and ∂r/∂γ."""
-    scales, lost = tip_map.box.scales, np.zeros(len(gamma), bool)
+    scales = tip_map.box.scales
     tip, slope = tip_map.tips_and_slopes(gamma)
     for _ in range(steps):
-        if tip_map.supports_unstable:
-            lost = np.isnan(tip[:, 0])
+        lost = np.isnan(tip[:, 0])
         known = np.where(lost[:, None, None], np.eye(3), slope * scales)
         left, sizes, right = np.linalg.svd(known)
         step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]

@@ -19,6 +19,8 @@ from softreach.arm.section import Section
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault
 
+_SAME = 1e-9  # of the length: guides that are one
+
 
 @dataclass(frozen=True, kw_only=True)
 class Tendon(PolarActuator):
@@ -95,7 +97,7 @@ class Tendon(PolarActuator):
         start, end = self.span(length)
         if self.guide_stations is None:
             return np.linspace(start, end, self.guides + 1)
-        inside = [z for z in self.guide_stations if z < end]
+        inside = [z for z in self.guide_stations if z < end - _SAME * length]
         return np.array([start, *inside, end])
 
     def points_at(self, profile: Profile, z: Array) -> Array:
@@ -152,7 +154,8 @@ class Tendon(PolarActuator):
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
         faults = section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
         given, (start, end) = self.guide_stations or (), self.span(profile.length)
-        if (np.diff([start, *given]) <= 0.0).any() or max(given, default=end) > end:
+        same = _SAME * profile.length
+        if (np.diff([start, *given]) <= same).any() or max(given, default=end) > end + same:
             between = f"{start:g} m, where the tendon begins, and its anchor at {end:g} m"
             faults.append(Fault("guide_stations", given, f"must rise between {between}"))
         return faults
