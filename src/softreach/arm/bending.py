@@ -40,10 +40,7 @@ class Extreme(NamedTuple):
 
 
 def has_exact_bending(arm: Manipulator) -> bool:
-    """True if the functions below hold: no loads, strains that are affine in the inputs.
-
-    And fibers and muscles alone, or forces alone by at most eight inputs.
-    """
+    """True without loads, if strains are affine in the inputs, of fibers alone or few forces."""
     driving = Driving(arm)
     if arm.loads is not None or not driving.is_affine:
         return False
@@ -53,15 +50,7 @@ def has_exact_bending(arm: Manipulator) -> bool:
 
 
 def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
-    """Least and largest bending κ = √(u1² + u2²) η/ζ, theory (45), within the bounds.
-
-    Args:
-        arm: A design that `has_exact_bending`.
-        stations: Z [m], shape (station,).
-
-    Returns:
-        Least and largest bending [1/m], each of shape (station,).
-    """
+    """Least and largest κ = √(u1² + u2²) η/ζ [1/m] within the bounds, (station,): theory (45)."""
     center, halves, edges = _reached(arm, stations)
     return np.where(_holds_origin(center, halves), 0.0, _distance_to_edges(*edges)), _farthest(
         edges
@@ -122,10 +111,7 @@ def _reached(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array, tuple
 
 
 def _vertices(center: Array, halves: Array) -> Array:
-    """All vertices in order around the zonogon, shape (station, 2 * bundle, 2).
-
-    Edges that all point upward, sorted by direction, lead from one vertex to the opposite one.
-    """
+    """Vertices in order around zonogons, (station, 2 * bundle, 2): edges sorted by direction."""
     x, y = halves[..., 0], halves[..., 1]
     upward = np.where(((y < 0) | ((y == 0) & (x < 0)))[..., None], -halves, halves)
     order = np.argsort(np.arctan2(upward[..., 1], upward[..., 0]), axis=1)
@@ -188,10 +174,7 @@ def _brackets(grid: Array, values: Array) -> tuple[Array, Array]:
 
 
 def bending_stations(arm: Manipulator) -> Array:
-    """Stations fine enough to see each turn of the bundles [m], shape (piece, station).
-
-    A piece lies between two breakpoints, where the curvature may jump: it ends just inside them.
-    """
+    """Stations [m] that see each turn of bundles, (piece, station), just inside breakpoints."""
     arm = body_of(arm)
     ends = np.array([0.0, *arm.breakpoints, arm.length])
     start, end = ends[:-1].copy(), ends[1:].copy()

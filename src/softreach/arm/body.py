@@ -350,11 +350,7 @@ def load_number(arm: Body) -> float:
 
 
 def is_overloaded(arm: Body) -> bool:
-    """The load number is above what was verified, by more than rounding.
-
-    Raises:
-        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
-    """
+    """The load number is above what was verified, by more than rounding; raises its errors."""
     return load_number(arm) > VERIFIED_LOAD_NUMBER * (1 + 1e-9)
 
 

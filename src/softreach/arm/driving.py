@@ -203,8 +203,7 @@ class Driving:
 def inner_arm(arm: Manipulator) -> Manipulator:
     """The arm as tables and kernels see it, with bounds that hold what activations lead to.
 
-    It is the arm itself where inputs load its sections as they are. A rest shape is a bundle held
-    at 1, and tendons that are driven by length have tensions.
+    It is the arm itself where inputs load its sections as they are: else see `body_of`.
 
     Raises:
         InvalidDesign: Displacements within the bounds shorten the arm to nothing.

@@ -189,17 +189,10 @@ class Guides:
         return by_works, -np.swapaxes(self.slopes(works) - self._straight, 1, 2)
 
     def settled(self, inner: Array, works_of: Callable[[Array], Array]) -> Array:
-        """Activations with the loads of arcs at which the arcs are those that they make.
+        """Activations with loads of arcs at which these make the arcs, NaN where nothing settles.
 
-        Each step is one of Newton's with the slopes of the straight arm; a sample stays once it has
-        settled, so that none depends on those beside it.
-
-        Args:
-            inner: Activations with tensions, and loads of arcs to begin with, shape (n, bundle).
-            works_of: Works of arcs at such activations, NaN without an equilibrium.
-
-        Returns:
-            Shape (n, bundle); NaN where nothing settles.
+        Newton's steps have the slopes of the straight arm; a sample stays once it has settled, so
+        that none depends on those beside it. `works_of` are the works of arcs at activations.
         """
         inner, left = inner.copy(), np.arange(len(inner))
         compliance = np.einsum("nii->ni", self.works.slopes(inner)[..., self.loads])

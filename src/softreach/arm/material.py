@@ -72,14 +72,7 @@ def material_names() -> tuple[str, ...]:
 
 
 def material_record(name: str) -> MaterialRecord:
-    """A material of the library with the sources of its numbers.
-
-    Args:
-        name: One of `material_names()`.
-
-    Raises:
-        InvalidInput: No material has this name.
-    """
+    """A material of the library with the sources of its numbers; raises InvalidInput."""
     if name not in (library := _library()):
         hint = _hint(name, tuple(library))
         raise InvalidInput("material", name, "a material of the library", hint)

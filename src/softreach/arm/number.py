@@ -159,10 +159,7 @@ class Number:
         return self.field + unit_suffix(self.unit)
 
     def refusal(self, value: object) -> Range | None:
-        """The limits that one number is beyond: its own, or the sizes that no arm has; else None.
-
-        Every number of a design passes here, from files, Python and the command line alike.
-        """
+        """The limits that a number is beyond: its own, or the sizes that no arm has; or None."""
         limits = (self.allowed, self._sense)
         return next((each for each in limits if not each.admits(value)), None)
 

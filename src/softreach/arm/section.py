@@ -306,7 +306,8 @@ class Section(Part):
         """Faults that keep loads from acting on an arm."""
         faults = self.modulus_faults("where loads act")
         if self.measured is not None and self.bending_ratio != 1.0:
-            given, allowed = self.measured.bending_stiffness, "must be one number where loads act or compliance is computed"
+            allowed = "must be one number where loads act or compliance is computed"
+            given = self.measured.bending_stiffness
             faults.append(Fault("measured.bending_stiffness", given, allowed))
         return faults
 
@@ -349,10 +350,7 @@ _RESERVED = ("actuators", "core", "loads", "profile", "rings", "section")
 
 
 def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
-    """Names in a sequence at a path that are given twice, or ambiguous in names of parameters.
-
-    An empty one does not count.
-    """
+    """Names in a sequence at a path that are given twice, or ambiguous in names of parameters."""
     for k, name in enumerate(names):
         if isinstance(name, str) and (allowed := _allowed_name(name, path)):
             yield Fault(f"{path}[{k}].name", name, allowed)

@@ -55,11 +55,7 @@ class Centerline:
 
     @classmethod
     def of(cls, shape: xr.Dataset | Centerline) -> Centerline:
-        """That of one configuration.
-
-        Raises:
-            InvalidInput: Several configurations, or one of an arm without length.
-        """
+        """That of one configuration; raises InvalidInput for several, or one without length."""
         if isinstance(shape, Centerline):
             return shape
         if not (least := float(shape["extension"].min())) > 0.0:
@@ -146,16 +142,7 @@ class _Span(NamedTuple):
 
 
 def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
-    """The body of the arm as a closed tube.
-
-    Args:
-        arm: The design; where its radius is not smooth, the tube has a section.
-        shape: One configuration of that arm, or its centerline.
-        sides: Corners of each section.
-
-    Raises:
-        InvalidInput: Several configurations, fewer than two stations or three sides.
-    """
+    """The body of an arm in one configuration as a closed tube with so many sides."""
     line = _drawn_line(arm, shape)
     d1, d2 = line.directors[:, 0], line.directors[:, 1]
     return tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
@@ -164,19 +151,10 @@ def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
 def bundle_skins(
     arm: Body, shape: Shape, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Surface]:
-    """Surfaces of all bundles where they act: bands, thin tubes for lines, tubes for lumens.
+    """A surface for each bundle where it acts: bands, thin tubes for lines, tubes for lumens.
 
-    Args:
-        arm: The design; band j covers a_j - σ_j/2 to a_j + σ_j/2 on the outside of its ring.
-        shape: As for `arm_surface`.
-        lift: Height of bands above their ring, in R2 [-].
-        step: Largest angle between neighboring points across a band [rad].
-
-    Returns:
-        One surface for each bundle; bands are open, and the points of each are (stations, across).
-
-    Raises:
-        InvalidInput: Several configurations.
+    Bands are open, lie `lift` R2 above the outside of their ring, and have a point every `step`
+    [rad] across; their points are (stations, across).
     """
 
     def sector(span: _Span) -> Surface:
@@ -188,15 +166,7 @@ def bundle_skins(
 
 
 def bundle_surfaces(arm: Body, shape: Shape) -> list[Surface]:
-    """Every bundle as a closed surface; bands are half sunk into the outside of their ring.
-
-    Args:
-        arm: The design.
-        shape: As for `arm_surface`.
-
-    Raises:
-        InvalidInput: Several configurations.
-    """
+    """Every bundle as a closed surface; bands are half sunk into the outside of their ring."""
 
     def sector(span: _Span) -> Surface:
         # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
@@ -207,18 +177,7 @@ def bundle_surfaces(arm: Body, shape: Shape) -> list[Surface]:
 
 
 def marker_points(markers: Sequence[Marker], shape: Shape) -> Array:
-    """Places of markers, between the stations of a configuration for pictures.
-
-    Args:
-        markers: Those of the arm.
-        shape: As for `arm_surface`, from the base to the tip.
-
-    Returns:
-        Points [m], shape (marker, 3).
-
-    Raises:
-        InvalidInput: Several configurations.
-    """
+    """Places [m] of markers, between the stations of a configuration for pictures, (marker, 3)."""
     if not markers:
         return np.empty((0, 3))
     line = Centerline.of(shape)

@@ -195,11 +195,7 @@ Made = TypeVar("Made", bound=Located)
 
 
 def placed(part: Made, stations: Mapping[str, float]) -> Made:
-    """The part where the stations that it names are.
-
-    Raises:
-        InvalidDesign: It names a station that is none of these.
-    """
+    """The part where the stations that it names are; raises InvalidDesign for unknown ones."""
     given = {field: getattr(part, field) for field in part.places}
     names = {
         field: place.name if isinstance(place, Station) else place

@@ -51,13 +51,9 @@ class Tables:
 
 
 def tables(arm: Body, stations: ArrayLike) -> Tables:
-    """z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
+    """z = N/K0 and U = K⁻¹M at Z [m] (station,): theory (6), which for fibers is (8) to (10).
 
     U of a rest shape is its curvature; what an arm is at rest, its `inner` arm has.
-
-    Args:
-        arm: The design.
-        stations: Z [m], shape (station,).
 
     Raises:
         InvalidDesign: An actuator loads the sections by another number of bundles than it has.
@@ -91,10 +87,7 @@ def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
 
 
 def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
-    """1/K0 [1/N], 1/K1 = 1/K2 and 1/K3 [1/(N m²)] at stations Z [m]; 0 in rigid pieces.
-
-    Returns:
-        One value for each station, shape (station,) each.
+    """1/K0 [1/N], 1/K1 = 1/K2 and 1/K3 [1/(N m²)] at stations Z [m], (station,); 0 in rigid pieces.
 
     Raises:
         InvalidDesign: A material without Young's modulus, or two bending stiffnesses.
@@ -151,12 +144,7 @@ def range_of_extension(arm: Body, extension: Array) -> tuple[float, float]:
 
 
 def ends_over(rates: Array, bounds: Array) -> Array:
-    """Least and largest of Σ rates γ over a box of activations, shape (station, 2).
-
-    Args:
-        rates: Per unit of each activation, shape (station, bundle).
-        bounds: Of the box, shape (bundle, 2).
-    """
+    """Ends of Σ rates γ, with rates (station, bundle), over a box (bundle, 2), (station, 2)."""
     ends = rates[..., None] * bounds
     return np.stack([ends.min(-1).sum(-1), ends.max(-1).sum(-1)], axis=1)
 
@@ -171,10 +159,7 @@ def both_sides(arm: Body, stations: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def jumps(arm: Body) -> tuple[float, ...]:
-    """Breakpoints [m] at which strains or stiffnesses jump by over a thousandth of their largest.
-
-    At the others it is their slopes that jump, as at the samples of a measured profile.
-    """
+    """Breakpoints [m] at which strains or stiffnesses, not their slopes alone, jump."""
     breaks = np.array(arm.breakpoints)
     sides = np.concatenate([breaks, np.nextafter(breaks, 0.0)])
     table, stiffness = tables(arm, sides), arm.stiffness_at(sides)
@@ -192,11 +177,7 @@ def strain_stations(arm: Body) -> Array:
 
 
 def quadrature(arm: Body, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
-    """Gauss nodes between all stations where something begins, ends or acts.
-
-    Returns:
-        The nodes, their weights, and half the gap that each is in [m].
-    """
+    """Gauss nodes between places where something begins or acts, weights, half their gaps [m]."""
     points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
     knots = np.union1d(np.linspace(0.0, arm.length, pieces + 1), [*arm.breakpoints, *points])
     half = np.diff(knots)[:, None] / 2.0

@@ -99,10 +99,7 @@ class LengthLaw:
     def complementary(self, matrix: Array, excess: Array) -> Tensions:
         """Tensions τ >= 0 with w = matrix τ - excess >= 0 and τ·w = 0.
 
-        Args:
-            matrix: ∂s/∂τ + 1/k [m/N], shape (n or 1, tendon, tendon).
-            excess: By how much they are pulled in beyond their paths without tension [m], (n,
-                tendon).
+        The matrix is ∂s/∂τ + 1/k [m/N], (n or 1, tendon, tendon), the excess in m, (n, tendon).
         """
         from softreach.kernels.box.complementarity import complementary  # loads Numba
 
@@ -280,12 +277,8 @@ class PulledTendons:
     def response(self, inner: Array, is_taut: Mask, pulled: Array, on_arcs: Array) -> Array:
         """Changes of the activations of the inner arm with what drives it, (n, bundle, change).
 
-        Args:
-            inner: Activations of the inner arm, shape (n, bundle).
-            is_taut: Shape (n, tendon).
-            pulled: Changes of activations with displacements, shape (n or none, bundle, change).
-            on_arcs: Changes of the loads of arcs at the same strains and tensions, likewise, in the
-                rows of these loads.
+        `pulled` are those of activations with displacements, `on_arcs` in the rows of the loads of
+        arcs those at the same strains and tensions, (n or none, bundle, change) each.
         """
         law, guides = self.law, self.guides
         if guides is None:

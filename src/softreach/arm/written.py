@@ -40,16 +40,7 @@ class Written:
         return cls(parameters_by_every_name(arm))
 
     def number(self, key: str, value: object, unit: str | None = None) -> float:
-        """A value in its SI unit: a number under a key with the unit, or text with its unit.
-
-        Args:
-            key: A name of `by_key`, or any other for a given unit.
-            value: Number or text.
-            unit: SI unit; None for that of the parameter.
-
-        Raises:
-            ValueError: Anything else.
-        """
+        """A value in SI: a number under a key with its unit, or text with it; else ValueError."""
         unit = self.by_key[key].unit if unit is None else unit
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError(value)

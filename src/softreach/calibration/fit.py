@@ -50,11 +50,7 @@ class Fit:
 
 
 def started(model: MarkerModel, places: Array) -> FreeNumbers:
-    """Numbers to start from: the pose by which predicted places match measured ones [Kabsch1976].
-
-    Raises:
-        InvalidInput: Axes that only a mirror brings together.
-    """
+    """Numbers to start from: the pose that puts predicted places on measured ones [Kabsch1976]."""
     free = model.free
     turning = [name for name in POSE[3:] if name in free.names]
     moving = [name for name in POSE[:3] if name in free.names]
@@ -229,10 +225,6 @@ def fitted(
     """The numbers at which predicted places are nearest to measured ones, as `calibrate` says.
 
     `places` are measured [m], NaN where none was seen, shape (n, marker, 3).
-
-    Raises:
-        InvalidInput: Numbers that the data cannot tell apart.
-        NotPossible: Columns in another order, or no equilibrium at the start.
     """
     model = replace(model, free=started(model, places))
     problem = _Problem(model, places, progress)

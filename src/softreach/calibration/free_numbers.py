@@ -85,11 +85,7 @@ class FreeNumbers:
         )
 
     def made(self, values: Array) -> Manipulator:
-        """The arm with these values.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """The arm with these values; raises InvalidDesign if there is none."""
         given = dict(zip(self.names, values.tolist(), strict=True))
         pose = {name: value for name, value in given.items() if name in POSE}
         paths = {path: value for name, value in given.items() for path in _tied(name)}

@@ -256,11 +256,7 @@ def _opened(data: Any) -> tuple[pd.DataFrame, str]:
 
 
 def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
-    """The table of a file that its name calls Parquet, else a CSV, packed if it says .gz or .zip.
-
-    Raises:
-        InvalidInput: It is no table.
-    """
+    """The table of a file whose name says Parquet, else CSV, packed if it says .gz or .zip."""
     import pandas as pd
 
     suffix = Path(name).suffix.lower()

@@ -73,10 +73,7 @@ class _Explicit(NamedTuple):
 
 
 def marker_stations(arm: Manipulator, names: Iterable[str]) -> tuple[Array, Array]:
-    """Stations Z [m] of some markers of an arm, and their offsets in the directors [m].
-
-    An arm without markers has one at its tip.
-    """
+    """Z [m] of some markers, or of the tip without any, and offsets in the directors [m]."""
     if not arm.markers:
         return np.array([arm.length]), np.zeros((1, 3))
     known = {marker.name: marker for marker in arm.markers}
@@ -105,11 +102,7 @@ class MarkerModel:
         return cls(free, data.inputs, data.marker_names)
 
     def predict(self, values: Array, *, slopes: bool = False) -> Prediction:
-        """Places of the markers, and their derivatives if asked for.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """Places of the markers, and their derivatives if asked for; may raise InvalidDesign."""
         arm, scale = self.free.made(values), self.free.scaled(values)
         return self.of_arm(arm, scale, values if slopes else None)
 

@@ -163,11 +163,7 @@ def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
 
 
 def own_kind(of: type[Kind], name: str) -> type[Kind] | None:
-    """The kind of this name that is not softreach's, from an installed package if need be.
-
-    Raises:
-        InvalidInput: A package that declares it cannot be imported.
-    """
+    """The kind of this name that is not softreach's, from an installed package if need be."""
     entries = plugins.declared(_GROUPS[of])
     if name not in own_kinds(of) and name in entries:
         plugins.loaded(entries[name])
@@ -213,8 +209,7 @@ def in_file_terms(
 ) -> InvalidDesign:
     """The same faults under the keys of a file and in its units.
 
-    `places` are those of the parts in the file by their paths in the arm; without them, paths stay
-    but for the field at their end.
+    `places` are those of the parts in the file; without them only the field at the end is renamed.
     """
     faults = [_in_file_terms(fault, places) for fault in error.faults]
     return InvalidDesign(one_a_path(faults), source)
@@ -281,10 +276,7 @@ class WrittenFloat(float):
 
 
 def radians(degrees: Any) -> float:
-    """Degrees as people write them convert like `math.radians`; longer ones by exact decimals.
-
-    Floating-point degrees miss one angle in ten by a unit in the last place; twenty digits do not.
-    """
+    """Degrees as `math.radians` has them, those of many digits by exact decimals."""
     return _radians(getattr(degrees, "text", repr(degrees)).replace("_", ""))
 
 

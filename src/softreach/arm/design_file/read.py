@@ -49,22 +49,14 @@ Arm = TypeVar("Arm")
 
 
 def text_of(path: str | PathLike[str]) -> str:
-    """The text of a design file.
-
-    Raises:
-        InvalidInput: No file that can be read, one too large to be a design, or no text in UTF-8.
-    """
+    """The text of a design file; raises InvalidInput without one, or without text in UTF-8."""
     return read_text("design", path, LONGEST)
 
 
 def document_of(
     text: str, source: str, number: Callable[[str], Any] = WrittenFloat
 ) -> dict[str, Any]:
-    """The tables of TOML text as `toml.document_of`, by default with numbers as they were written.
-
-    Raises:
-        InvalidDesign: Text that is no TOML, or too long to be a design.
-    """
+    """The tables of TOML text as `toml.document_of`, by default with numbers as written."""
     return toml.document_of(text, LONGEST, source, number)
 
 
@@ -72,8 +64,7 @@ def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     """The arm that `make` makes of the fields in a TOML text, which errors call `source`.
 
     Raises:
-        InvalidDesign: Every fault of the tables, and of the arm that the sound ones make, with
-            key, value and what is allowed.
+        InvalidDesign: Every fault of the tables, and of the arm that the sound ones make.
     """
     document = document_of(text, source)
     version = document.get("version", 2)
@@ -193,10 +184,7 @@ class _Reader(FaultReader):
         values: Mapping[str, Any],
         wrong: Set[str] = frozenset(),
     ) -> Any:
-        """A part, which judges its values; `WRONG`, and its faults, where they are wrong.
-
-        Fields that no value can be given are None, so that the part can judge the others.
-        """
+        """A part, which judges its values but for those in `wrong`; `WRONG` for a faulty one."""
         self.places[place.path] = place
         if "" in wrong:
             return WRONG

@@ -30,11 +30,7 @@ _ORDER = (
 
 
 def render(arm: Mapping[str, Any]) -> str:
-    """TOML text of a design, of version 2, from its fields.
-
-    Raises:
-        InvalidDesign: A part of one's own kind that is not made of plain values.
-    """
+    """TOML text of a design, of version 2; raises InvalidDesign where a part is no plain values."""
     section, stations, loads = arm["section"], arm["stations"], arm["loads"]
     names: dict[str, Material] = {}
     for material in (section.core, *(ring.material for ring in section.rings)):
