@@ -33,10 +33,8 @@ _MOST_INPUTS = 8  # of which all corners are looked at
 class Extreme(NamedTuple):
     """An extreme value along an arm and where it is."""
 
-    value: float
-    """Of bending [1/m], or of bending times radius [-]."""
-    station: float
-    """The first Z where it is reached [m]."""
+    value: float  # Of bending [1/m], or of bending times radius [-]
+    station: float  # The first Z where it is reached [m]
 
 
 def has_exact_bending(arm: Manipulator) -> bool:

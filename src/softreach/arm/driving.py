@@ -51,10 +51,8 @@ class Driving:
     """The map from the inputs x of an arm to the activations of its inner arm, γ(x)."""
 
     arm: Manipulator
-    pulled: Pulled | None = None
-    """Tendons driven by length or held by guides under loads; by default those without loads."""
-    is_effective: bool = False
-    """True if x are inputs beyond the dead zones of the drives."""
+    pulled: Pulled | None = None  # Tendons driven by length or guided under loads; else without
+    is_effective: bool = False  # True if x are inputs beyond the dead zones of the drives
 
     @lazy
     def driven(self) -> Manipulator:

@@ -40,8 +40,7 @@ class ArcLoads(UnseenActuator):
     """N and M about the three directors, even along each arc between guides."""
 
     is_force: ClassVar[bool] = True
-    edges: tuple[float, ...]
-    """Z of the ends of the arcs [m]."""
+    edges: tuple[float, ...]  # Z of the ends of the arcs [m]
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         arc = np.searchsorted(self.edges, z, side="right") - 1
@@ -84,14 +83,10 @@ def _guided(arm: Body) -> list[Tendon]:
 class _Chords(NamedTuple):
     """Straight pieces of tendons between guides."""
 
-    tendon: NDArray[np.intp]
-    """Guided tendon of each, shape (chord,)."""
-    arc: NDArray[np.intp]
-    """Arcs that each spans, from base to tip, (chord, place); one past the last for none."""
-    start: Array
-    """In the section of the first guide [m], shape (chord, 3)."""
-    end: Array
-    """In the section of the next [m], shape (chord, 3)."""
+    tendon: NDArray[np.intp]  # Guided tendon of each, shape (chord,)
+    arc: NDArray[np.intp]  # Arcs that each spans, (chord, place), base first; one too far is none
+    start: Array  # In the section of the first guide [m], shape (chord, 3)
+    end: Array  # In the section of the next [m], shape (chord, 3)
 
 
 @dataclass(frozen=True, eq=False)

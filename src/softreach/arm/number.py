@@ -124,29 +124,18 @@ class NamedFloats(Mapping[str, float]):
 class Number:
     """A number of a part of an arm."""
 
-    field: str = ""
-    """Name in the part."""
-    symbol: str
-    """Symbol in formulas."""
-    meaning: str
-    """Meaning in a few words."""
-    allowed: Range
-    """Unit, limits, and whether it is an integer."""
+    field: str = ""  # Name in the part
+    symbol: str  # Symbol in formulas
+    meaning: str  # Meaning in a few words
+    allowed: Range  # Unit, limits, and whether it is an integer
     shape: Shape = "single"
-    along: type | None = None
-    """Class of functions along the arm that may take its place."""
-    optional: bool = False
-    """None is allowed."""
-    named: bool = False
-    """The name of a station of the arm may take its place."""
-    pair: str = ""
-    """Two values that may take its place, such as "two at its ends"; "" for none."""
-    each: bool = False
-    """One value for each bundle of an actuator may take its place."""
-    instead_of: str = ""
-    """Field of the part that says the same in another way: one of the two is given."""
-    hint: str = ""
-    """Ends the sentence "give exactly one of ..."."""
+    along: type | None = None  # Class of functions along the arm that may take its place
+    optional: bool = False  # None is allowed
+    named: bool = False  # The name of a station of the arm may take its place
+    pair: str = ""  # Two values that may take its place, such as "two at its ends"; "" for none
+    each: bool = False  # One value for each bundle of an actuator may take its place
+    instead_of: str = ""  # Field that says the same in another way: one of the two is given
+    hint: str = ""  # Ends the sentence "give exactly one of ..."
 
     @property
     def unit(self) -> str:

@@ -39,12 +39,9 @@ _CARD_STATIONS, _CARD_STEP = 41, np.pi / 27
 class Centerline:
     """Sections of an arm in one configuration."""
 
-    z: Array
-    """Stations before activation [m], ascending, shape (station,)."""
-    position: Array
-    """Their centers [m], shape (station, 3)."""
-    directors: Array
-    """d1, d2, d3 of each, shape (station, 3, 3)."""
+    z: Array  # Stations before activation [m], ascending, shape (station,)
+    position: Array  # Their centers [m], shape (station, 3)
+    directors: Array  # d1, d2, d3 of each, shape (station, 3, 3)
 
     @classmethod
     def unactivated(cls, z: Array, base: Base) -> Self:
@@ -110,8 +107,7 @@ class _Span(NamedTuple):
 
     extent: float
     z: Array
-    held: Array
-    """Z of guides between which a line is straight; none if it follows the arm."""
+    held: Array  # Z of guides between which a line is straight; none if it follows the arm
     position: Array
     directors: Array
     center: Array

@@ -34,12 +34,9 @@ _JUMP = 1e-3
 class Tables:
     """The response of an arm at given stations per unit of activation of each bundle."""
 
-    stations: Array
-    """Z [m], shape (station,)."""
-    extension: Array
-    """z = dζ/dγ [-], shape (station, bundle)."""
-    curvature: Array
-    """U = du/dγ [1/m], per length of η, in the directors, shape (station, 3, bundle)."""
+    stations: Array  # Z [m], shape (station,)
+    extension: Array  # z = dζ/dγ [-], shape (station, bundle)
+    curvature: Array  # U = du/dγ [1/m], per length of η, in the directors, (station, 3, bundle)
     rest_length_factor: Array
     """dη/dγ [-]: z of bundles that change the length of matter at rest, 0 of those that are forces;
     shape (station, bundle). Of fibers and muscles alone it is `extension` itself."""
@@ -193,8 +190,7 @@ class Works:
     """
 
     arm: Body
-    columns: NDArray[np.intp]
-    """Bundles whose unit loads do the work."""
+    columns: NDArray[np.intp]  # Bundles whose unit loads do the work
 
     @property
     def has_growth(self) -> bool:

@@ -38,10 +38,8 @@ _HALVINGS = 6
 class Tensions(NamedTuple):
     """Tensions of the tendons that are driven by length."""
 
-    tension: Array
-    """τ >= 0 [N], shape (n, tendon)."""
-    is_taut: Mask
-    """Tendons whose tension follows the displacements, shape (n, tendon)."""
+    tension: Array  # τ >= 0 [N], shape (n, tendon)
+    is_taut: Mask  # Tendons whose tension follows the displacements, shape (n, tendon)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +50,7 @@ class LengthLaw:
     displacements [m].
     """
 
-    arm: Body
-    """With its rest shape as a bundle: see `body_of`."""
+    arm: Body  # With its rest shape as a bundle: see `body_of`
 
     @lazy
     def columns(self) -> NDArray[np.intp]:
@@ -142,12 +139,9 @@ class LengthLaw:
 class _State(NamedTuple):
     """Tensions on their way, for some samples."""
 
-    inner: Array
-    """Activations of the inner arm, shape (n, bundle)."""
-    shortening: Array
-    """s [m], shape (n, tendon)."""
-    slopes: Array
-    """Estimate of ∂s/∂τ [m/N], shape (n, tendon, tendon)."""
+    inner: Array  # Activations of the inner arm, shape (n, bundle)
+    shortening: Array  # s [m], shape (n, tendon)
+    slopes: Array  # Estimate of ∂s/∂τ [m/N], shape (n, tendon, tendon)
 
 
 @dataclass(frozen=True)

@@ -39,12 +39,9 @@ class Fit:
     free: FreeNumbers
     values: Array
     prediction: Prediction
-    residuals: Array
-    """Predicted minus measured places [m], NaN where none was seen, (n, marker, 3)."""
-    weights: Array
-    """Of each marker of each sample in the fit: 1, less for outliers; (n, marker)."""
-    at_bound: Mask
-    """Numbers that end at a bound, shape (number,)."""
+    residuals: Array  # Predicted minus measured places [m], NaN where none was seen, (n, marker, 3)
+    weights: Array  # Of each marker of each sample in the fit: 1, less for outliers; (n, marker)
+    at_bound: Mask  # Numbers that end at a bound, shape (number,)
     evaluations: int
     converged: bool
 

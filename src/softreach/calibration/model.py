@@ -67,8 +67,7 @@ class _Explicit(NamedTuple):
     bundles: Array  # Activations of all bundles, displacements among them, (n, bundle)
     taut_from: Array
     compliance: Array
-    measures: Array
-    """M and N of tendons that are driven by length at the nodes, (step, 3, 4, tendon)."""
+    measures: Array  # M and N of tendons driven by length at the nodes, (step, 3, 4, tendon)
     rest: Array  # û at rest at the nodes, (step, 3, 3)
 
 

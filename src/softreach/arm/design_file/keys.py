@@ -76,12 +76,9 @@ _LONG = 17  # digits from which a number of degrees is read exactly
 class Block(NamedTuple):
     """What a file says under a key at its top."""
 
-    shape: type
-    """One table, a list of tables, text or a number."""
-    kind: Any
-    """Kind of part that a table describes; None for none."""
-    about: str = ""
-    """Description; that of a table alone is its kind's."""
+    shape: type  # One table, a list of tables, text or a number
+    kind: Any  # Kind of part that a table describes; None for none
+    about: str = ""  # Description; that of a table alone is its kind's
     required: bool = False
 
 
@@ -108,17 +105,11 @@ LAYOUT: Mapping[str, Block] = {
 class Key(NamedTuple):
     """A key of a table."""
 
-    name: str
-    """As the file has it: `offset_deg`."""
-    field: str
-    """Field of the part."""
-    number: Number | None
-    """Declaration of a number; None for names, bounds, materials, and lists of tables."""
-    default: Any
-    """Default of the field; MISSING where the key is required."""
-
-    of_names: bool = False
-    """It holds the name of a station, beside a key of the field that holds its place in m."""
+    name: str  # As the file has it: `offset_deg`
+    field: str  # Field of the part
+    number: Number | None  # None for names, bounds, materials, and lists of tables
+    default: Any  # Default of the field; MISSING where the key is required
+    of_names: bool = False  # It holds the name of a station, another key its place in m
 
     @property
     def required(self) -> bool:
@@ -196,12 +187,9 @@ def _every_key() -> Mapping[str, str]:
 class Place(NamedTuple):
     """Where in a file a part stands."""
 
-    path: str
-    """`actuators[0]`."""
-    keys: Mapping[str, str] = MappingProxyType({})
-    """Field -> key of its table; without those that are the same."""
-    table: Mapping[str, Any] = MappingProxyType({})
-    """What the file says there."""
+    path: str  # `actuators[0]`
+    keys: Mapping[str, str] = MappingProxyType({})  # Field -> key of its table, where they differ
+    table: Mapping[str, Any] = MappingProxyType({})  # What the file says there
 
 
 def in_file_terms(
