@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array
 
 _STATIONS = 101
 _PER_TURN = 24  # stations for each turn of one bundle relative to another
@@ -49,10 +49,19 @@ def has_exact_bending(arm: Manipulator) -> bool:
 
 def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
     """Least and largest κ = √(u1² + u2²) η/ζ [1/m] within the bounds, (station,): theory (45)."""
-    center, halves, edges = _reached(arm, stations)
-    return np.where(_holds_origin(center, halves), 0.0, _distance_to_edges(*edges)), _farthest(
-        edges
-    )
+    center, halves, (start, end) = _reached(arm, stations)
+    # Zonogons hold the origin where no line along an edge separates them, nor one across the
+    # center, which is what remains where all edges are parallel or of no length.
+    normals = np.stack([halves[..., 1], -halves[..., 0]], axis=-1)
+    normals = np.concatenate([normals, center[:, None]], axis=1)
+    away = np.abs(np.einsum("snc,sc->sn", normals, center))
+    reach = np.abs(np.einsum("snc,sbc->snb", normals, halves)).sum(axis=-1)
+    edges = end - start
+    square, along = (edges**2).sum(axis=-1), -(start * edges).sum(axis=-1)
+    part = np.divide(along, square, out=np.zeros_like(square), where=square > 0)
+    nearest = np.linalg.norm(start + np.clip(part, 0.0, 1.0)[..., None] * edges, axis=-1)
+    least = np.where((away <= reach).all(axis=1), 0.0, nearest.min(axis=1))
+    return least, _farthest((start, end))
 
 
 def _largest_at(arm: Manipulator, stations: Array) -> Array:
@@ -118,57 +127,29 @@ def _vertices(center: Array, halves: Array) -> Array:
     return center[:, None] + np.concatenate([side, -side], axis=1)
 
 
-def _holds_origin(center: Array, halves: Array) -> Mask:
-    """Zonogons that hold the origin: no line along an edge or across the center separates them.
-
-    The last is what remains to be asked where all edges are parallel or of no length.
-    """
-    normals = np.stack([halves[..., 1], -halves[..., 0]], axis=-1)
-    normals = np.concatenate([normals, center[:, None]], axis=1)
-    away = np.abs(np.einsum("snc,sc->sn", normals, center))
-    reach = np.abs(np.einsum("snc,sbc->snb", normals, halves)).sum(axis=-1)
-    return (away <= reach).all(axis=1)
-
-
-def _distance_to_edges(start: Array, end: Array) -> Array:
-    edges = end - start
-    square = (edges**2).sum(axis=-1)
-    along = -(start * edges).sum(axis=-1)
-    part = np.divide(along, square, out=np.zeros_like(square), where=square > 0)
-    nearest = start + np.clip(part, 0.0, 1.0)[..., None] * edges
-    return np.linalg.norm(nearest, axis=-1).min(axis=1)
-
-
 def _largest(arm: Manipulator, measure: Callable[[Array], Array]) -> Extreme:
     """The largest value of a function of Z that is smooth or kinks downward between breakpoints."""
     grid = bending_stations(arm)
-    values = measure(grid.ravel())
-    low, high = _brackets(grid, values.reshape(grid.shape))
+    values, last = measure(grid.ravel()), grid.shape[1] - 1
+    # Brackets lie around the highest local maxima; none crosses a breakpoint.
+    each = values.reshape(grid.shape)
+    padded = np.pad(each, ((0, 0), (1, 1)), constant_values=-np.inf)
+    piece, place = np.nonzero((each >= padded[:, :-2]) & (each >= padded[:, 2:]))
+    highest = np.argsort(-each[piece, place], kind="stable")[:_BRACKETS]
+    piece, place = piece[highest], place[highest]
+    low, high = grid[piece, np.maximum(place - 1, 0)], grid[piece, np.minimum(place + 1, last)]
     stations = [grid.ravel()]
     for _ in range(_ROUNDS):
         inside = np.linspace(low, high, _POINTS, axis=1)
         finer = measure(inside.ravel())
         stations.append(inside.ravel())
         values = np.concatenate([values, finer])
-        best = finer.reshape(inside.shape).argmax(axis=1)
-        row = np.arange(len(inside))
-        low, high = (
-            inside[row, np.maximum(best - 1, 0)],
-            inside[row, np.minimum(best + 1, _POINTS - 1)],
-        )
+        best, row = finer.reshape(inside.shape).argmax(axis=1), np.arange(len(inside))
+        low = inside[row, np.maximum(best - 1, 0)]
+        high = inside[row, np.minimum(best + 1, _POINTS - 1)]
     top = values.max()
     reached = np.concatenate(stations)[values >= top - 1e-12 * abs(top)]
     return Extreme(float(top), float(reached.min()))
-
-
-def _brackets(grid: Array, values: Array) -> tuple[Array, Array]:
-    """Ends of intervals around the highest local maxima [m]; none crosses a breakpoint."""
-    padded = np.pad(values, ((0, 0), (1, 1)), constant_values=-np.inf)
-    piece, place = np.nonzero((values >= padded[:, :-2]) & (values >= padded[:, 2:]))
-    highest = np.argsort(-values[piece, place], kind="stable")[:_BRACKETS]
-    piece, place = piece[highest], place[highest]
-    last = grid.shape[1] - 1
-    return grid[piece, np.maximum(place - 1, 0)], grid[piece, np.minimum(place + 1, last)]
 
 
 def bending_stations(arm: Manipulator) -> Array:
@@ -177,12 +158,8 @@ def bending_stations(arm: Manipulator) -> Array:
     ends = np.array([0.0, *arm.breakpoints, arm.length])
     start, end = ends[:-1].copy(), ends[1:].copy()
     start[1:], end[:-1] = np.nextafter(start[1:], np.inf), np.nextafter(end[:-1], -np.inf)
-    along = _STATIONS + _PER_TURN * _turns(arm)
-    count = math.ceil(along * float((end - start).max()) / arm.length)
-    return np.linspace(start, end, max(_FEWEST, count), axis=1)
-
-
-def _turns(arm: Manipulator) -> float:
     center = arm.outline(np.linspace(0.0, arm.length, _STATIONS)).center
     relative = np.abs(np.diff(center - center[:, :1], axis=0)).sum(axis=0)
-    return float(relative.max(initial=0.0)) / (2 * np.pi)
+    along = _STATIONS + _PER_TURN * (float(relative.max(initial=0.0)) / (2 * np.pi))
+    count = math.ceil(along * float((end - start).max()) / arm.length)
+    return np.linspace(start, end, max(_FEWEST, count), axis=1)

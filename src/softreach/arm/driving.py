@@ -71,7 +71,7 @@ class Driving:
             return True
         if self._has_kinked_drives or not self.law.columns.size:
             return not self._has_kinked_drives
-        if self.arm.loads is not None or self.law.works.has_growth:
+        if self.arm.loads is not None or self.law.works.growing.size:
             return False
         low, high = self.driven.input_bounds.T
         bundles = self.bundles(low + pilot(self.arm.inputs) * (high - low))

@@ -9,7 +9,6 @@ nothing that reads them.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -106,9 +105,16 @@ def check_extension(arm: Body) -> None:
         InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, dimensions too
             large or too small for numbers of double precision, or more than a hundred turns.
     """
-    if faults := list(_winding_faults(arm)):
-        raise InvalidDesign(faults)
+    faults, most = list[Fault](), MOST_TURN / math.tau
     with np.errstate(all="ignore"):
+        for actuator in arm.actuators:  # those that wind so often that no steps follow them
+            if "revolution" in fields_of(type(actuator)):
+                turn = abs(actuator.value_on("revolution", arm.profile, arm.section))
+                if not (turns := float(turn / math.tau)) <= most:
+                    allowed = f"must be at most {most:g}: give a smaller angle"
+                    faults.append(Fault(f"turns of {actuator.name}", turns, allowed))
+        if faults:
+            raise InvalidDesign(faults)
         table = tables(arm, strain_stations(arm))
     if not (np.isfinite(table.extension).all() and np.isfinite(table.curvature).all()):
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
@@ -121,17 +127,6 @@ def check_extension(arm: Body) -> None:
             kept = "must keep ζ > 0: narrow the bounds"
             allowed = f"reaches extension ζ = {smallest:.4g}{of}; {kept}"
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
-
-
-def _winding_faults(arm: Body) -> Iterator[Fault]:
-    """Fibers and tendons that wind so often about the arm that no steps follow them."""
-    for actuator in arm.actuators:
-        if "revolution" in fields_of(type(actuator)):
-            with np.errstate(all="ignore"):
-                turns = abs(actuator.value_on("revolution", arm.profile, arm.section)) / math.tau
-            if not turns <= (most := MOST_TURN / math.tau):
-                allowed = f"must be at most {most:g}: give a smaller angle"
-                yield Fault(f"turns of {actuator.name}", float(turns), allowed)
 
 
 def range_of_extension(arm: Body, extension: Array) -> tuple[float, float]:
@@ -192,13 +187,9 @@ class Works:
     arm: Body
     columns: NDArray[np.intp]  # Bundles whose unit loads do the work
 
-    @property
-    def has_growth(self) -> bool:
-        """True if bundles change the length of matter."""
-        return len(self._growing) > 0
-
     @lazy
-    def _growing(self) -> NDArray[np.intp]:
+    def growing(self) -> NDArray[np.intp]:
+        """Bundles that change the length of matter."""
         return np.flatnonzero([not each.is_force for each in self.arm.bundle_actuators])
 
     def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:
@@ -218,7 +209,7 @@ class Works:
         table = tables(self.arm, z)
         bent = np.einsum("sct,scb->stb", moment, table.curvature)
         axial = np.einsum("st,sb->tb", force, table.extension)
-        eta = table.rest_length_factor[:, self._growing]
+        eta = table.rest_length_factor[:, self.growing]
         return axial + bent.sum(axis=0), np.einsum("stb,sg->tbg", bent, eta)
 
     def of(self, inner: Array) -> Array:
@@ -228,7 +219,7 @@ class Works:
     def slopes(self, inner: Array) -> Array:
         """Its derivatives by the activations, shape (n or 1, work, bundle)."""
         slopes = self.by_bundle(inner)
-        for k, column in enumerate(self._growing):
+        for k, column in enumerate(self.growing):
             slopes[..., column] += self._sum(self._rates[1][None, ..., k], inner)
         return slopes
 
@@ -236,7 +227,7 @@ class Works:
         """∫ N z + η M·U dZ, shape (n or 1, work, bundle)."""
         linear, growing = self._rates
         work = linear[None].copy()
-        for k, column in enumerate(self._growing):
+        for k, column in enumerate(self.growing):
             work = work + inner[:, column, None, None] * growing[..., k]
         return work
 

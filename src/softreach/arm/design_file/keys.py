@@ -265,7 +265,13 @@ class WrittenFloat(float):
 
 def radians(degrees: Any) -> float:
     """Degrees as `math.radians` has them, those of many digits by exact decimals."""
-    return _radians(getattr(degrees, "text", repr(degrees)).replace("_", ""))
+    text = degrees if isinstance(degrees, str) else getattr(degrees, "text", repr(degrees))
+    text = text.replace("_", "")
+    digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
+    short = len(digits) < _LONG and math.isfinite(float(text))
+    if short or not Decimal(text).is_finite():
+        return math.radians(float(text))
+    return float(Decimal(text) * _PI / 180)
 
 
 def degrees_text(angle: float) -> str:
@@ -274,15 +280,7 @@ def degrees_text(angle: float) -> str:
         return repr(float(angle))
     degrees = Decimal(angle) * 180 / _PI
     texts = (_decimal_text(f"{degrees:.{digits}g}") for digits in range(1, 26))
-    return next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
-
-
-def _radians(text: str) -> float:
-    digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
-    short = len(digits) < _LONG and math.isfinite(float(text))
-    if short or not Decimal(text).is_finite():
-        return math.radians(float(text))
-    return float(Decimal(text) * _PI / 180)
+    return next((text for text in texts if radians(text) == angle), repr(math.degrees(angle)))
 
 
 def _decimal_text(number: str) -> str:

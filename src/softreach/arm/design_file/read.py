@@ -246,9 +246,13 @@ class _Reader(FaultReader):
         self.places[of] = Place(path, field_keys(Material))
         if isinstance(raw, str) and raw in material_names():
             return named_material(raw)
-        if isinstance(raw, str):
-            return self._refuse(path, raw, _materials_text(raw, [*self._materials]))
-        return self._refuse(path, raw, "must be the name of a material, or a table of its values")
+        if not isinstance(raw, str):
+            allowed = "must be the name of a material, or a table of its values"
+            return self._refuse(path, raw, allowed)
+        own = [*self._materials]
+        hint = did_you_mean(raw, [*own, *material_names()]) or LIBRARY_HINT
+        here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
+        return self._refuse(path, raw, f"must be a material {here}, or of the library; {hint}")
 
     def _section(self) -> Any:
         rings = [self._part(Ring, raw, path) for raw, path in self._tables(self._document, "rings")]
@@ -298,12 +302,6 @@ def _home(key: str) -> str:
     homes |= {"[materials.NAME]": Material, "[loads]": Loads}
     home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
     return f"unknown key; it belongs in {home}" if home else ""
-
-
-def _materials_text(name: str, own: list[str]) -> str:
-    hint = did_you_mean(name, [*own, *material_names()]) or LIBRARY_HINT
-    here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
-    return f"must be a material {here}, or of the library; {hint}"
 
 
 def _kinds_text(of: type[Kind], kind: Any) -> str:
