@@ -35,8 +35,7 @@ _ALLOWED = (
     f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z), "
     "or a rotation vector (three numbers [rad])"
 )
-_NEAR = 1e-6
-"""Largest error of the numbers of a rotation: what is typed with seven digits."""
+_NEAR = 1e-6  # Largest error of the numbers of a rotation: what is typed with seven digits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,5 +153,4 @@ def _turned(rotation: Array, vectors: Array) -> Array:
     return np.stack([a * x + b * y + c * z for a, b, c in rotation.tolist()], axis=-1)
 
 
-UPRIGHT = Base()
-"""At the origin of the world, where the frame of the base is that of the world."""
+UPRIGHT = Base()  # At the origin of the world, where the frame of the base is that of the world

@@ -1,10 +1,8 @@
 """Extremes of bending κ over the bounds of an arm, exact: at stations and along the arm.
 
-κ is the curvature of the centerline as it is, |u| η/ζ of theory (7) and (45). Fibers and muscles
-have η = ζ: the (u1, u2) that they reach at a station are a zonogon, the image of the box of inputs.
-Forces have η = 1: they reach a polygon, the box seen from ζ = 0, whose vertices and edges are those
-of corners and edges of the box. The farthest vertex and the point nearest to the origin are the
-range.
+κ is |u| η/ζ of theory (7) and (45). The (u1, u2) that fibers and muscles reach at a station, of
+η = ζ, are a zonogon, the image of the box of inputs. Forces, of η = 1, reach a polygon, the box
+seen from ζ = 0. The farthest vertex and the point nearest to the origin are the range.
 """
 
 from __future__ import annotations

@@ -1,10 +1,6 @@
-"""Numbers of a design, each declared once: symbol, unit, meaning, range.
+"""Numbers of a design, each declared once: symbol, unit, meaning, range; see DESIGN.md.
 
-    offset: float = number("θ0", "rad", "polar angle of the first bundle", default=0.0)
-
-stands in a frozen dataclass, and `fields_of` lists the numbers of a kind of part. Checks, keys and
-units of design files, their JSON schema, parameters and sliders follow from it. In kinds outside
-softreach, fields of type `float`, `int` or `tuple[float, ...]` are numbers too, without a unit.
+In kinds outside softreach, fields of numbers without a declaration are numbers without a unit.
 """
 
 from __future__ import annotations
@@ -30,11 +26,8 @@ Shape = Literal["single", "along", "triple", "series", "stations", "several"]
 """One number, a function along the arm alone, a vector, several along the arm, their places, or
 several that are none of these."""
 
-_NEAREST = 1e-12
-"""Z/L by which stations differ at least: less is rounding."""
-
-_NOTHING = 1e-30
-"""Size up to which a component of a vector is 0: its powers would be."""
+_NEAREST = 1e-12  # Z/L by which stations differ at least: less is rounding
+_NOTHING = 1e-30  # Size up to which a component of a vector is 0: its powers would be
 
 _SENSE: Mapping[str, tuple[float, float]] = {
     "L": (1e-6, 1e3),
@@ -48,8 +41,7 @@ _SENSE: Mapping[str, tuple[float, float]] = {
 }
 """Symbol or unit -> smallest size above 0 and largest that a number of an arm has [unit]."""
 
-MOST = 1e15
-"""The largest size of numbers of an arm in other units, and of activations."""
+MOST = 1e15  # The largest size of numbers of an arm in other units, and of activations
 
 _PLAIN = re.compile(
     r"(?:typing\.Optional\[)?(float|int)(\|None|\])?|tuple\[float(,(float|\.\.\.))*\]"

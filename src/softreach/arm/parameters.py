@@ -1,8 +1,6 @@
 """Design parameters: the numbers of an arm that a sweep, a slider or an optimizer varies.
 
-Parts say what numbers they have (`Part.numbers`), what values (`values_of`), and make changed
-copies (`replace`). A parameter is a number of a part, one that several parts share, or one that
-numbers of several parts follow by a law of its own.
+A parameter is a number of a part, one that several parts share, or a law that several follow.
 """
 
 from __future__ import annotations
@@ -31,19 +29,14 @@ __all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "paramet
 PartKey = tuple[str | int, ...]
 """("profile",), ("rings", 0, "material"), ("core",), ("actuators", "left"), ("loads",), ..."""
 
-Address = tuple[PartKey, str]
-"""A part, and the name of one of its numbers there."""
-
-Rule = Callable[[float], float]
-"""New value from the old one."""
-
+Address = tuple[PartKey, str]  # A part, and the name of one of its numbers there
+Rule = Callable[[float], float]  # New value from the old one
 _ROUNDING = 1e-12  # of an angle that follows from another one
 _FEW = 12
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]$")
 _ACTIVATIONS = ("activation", "force", "pressure", "tension")
 """Names under which activations are looked for among the parameters of an actuator."""
-_BOUNDS = {"actuators": "activation_bounds", "drives": "bounds"}
-"""Fields that `lower` and `upper` are of."""
+_BOUNDS = {"actuators": "activation_bounds", "drives": "bounds"}  # Fields of `lower` and `upper`
 _ABSENT = {
     "loads": "the arm has no loads: give it some first",
     "base": "the arm stands upright at the origin: give it another base first",
@@ -364,21 +357,11 @@ def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipula
     edits: _Edits = {}
     for each, value in new.items():
         _add_edits(edits, arm, each, lambda _, value=value: value)
-    names = {each.name: value for each, value in new.items()}
-    return _made(arm, edits, names) if edits else arm
+    return _made(arm, edits, {each.name: x for each, x in new.items()}) if edits else arm
 
 
 def shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
-    """The design with an amount added to one parameter, in each part to the part's own value.
-
-    Args:
-        arm: The design to start from.
-        parameter: One of its parameters.
-        amount: What is added [its unit].
-
-    Raises:
-        InvalidDesign: No such arm can exist.
-    """
+    """The design with an amount [unit] added to one parameter, in each part to its own value."""
     edits: _Edits = {}
     _add_edits(edits, arm, parameter, lambda old: old + amount)
     return _made(arm, edits, {parameter.name: parameter.value(arm) + amount})

@@ -26,8 +26,7 @@ from softreach.support.lazy import lazy
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEWTON_STEPS = 60
 _WIDEST = 100.0  # over L, of any radius
-_CHECKED = 65
-"""Places at which a radius is seen to be positive."""
+_CHECKED = 65  # Places at which a radius is seen to be positive
 
 
 @dataclass(frozen=True, kw_only=True)

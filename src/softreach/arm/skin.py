@@ -1,8 +1,4 @@
-"""Skins of an arm on a centerline: its body, and a surface for each bundle.
-
-Bundles that fill a sector of a ring are bands on the outside of that ring, lines are thin tubes,
-lumens tubes of their radius. They are cut where they begin and end to act.
-"""
+"""Skins of an arm on a centerline: its body, and a surface for each bundle where it acts."""
 
 from __future__ import annotations
 

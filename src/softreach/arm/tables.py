@@ -2,8 +2,6 @@
 
 The map is linear in the activations, theory (7). Curvature u is per length of η = 1 + Σ zγ over
 fibers and muscles alone: these change the length of matter at rest, which forces leave as it is.
-All physics lives in this room: a new actuator, profile or material changes these tables, and
-nothing that reads them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Parameters as files and the command line write them: the unit in the name, angles in degrees.
-
-The unit stands before the place in a series: `taper_deg`, `left.helical_angle.values_deg[2]`.
-"""
+"""Parameters as files and the command line write them: the unit in the name, angles in degrees."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from softreach.support.quantity import read_quantity, unit_names
 
 
 def written_name(name: str, unit: str) -> str:
-    """A name with its unit: `taper_deg`, `rings[0].material.young_modulus_pa`, `radii_m[1]`."""
+    """A name with its unit: `taper_deg`, `left.helical_angle.values_deg[2]`."""
     return with_suffix(name, unit_suffix(unit))
 
 

@@ -115,7 +115,15 @@ def calibrate(
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
         result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
     result = replace(result, seconds=perf_counter() - begin)
-    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+    if not rivals:
+        return result
+    laws = {
+        "constant curvature": constant_curvature(arm, train, table, progress),
+        "quadratic ridge": quadratic(train, table),
+    }
+    off = [(name, count, places - table.places) for name, (places, count) in laws.items()]
+    others = (Rival(name, n, misses(x[~held]), misses(x[held])) for name, n, x in off)
+    return replace(result, rivals=tuple(others))
 
 
 def _held_out(table: Measurements, share: float, by_run: bool | None, seed: int) -> Mask:
@@ -131,18 +139,6 @@ def _held_out(table: Measurements, share: float, by_run: bool | None, seed: int)
         raise InvalidInput("hold_out", share, f"small enough to leave some of {count} {what}")
     chosen = np.random.default_rng(seed).permutation(count)[:out]
     return np.isin(parts, chosen)
-
-
-def _rivals(
-    arm: Manipulator, table: Measurements, held: Mask, progress: Progress
-) -> tuple[Rival, ...]:
-    def rival(name: str, places: Array, numbers: int) -> Rival:
-        off = places - table.places
-        return Rival(name, numbers, misses(off[~held]), misses(off[held]))
-
-    train = table.of(~held)
-    arcs = constant_curvature(arm, train, table, progress)
-    return rival("constant curvature", *arcs), rival("quadratic ridge", *quadratic(train, table))
 
 
 def leave_one_run_out(

@@ -17,16 +17,13 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from softreach.support.progress import Progress
 
-SAME = 1e-7
-"""Smallest singular value over the largest, in scales of the numbers, that data can tell."""
+SAME = 1e-7  # Least singular value over the largest, in scales of numbers, that data can tell
 _IDLE = 1e-9  # motion of markers in L, or over that of the other numbers, that is rounding
 _ROBUST = 3.0  # residuals beyond so many widths count less than their squares
-_FINE, _COARSE = 1e-7, 1e-3
-"""Least share by which a step must improve: of the last round, of those before."""
+_FINE, _COARSE = 1e-7, 1e-3  # Least share by which a step improves: last round, those before
 _MOST = 60
 _SAMPLES = 100  # samples by which exchanges are compared
-_PROMISING, _BETTER = 0.8, 0.5
-"""Error over that of the columns as they are: before a fit, and after it."""
+_PROMISING, _BETTER = 0.8, 0.5  # Error over that of the columns as they are: before a fit, after it
 _ALIKE, _FAR_BETTER = 1.2, 0.35
 """Factor between errors that nothing tells apart, and that with which a fit is not begun."""
 _FAR = 1.0  # m, what a sample without equilibrium misses

@@ -52,8 +52,7 @@ _ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")
 _PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNORECASE)
 _MOST_ROWS = 2_000_000
 _MOST_BYTES = 1000 * MEGABYTE
-_WIDEST = 4.0
-"""Distance of a place from the middle of all, in lengths of the arm, that is no pose of it."""
+_WIDEST = 4.0  # Distance of a place from the middle of all, in lengths of the arm, that is no pose
 _HARD = 100.0  # inputs beyond the bounds of the design, in them, that are a wrong unit or a slip
 _SLACK = 0.01  # of the largest tension: a negative one that is the zero of a load cell
 

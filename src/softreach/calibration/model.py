@@ -79,13 +79,6 @@ def marker_stations(arm: Manipulator, names: Iterable[str]) -> tuple[Array, Arra
     return np.array(places), np.array([known[name].offset for name in names])
 
 
-def _moves_guides(arm: Manipulator, neighbors: list[Neighbors]) -> bool:
-    """True if arcs between guides come or go with a number."""
-    near = (other for each in neighbors for _, other in each if isinstance(other, Manipulator))
-    bundles = body_of(arm).bundles
-    return has_guides(arm) and any(body_of(other).bundles != bundles for other in near)
-
-
 @dataclass(frozen=True, eq=False)
 class MarkerModel:
     """Markers of an arm as functions of its free numbers, at given inputs."""
@@ -112,8 +105,10 @@ class MarkerModel:
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
-        if _moves_guides(arm, neighbors):
-            return self._by_differences(arm, scale, neighbors)
+        if has_guides(arm):
+            near = [x for each in neighbors for _, x in each if isinstance(x, Manipulator)]
+            if any(body_of(x).bundles != body_of(arm).bundles for x in near):  # of other arcs
+                return self._by_differences(arm, scale, neighbors)
         blocks = (self.inputs[rows] for rows in parallel.blocks(len(self.inputs), _BLOCK))
         return joined([self._block(arm, scale, neighbors, grid, inputs) for inputs in blocks])
 

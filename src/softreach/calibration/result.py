@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -196,7 +196,7 @@ class Calibration(Reported):
         """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
         table = read_measurements(self.start, data, **columns)
         scale = self.fit.free.scaled(self.fit.values)
-        return self._model(table).of_arm(self.arm, scale).places - table.places
+        return MarkerModel.of(self.fit.free, table).of_arm(self.arm, scale).places - table.places
 
     def predict(self, inputs: ArrayLike, *, numbers_only: bool = False) -> tuple[Array, Array]:
         """Places of the markers and the standard deviations to expect of measured ones.
@@ -217,7 +217,8 @@ class Calibration(Reported):
         """
         allowed = f"shape (n, {self.arm.inputs})"
         x = as_rows("inputs", inputs, self.arm.inputs, allowed)
-        prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
+        model = MarkerModel(self.fit.free, x, self.data.marker_names)
+        prediction = model.predict(self.fit.values, slopes=True)
         covariance = self.uncertainty.covariance
         square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
         square = np.maximum(square, 0.0)
@@ -264,9 +265,6 @@ class Calibration(Reported):
     @property
     def _held_text(self) -> str:
         return f"{int(self.held.sum())} {'in held-out runs' if self.held_runs else 'held out'}"
-
-    def _model(self, data: Measurements) -> MarkerModel:
-        return MarkerModel.of(self.fit.free, data)
 
     def to_dataset(self) -> xr.Dataset:
         """Numbers with their errors over `number`, residuals over `sample`, `marker`, `axis`."""

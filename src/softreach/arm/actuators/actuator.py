@@ -26,8 +26,7 @@ MOST_TURN = 200 * math.pi
 """A hundred turns [rad]: steps along the arm grow with them, and with a thousand no tolerance is
 met."""
 
-MOST_BUNDLES = 100
-"""Of an arm in all: the time to bound its bending grows with their square."""
+MOST_BUNDLES = 100  # Of an arm in all: the time to bound its bending grows with their square
 
 
 _BOUND = re.compile(r"(lower|upper)(?:\[(\d+)\])?")

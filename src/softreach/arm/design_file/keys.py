@@ -1,8 +1,4 @@
-"""Vocabulary of design files: keys with their units, kinds of tables, values as TOML writes them.
-
-Keys follow from the numbers that the parts of an arm declare; angles are in degrees, and no digit
-is lost either way.
-"""
+"""Vocabulary of design files: keys with their units, kinds of tables, degrees of all digits."""
 
 from __future__ import annotations
 
@@ -37,8 +33,7 @@ from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
-Kind = TypeVar("Kind", bound=Part)
-"""Actuators or profiles."""
+Kind = TypeVar("Kind", bound=Part)  # Actuators or profiles
 
 KINDS: Mapping[type, Mapping[str, type]] = {
     Actuator: {

@@ -1,9 +1,6 @@
 """From the text of a design file to the fields of an arm.
 
-The reader knows how a file says things: keys, units, tables inside tables. What may be said, the
-parts judge themselves when they are made, and the arm when they are put together; their faults
-come back under the keys of the file (`keys.in_file_terms`), as the reader remembers where in the
-file each part stands.
+The parts and the arm judge themselves; their faults come back under the keys of the file.
 """
 
 from __future__ import annotations
