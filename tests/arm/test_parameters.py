@@ -10,11 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softreach.arm import designs
-from softreach.arm.actuators import (
-    Chamber,
-    FiberArchitecture,
-    Tendon,
-)
+from softreach.arm.actuators import Chamber, FiberArchitecture, Tendon
 from softreach.arm.along import Samples
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads

@@ -21,14 +21,7 @@ from softreach.arm.part import gathered, kind_faults
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import Marker
-from softreach.support.arguments import (
-    as_flag,
-    as_given,
-    as_integer,
-    as_path,
-    as_text,
-    plain,
-)
+from softreach.support.arguments import as_flag, as_given, as_integer, as_path, as_text, plain
 from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.text import write_text
