@@ -62,23 +62,18 @@ def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
     return least, _farthest((start, end))
 
 
-def _largest_at(arm: Manipulator, stations: Array) -> Array:
-    """As `bending_at`, the largest alone [1/m]: with many bundles by far the cheaper half."""
-    return _farthest(_reached(arm, stations)[2])
-
-
 def _farthest(edges: tuple[Array, Array]) -> Array:
     return np.max([np.linalg.norm(ends, axis=-1).max(axis=1) for ends in edges], axis=0)
 
 
 def largest_bending(arm: Manipulator) -> Extreme:
     """The largest bending [1/m] within the bounds and along the arm, to 1e-9 of it."""
-    return _largest(arm, lambda z: _largest_at(arm, z))
+    return _largest(arm, lambda z: _farthest(_reached(arm, z)[2]))
 
 
 def sharpest_bending(arm: Manipulator) -> Extreme:
     """The largest bending times R2(Z) [-]: the inner side folds where it is 1 or more."""
-    return _largest(arm, lambda z: _largest_at(arm, z) * arm.profile.radius(z))
+    return _largest(arm, lambda z: _farthest(_reached(arm, z)[2]) * arm.profile.radius(z))
 
 
 def smallest_bending(arm: Manipulator) -> Extreme:

@@ -16,7 +16,7 @@ from softreach.arm.stations import Marker
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
 
@@ -220,17 +220,13 @@ def _skins(arm: Body, shape: Shape, sector: Callable[[_Span], Surface]) -> list[
         extent, z = float(outline.extent[k]), line.z[part]
         return _Span(extent, z, held, *section, center, inner, outer, radius[part])
 
-    return [
-        joined([make[kind](span(k, part)) for part in _runs(acts[:, k])])
-        for k, kind in enumerate(outline.shape)
-    ]
-
-
-def _runs(acts: Mask) -> list[slice]:
-    """Stations from the start to the end of each run of pieces that act."""
-    change = np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))
-    pairs = zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True)
-    return [slice(int(start), int(end) + 1) for start, end in pairs]
+    surfaces: list[Surface] = []
+    change = np.diff(np.pad(acts.astype(np.int8), ((1, 1), (0, 0))), axis=0)
+    for k, kind in enumerate(outline.shape):  # from start to end of each run of pieces that act
+        ends = zip(np.flatnonzero(change[:, k] > 0), np.flatnonzero(change[:, k] < 0), strict=True)
+        runs = [slice(int(start), int(end) + 1) for start, end in ends]
+        surfaces.append(joined([make[kind](span(k, run)) for run in runs]))
+    return surfaces
 
 
 def _line_tube(span: _Span, radius: float) -> Surface:

@@ -239,7 +239,10 @@ def fitted(
     residuals = prediction.places - places
     (low, high), hair = problem.bounds, 1e-6 * model.free.scale
     at_bound = (values <= low + hair) | (values >= high - hair)
-    weights = problem.weights_of(residuals)
+    weights = problem.seen.astype(float)
+    if problem.width is not None:
+        distance = np.linalg.norm(np.where(problem.seen[..., None], residuals, 0.0), axis=2)
+        weights = problem.seen / np.sqrt(1.0 + (distance / problem.width) ** 2)
     return Fit(model.free, values, prediction, residuals, weights, at_bound, count, converged)
 
 
@@ -301,13 +304,6 @@ class _Problem:
             gtol=1e-14,
             max_nfev=_MOST,
         )
-
-    def weights_of(self, residuals: Array) -> Array:
-        """Weight of each marker of each sample in the fit, (n, marker)."""
-        if self.width is None:
-            return self.seen.astype(float)
-        distance = np.linalg.norm(np.where(self.seen[..., None], residuals, 0.0), axis=2)
-        return self.seen / np.sqrt(1.0 + (distance / self.width) ** 2)
 
 
 def _loss(count: int, width: float | None) -> str | Callable[[Array], Array]:

@@ -159,7 +159,22 @@ class Calibration(Reported):
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the model or its numbers, in a sentence each, with what to try."""
-        return tuple([*_doubtful_inputs(self), *_doubtful_priors(self), *_better_rivals(self)])
+        doubts, own = [*_doubtful_inputs(self)], self.held_out
+        for number, value in zip(self.fit.free.numbers, self.fit.values.tolist(), strict=True):
+            mean, width = number.prior or (value, 1.0)
+            if (off := abs(value - mean) / width) > _FAR_FROM_PRIOR:
+                doubts.append(
+                    f"{number.name} is {off:.1f} widths from its prior: free another number that "
+                    "may explain the data, or widen the prior"
+                )
+        known = [rival for rival in self.rivals if rival.held_out.number]
+        best = min(known, key=lambda rival: rival.held_out.rms, default=None)
+        if best is not None and best.held_out.rms < _BETTER * own.rms:
+            doubts.append(
+                f"{best.name} predicts better than the arm ({1e3 * best.held_out.rms:.3g} mm, not "
+                f"{1e3 * own.rms:.3g}): check order, sign and unit of inputs, or free more numbers"
+            )
+        return tuple(doubts)
 
     @property
     def held_runs(self) -> bool:
@@ -475,26 +490,3 @@ def _doubtful_inputs(result: Calibration) -> Iterator[str]:
                 seen = ", ".join(data.marker_names[m] for m in hits)
                 times = share[k, hits[0]]
                 yield f"{name} moves {seen} {words} ({times:.2f} times as far as the model)"
-
-
-def _doubtful_priors(result: Calibration) -> Iterator[str]:
-    for number, value in zip(result.fit.free.numbers, result.fit.values.tolist(), strict=True):
-        if number.prior is None:
-            continue
-        mean, width = number.prior
-        if (off := abs(value - mean) / width) > _FAR_FROM_PRIOR:
-            yield (
-                f"{number.name} is {off:.1f} widths from its prior: free another number that may "
-                "explain the data, or widen the prior"
-            )
-
-
-def _better_rivals(result: Calibration) -> Iterator[str]:
-    own = result.held_out
-    better = [r for r in result.rivals if r.held_out.number and r.held_out.rms < _BETTER * own.rms]
-    if better:
-        best = min(better, key=lambda rival: rival.held_out.rms)
-        yield (
-            f"{best.name} predicts better than the arm ({1e3 * best.held_out.rms:.3g} mm, not "
-            f"{1e3 * own.rms:.3g}): check order, sign and unit of inputs, or free more numbers"
-        )

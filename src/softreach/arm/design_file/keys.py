@@ -274,11 +274,10 @@ def degrees_text(angle: float) -> str:
     if angle == 0:
         return repr(float(angle))
     degrees = Decimal(angle) * 180 / _PI
-    texts = (_decimal_text(f"{degrees:.{digits}g}") for digits in range(1, 26))
-    return next((text for text in texts if radians(text) == angle), repr(math.degrees(angle)))
-
-
-def _decimal_text(number: str) -> str:
-    plain = -6 < Decimal(number).adjusted() < 16
-    text = f"{Decimal(number):f}" if plain else number
-    return text if "." in text or "e" in text else f"{text}.0"
+    for digits in range(1, 26):
+        text = f"{degrees:.{digits}g}"
+        if -6 < Decimal(text).adjusted() < 16:
+            text = f"{Decimal(text):f}"
+        if radians(text) == angle:
+            return text if "." in text or "e" in text else f"{text}.0"
+    return repr(math.degrees(angle))

@@ -273,8 +273,15 @@ class _Reader(FaultReader):
                 self._refuse(key, self._document[key], words[block.shape])
         if self._document.get("rings") == []:
             self._refuse("rings", [], "must not be empty")
+        homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
+        homes |= {"[materials.NAME]": Material, "[loads]": Loads}
         for key in (key for key in self._document if key not in LAYOUT):
-            said = _home(key) or unknown_key(key, {name: name for name in LAYOUT})
+            home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
+            said = f"unknown key; it belongs in {home}"
+            if (kind := key.removesuffix("s")) in KINDS[Actuator]:
+                said = f'unknown key; write [[actuators]] with kind = "{kind}"'
+            elif not home:
+                said = unknown_key(key, {name: name for name in LAYOUT})
             self._refuse(key_text(key), self._document[key], said)
 
     def _plain(self, value: Any, path: str) -> Any:
@@ -290,15 +297,6 @@ class _Reader(FaultReader):
 
 def _in_radians(value: Any) -> Any:
     return radians(value) if Range().admits(value) else value
-
-
-def _home(key: str) -> str:
-    if (kind := key.removesuffix("s")) in KINDS[Actuator]:
-        return f'unknown key; write [[actuators]] with kind = "{kind}"'
-    homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
-    homes |= {"[materials.NAME]": Material, "[loads]": Loads}
-    home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
-    return f"unknown key; it belongs in {home}" if home else ""
 
 
 def _kinds_text(of: type[Kind], kind: Any) -> str:
