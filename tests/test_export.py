@@ -85,24 +85,18 @@ class TestCloud:
         assert table.schema.metadata[b"seed"] == b"5"
         assert table.schema.field("x").metadata[b"units"] == b"m"
 
-    def test_npz_reads_back_equal_without_pickle(self, cloud, tmp_path):
-        export_cloud(cloud, tmp_path / "cloud.npz")
-        with np.load(tmp_path / "cloud.npz", allow_pickle=False) as data:
-            np.testing.assert_array_equal(data["tip"], cloud.tip)
-            np.testing.assert_array_equal(data["activation"], cloud.activation)
-            assert list(data["bundle"]) == ["left", "right", "longitudinal"]
-            assert str(data["design"]) == cloud.attrs["design"]
-            assert int(data["seed"]) == 5
-            assert str(data["tip_units"]) == "m"
-
-    def test_mat_reads_back_equal(self, cloud, tmp_path):
-        export_cloud(cloud, tmp_path / "cloud.mat")
-        data = loadmat(tmp_path / "cloud.mat", simplify_cells=True)
+    @pytest.mark.parametrize("suffix", ["npz", "mat"])
+    def test_arrays_read_back_equal_without_pickle(self, suffix, cloud, tmp_path):
+        path = tmp_path / f"cloud.{suffix}"
+        export_cloud(cloud, path)
+        data = np.load(path) if suffix == "npz" else loadmat(path, simplify_cells=True)
         np.testing.assert_array_equal(data["tip"], cloud.tip)
         np.testing.assert_array_equal(data["activation"], cloud.activation)
         assert list(data["bundle"]) == ["left", "right", "longitudinal"]
-        assert data["metadata"]["design"] == cloud.attrs["design"]
-        assert data["metadata"]["seed"] == 5
+        described = data if suffix == "npz" else data["metadata"]
+        assert str(described["design"]) == cloud.attrs["design"]
+        assert int(described["seed"]) == 5
+        assert str(described["tip_units"]) == "m"
 
     def test_vtu_reads_back_equal(self, cloud, expected, tmp_path):
         export_cloud(cloud, tmp_path / "cloud.vtu")
@@ -111,10 +105,14 @@ class TestCloud:
         for name in COLUMNS[3:]:
             np.testing.assert_array_equal(np.ravel(mesh.point_data[name]), expected[name])
 
-    def test_ply_reads_back_equal_with_activations_and_design(self, cloud, expected, tmp_path):
+    def test_ply_reads_back_equal_with_activations_as_colors_and_design(
+        self, cloud, expected, tmp_path
+    ):
         export_cloud(cloud, tmp_path / "cloud.ply")
         points = trimesh.load(tmp_path / "cloud.ply")
         np.testing.assert_array_equal(points.vertices, cloud.tip)
+        gamma = np.abs(cloud.activation.values)
+        np.testing.assert_array_equal(points.colors[:, :3], np.rint(255 * gamma / gamma.max()))
         data = meshio.read(tmp_path / "cloud.ply").point_data
         for name in COLUMNS[3:]:
             np.testing.assert_array_equal(data[name], expected[name])
@@ -124,20 +122,13 @@ class TestCloud:
         assert design == cloud.attrs["design"].splitlines()
         assert "comment seed: 5" in header
 
-    def test_ply_colors_are_the_relative_activations(self, cloud, tmp_path):
-        export_cloud(cloud, tmp_path / "cloud.ply")
-        rgb = trimesh.load(tmp_path / "cloud.ply").colors[:, :3]
-        gamma = np.abs(cloud.activation.values)
-        np.testing.assert_array_equal(rgb, np.rint(255 * gamma / gamma.max()))
-
     def test_blocks_do_not_show_in_the_result(self, cloud, tmp_path, monkeypatch):
-        export_cloud(cloud, tmp_path / "whole.ply")
-        export_cloud(cloud, tmp_path / "whole.csv")
-        monkeypatch.setattr("softreach.export.clouds._BLOCK", 7)
-        export_cloud(cloud, tmp_path / "blocks.ply")
-        export_cloud(cloud, tmp_path / "blocks.csv")
+        for block in (7, 1 << 18):
+            monkeypatch.setattr("softreach.export.clouds._BLOCK", block)
+            for suffix in ("ply", "csv"):
+                export_cloud(cloud, tmp_path / f"{block}.{suffix}")
         for suffix in ("ply", "csv"):
-            whole, blocks = (tmp_path / f"{name}.{suffix}" for name in ("whole", "blocks"))
+            blocks, whole = (tmp_path / f"{block}.{suffix}" for block in (7, 1 << 18))
             assert whole.read_bytes() == blocks.read_bytes()
 
     @pytest.mark.parametrize("suffix", ["ply", "csv", "parquet", "npz", "mat"])

@@ -172,6 +172,9 @@ def test_solutions_print_how_many_targets_were_reached_and_how_well(folded):
         f"<Solution for (0, 0, 2) m: unreachable, nearest point {solutions[-1].gap:.3g} m away>"
     )
     assert repr(solutions[0]).endswith(f"largest residual {solutions[0].residuals.max():.1e} m>")
+    page = solutions._repr_html_()
+    assert page.startswith(f"<p>{repr(solutions)[1:-1]}</p>")
+    assert "target_of" in page
 
 
 def test_blocks_and_threads_change_no_solution(folded, monkeypatch):

@@ -9,7 +9,7 @@ import softreach as sr
 from softreach.arm import Chamber, FiberArchitecture, LinearTaper, ObliqueMuscle, Tendon
 from softreach.arm.skin import Centerline, arm_surface, bundle_skins, bundle_surfaces, inside
 from softreach.export import export_arm
-from softreach.picture.shading import faces_to_eye, seen_through
+from softreach.picture.zbuffer import faces_to_eye, seen_through
 from softreach.plot import DesignPanel, plot_arm, plot_cross_section, plot_designs
 from softreach.rod.kinematics import rest_configuration
 from softreach.support.palette import material_fill

@@ -17,8 +17,8 @@ from softreach.cli.app import run
 from softreach.paper import reproduce, reproduce_paper
 from softreach.paper.notebook import QUICK, Notebook, Verdict
 from softreach.paper.reproduce import CLAIMS
-from softreach.paper.sections import uniqueness, volume
-from softreach.paper.sections.misprints import printed_deltas
+from softreach.paper.sections import redundancy, sweep
+from softreach.paper.sections.model import printed_deltas
 from softreach.paper.sections.sweep import shapes
 from softreach.plot import atlas, axes, style
 from softreach.support.errors import InvalidInput
@@ -167,7 +167,7 @@ def test_what_only_the_full_sizes_test_is_marked_so_in_a_quick_run(folder):
 def test_a_part_computed_by_itself_is_that_of_a_whole_run_to_the_last_bit(folder, tmp_path):
     """As when a run is killed and resumed; all but the seconds that it took."""
     whole = notebook(folder, "volume")
-    Notebook(tmp_path, "volume", whole["key"]).fill(volume.computed, TINY)
+    Notebook(tmp_path, "volume", whole["key"]).fill(sweep.volume, TINY)
     again = json.loads((tmp_path / "volume.json").read_text())
     assert again | {"seconds": 0.0} == whole | {"seconds": 0.0}
     figure = "alpha_dependence.pdf"
@@ -189,8 +189,8 @@ def test_both_activations_of_the_example_reach_the_same_tip(folder):
 
 def test_a_finished_report_is_only_written_again(folder, small, monkeypatch):
     before = (folder / "quick" / "report.html").read_text()
-    for section in reproduce.SECTIONS.values():
-        monkeypatch.setattr(section, "computed", None)  # nothing to call
+    for name, section in reproduce.SECTIONS.items():
+        monkeypatch.setattr(section, name, None)  # nothing to call
     assert reproduce_paper(folder, quick=True, overwrite=True).read_text() == before
 
 
@@ -204,7 +204,7 @@ def test_an_interrupted_report_keeps_its_finished_parts(tmp_path, small, monkeyp
                 raise KeyboardInterrupt
             return {name: 1.0}
 
-        return SimpleNamespace(computed=compute)
+        return SimpleNamespace(**{name: compute})
 
     monkeypatch.setattr(reproduce, "CLAIMS", ())
     monkeypatch.setattr(reproduce, "SECTIONS", {"a": part("a"), "b": part("b", fails=True)})
@@ -258,5 +258,5 @@ def test_printed_appendix_a_is_the_integrals_but_for_delta3(ratio, taper, angle,
 def test_an_atlas_that_was_removed_is_asked_for_and_does_not_come_back(tmp_path):
     notes = Notebook(tmp_path / "figures", "uniqueness", {})
     with pytest.raises(InvalidInput, match=r"atlas = .*remove .*sweep\.json too"):
-        uniqueness.computed(TINY, notes)
+        redundancy.uniqueness(TINY, notes)
     assert not (tmp_path / "atlas.zarr").exists()

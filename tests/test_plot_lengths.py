@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,21 +23,6 @@ OBLIQUE = "oblique"
 
 Shown = tuple[str, object, object]
 """A label, the numbers drawn beside it, and what they show in powers of m."""
-Case = Callable[[SimpleNamespace], Iterator[Shown]]
-
-CASES: dict[str, Case] = {}
-MAY_NOT_KNOW: set[str] = set()
-
-
-def case(*, may_not_know: bool) -> Callable[[Case], Case]:
-    """Enter a figure; it is drawn with data that know L, and if possible with data that do not."""
-
-    def enter(function: Case) -> Case:
-        CASES[function.__name__] = function
-        MAY_NOT_KNOW.update({function.__name__} if may_not_know else ())
-        return function
-
-    return enter
 
 
 def si(label: str, numbers: object) -> np.ndarray:
@@ -117,7 +102,6 @@ def ignorant(everything) -> SimpleNamespace:
     return found
 
 
-@case(may_not_know=True)
 def plot_cloud(of):
     yield from plane(plot.plot_cloud(of.cloud, view="back"), of.tips)
     yield from space(plot.plot_cloud(of.cloud, view=OBLIQUE), of.tips)
@@ -125,7 +109,6 @@ def plot_cloud(of):
     yield from plane(plot.plot_cloud(of.cloud, view="top", box=box), of.tips)
 
 
-@case(may_not_know=True)
 def plot_slab(of):
     ax = plot.plot_slab(of.cloud, view="side", at=0.03, thickness=0.05)
     yield from plane(ax, of.tips)
@@ -135,26 +118,22 @@ def plot_slab(of):
     yield half, (0, float(half[:-2])), (0, 0.025)
 
 
-@case(may_not_know=True)
 def plot_distance(of):
     tips = of.tips[of.distance.sample]
     yield from plane(plot.plot_distance(of.cloud, of.distance, view="left"), tips)
 
 
-@case(may_not_know=True)
 def plot_distance_histograms(of):
     (ax,) = plot.plot_distance_histograms({"one": of.distance}).axes
     yield "", ax.get_xlim(), of.distance
 
 
-@case(may_not_know=True)
 def plot_redundancy(of):
     figure = plot.plot_redundancy({"one": of.cloud}, {"one": of.distance}, thickness=0.05)
     for ax in image_axes(figure):
         yield from plane(ax, of.tips)
 
 
-@case(may_not_know=True)
 def plot_views(of):
     arm = of.arm if of.known else None
     *planes, oblique = image_axes(plot.plot_views(of.cloud, arm))
@@ -163,7 +142,6 @@ def plot_views(of):
     yield from space(oblique, of.tips)
 
 
-@case(may_not_know=True)
 def plot_slice(of):
     ax = plot.plot_slice(of.grid, view="top", at=0.1)
     half = of.grid.cell / 2
@@ -174,20 +152,17 @@ def plot_slice(of):
     yield title, (0, float(re.search(r"[\d.]+", title)[0])), (0, 0.1)
 
 
-@case(may_not_know=True)
 def plot_slices(of):
     for ax in image_axes(plot.plot_slices(of.grid, at=(0.01, 0.0, 0.1))):
         points = np.stack(np.broadcast_arrays(*np.ix_(*(ends(of.grid[a]) for a in "xyz"))), -1)
         yield from plane(ax, points.reshape(-1, 3))
 
 
-@case(may_not_know=True)
 def plot_hull(of):
     yield from plane(plot.plot_hull(of.hull, length=of.length), of.hull.vertices)
     yield from space(plot.plot_hull(of.hull, length=of.length, view=OBLIQUE), of.hull.vertices)
 
 
-@case(may_not_know=True)
 def plot_volume_curve(of):
     alphas = np.geomspace(0.03, 0.3, 5)
     volumes = sr.volume.volume_curve(of.cloud.tip, alphas)
@@ -199,7 +174,6 @@ def plot_volume_curve(of):
     yield ax.get_ylabel(), (0, ax.lines[1].get_ydata()[0]), (0, convex)
 
 
-@case(may_not_know=True)
 def plot_curvature(of):
     for quantity in ("bending", "torsion"):
         ax = plot.plot_curvature({"one": of.curvature}, quantity=quantity)
@@ -209,7 +183,9 @@ def plot_curvature(of):
         yield ax.get_ylabel(), ax.lines[-1].get_ydata(), medians
 
 
-@case(may_not_know=False)
+# From here on data always know the length, as they hold the arm.
+
+
 def plot_arm(of):
     yield from plane(plot.plot_arm(of.arm, view="side"), of.rest)
     yield from space(plot.plot_arm(of.arm, view=OBLIQUE), of.rest)
@@ -223,14 +199,12 @@ def checked(of):
     return sr.check(of.arm, sr.Requirements(targets=[target], keeps=[needs.Keep(box, True)])), box
 
 
-@case(may_not_know=False)
 def plot_check(of):
     check, box = checked(of)
     yield from plane(plot.plot_check(check, view="side", unit="L"), box.bounds)
     yield from space(plot.plot_check(check, unit="L"), box.bounds)
 
 
-@case(may_not_know=False)
 def plot_compliance(of):
     """Ellipsoids far smaller than the arm, which lies along one direction."""
     rest = rest_configuration(of.arm)
@@ -238,7 +212,6 @@ def plot_compliance(of):
     yield from plane(ax, of.rest)
 
 
-@case(may_not_know=False)
 def plot_equilibria(of):
     every = sr.equilibria(of.arm, [0.0, 0.0, 0.0])
     ax = plot.plot_equilibria(every, view="side")
@@ -246,7 +219,6 @@ def plot_equilibria(of):
     yield "z / L", ax.get_ylim(), [base, of.rest[:, 2].max()]
 
 
-@case(may_not_know=False)
 def plot_cross_section(of):
     radius = float(of.arm.profile.radius(0.1))
     circle = np.outer([-1, 1], [radius] * 3)
@@ -254,7 +226,6 @@ def plot_cross_section(of):
     yield from plane(plot.plot_cross_section(of.arm, 0.1, half_width=1.1 * radius), circle)
 
 
-@case(may_not_know=False)
 def plot_designs(of):
     long = sr.designs.minimal_trunk(length=2 * LENGTH)
     panels = [plot.DesignPanel("a", of.arm), plot.DesignPanel("b", long)]
@@ -264,7 +235,6 @@ def plot_designs(of):
     yield from plane(section, circle)
 
 
-@case(may_not_know=False)
 def plot_opposite_sides(of):
     view = (0.3, 0.2)
     above, below = image_axes(plot.plot_opposite_sides({"one": of.cloud}, view=view))
@@ -290,17 +260,14 @@ def sheet(of, draw) -> Iterator[Shown]:
     yield "x / L", (0, drawn), (0, LENGTH / 2)
 
 
-@case(may_not_know=False)
 def plot_cloud_sheet(of):
     yield from sheet(of, plot.plot_cloud_sheet)
 
 
-@case(may_not_know=False)
 def plot_hull_sheet(of):
     yield from sheet(of, plot.plot_hull_sheet)
 
 
-@case(may_not_know=False)
 def plot_metric_map(of):
     atlas = of.atlas
     ax = plot.plot_metric_map(atlas, "reach_height")
@@ -309,6 +276,11 @@ def plot_metric_map(of):
     yield bar.get_ylabel(), bar.get_ylim(), atlas.reach_height * LENGTH / atlas.length
     assert ax.get_xlabel() == "L (m)"
     yield "", ax.get_xlim(), atlas.length
+
+
+CASES = {name: case for name, case in globals().items() if name.startswith("plot_")}
+"""Each figure, drawn with data that know L."""
+MAY_NOT_KNOW = [*CASES][: [*CASES].index("plot_arm")]  # and with data that do not
 
 
 def test_every_figure_of_the_product_is_held_to_this():
@@ -324,7 +296,7 @@ def test_axes_count_in_what_they_say_where_data_know_the_length(name, everything
     assert not any("[m" in text for text in texts())
 
 
-@pytest.mark.parametrize("name", sorted(MAY_NOT_KNOW))
+@pytest.mark.parametrize("name", MAY_NOT_KNOW)
 def test_axes_count_in_meters_where_data_do_not_know_the_length(name, ignorant):
     check(CASES[name](ignorant))
     assert not any(re.search(r"/ L|\dL|\d L\b|κL", text) for text in texts())

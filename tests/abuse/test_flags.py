@@ -7,9 +7,7 @@ import typing
 import pytest
 
 from softreach.cli.app import app
-from softreach.cli.changes import Changes
-from softreach.cli.options import Sampling
-from softreach.cli.values import Number, Whole
+from softreach.cli.options import Changes, Number, Sampling, Whole
 from softreach.support.quantity import read_whole_number
 from tests.abuse.refusals import refusal_of
 

@@ -8,6 +8,8 @@ import pytest
 
 from softreach.arm import designs
 from softreach.studio import Quality, Start, Studio, StudioState
+from softreach.studio.session import Session
+from tests.studio import sockets
 from tests.studio.tab import Tab
 
 SMALL = Quality(coarse_level=11, fine_level=12, coarse_accuracy=0.05, fine_accuracy=0.02)
@@ -19,6 +21,13 @@ def studio() -> Iterator[Studio]:
     start = Start(state=StudioState(design=designs.minimal_trunk()).showing(**look), quality=SMALL)
     with Studio(start) as running:
         yield running
+
+
+@pytest.fixture(scope="module")
+def opened(studio) -> Iterator[Session]:
+    """A tab without a browser, which the tests of a file share."""
+    with sockets.page(studio) as session:
+        yield session
 
 
 @pytest.fixture(scope="session")

@@ -37,8 +37,6 @@ CHEAP = """
     });
 """
 """Seven pictures a second, with jagged edges and nothing that glides: there is no graphics card."""
-
-
 FLASH = """
     window.flashed = false;
     (function look() {
@@ -49,8 +47,6 @@ FLASH = """
     })();
 """
 """Notes whether a panel was seen before ours."""
-
-
 SCROLLED_UP = """
     for (const area of document.querySelectorAll(".mantine-ScrollArea-viewport")) {
         area.scrollTop = 0;
@@ -59,8 +55,6 @@ SCROLLED_UP = """
 
 
 class Tab:
-    """One page and its session."""
-
     def __init__(
         self, browser, studio: Studio, size: tuple[int, int] = SIZE, *, drawing: str = CHEAP
     ) -> None:
@@ -125,7 +119,6 @@ class Tab:
         self.page.get_by_role("tab", name=name).click()
 
     def unfold(self, name: str) -> None:
-        """Show what is in a folder of the tab."""
         head = self.page.get_by_text(name, exact=True).locator("visible=true")
         head.wait_for()
         if head.locator("xpath=..").bounding_box()["height"] < FOLDED:
@@ -137,7 +130,6 @@ class Tab:
         )
 
     def center(self, place) -> None:
-        """Scroll to a place of the panel, where its head does not cover it."""
         place.evaluate("place => place.scrollIntoView({block: 'center'})")
 
     def drag(self, label: str, pixels: int) -> None:
@@ -174,11 +166,9 @@ class Tab:
         self.page.get_by_role("option", name=option, exact=True).click()
 
     def drawn(self, path: str):
-        """The node of this tab's scene, or None."""
         return self.session.client.scene.get_handle_by_name(path)
 
     def save(self, button: str, folder: Path) -> Path:
-        """What a press of the button downloads."""
         with self.page.expect_download() as caught:
             self.press(button)
         path = folder / caught.value.suggested_filename
@@ -186,7 +176,6 @@ class Tab:
         return path
 
     def upload(self, button: str, path: Path) -> None:
-        """Press a button that asks for a file, and choose one."""
         with self.page.expect_file_chooser() as caught:
             self.press(button)
         caught.value.set_files(path)
@@ -258,8 +247,21 @@ class Tab:
         right, down = self.projected(point)
         return canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
 
+    def labels(self) -> list:
+        """Numbers and names along the axes of the scene."""
+        known = [self.drawn(f"/axes/label {k}") for k in range(60)]
+        return [label for label in known if label is not None]
+
+    def drag_tip(self, begin: np.ndarray, end: np.ndarray) -> None:
+        """Grab the ball at a point [L] and pull it to another; the button stays down."""
+        self.page.mouse.move(*self.screen(begin))
+        self.page.wait_for_timeout(100)
+        self.page.mouse.down()
+        for part in np.linspace(0, 1, 13)[1:]:
+            self.page.mouse.move(*self.screen(begin + part * (end - begin)))
+            self.page.wait_for_timeout(30)
+
     def click_at(self, point: np.ndarray) -> None:
-        """Click where a point of the scene [L] appears."""
         self.page.mouse.click(*self.screen(point))
 
     def projected(self, point: np.ndarray) -> tuple[float, float]:

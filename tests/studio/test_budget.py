@@ -12,6 +12,7 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
+from softreach.studio import figures
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
 from softreach.studio.figures import Slope, VolumeSlopes, slope_bars, volume_slopes
@@ -19,6 +20,7 @@ from softreach.studio.markup import bar
 from softreach.studio.reach import Quality, Reach, level_in_memory, stages
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
+from softreach.support.errors import InvalidInput
 from softreach.workspace import volume_gradient
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -28,14 +30,11 @@ def nothing() -> None:
     """Everything is wanted."""
 
 
-def test_a_computation_ends_when_its_time_is_over():
+def test_a_computation_ends_when_its_time_is_over_or_memory_runs_out_meanwhile(monkeypatch):
     spent = Budget(nothing, 0.0)
     time.sleep(0.01)
     with pytest.raises(OverBudget, match="more than 0 s"):
         spent()
-
-
-def test_a_computation_ends_when_memory_runs_out_meanwhile(monkeypatch):
     monkeypatch.setattr(budget, "free_memory", lambda: 10e9)
     running = Budget(nothing, 60.0)
     assert running.memory < 5e9
@@ -126,11 +125,9 @@ def slopes(small_arm) -> VolumeSlopes:
 def test_a_slope_is_that_of_the_library_in_units_of_the_slider(small_arm, slopes):
     theirs = volume_gradient(small_arm, list(slopes.slopes), accuracy=QUALITY.fine_accuracy)
     sliders = {each.name: each for each in slider_parameters(small_arm)}
-    for name, value, error in zip(
-        theirs.parameters, theirs.volume, theirs.volume_error, strict=True
-    ):
-        scale = sliders[name].scale
-        ours = slopes.slopes[name]
+    rows = zip(theirs.parameters, theirs.volume, theirs.volume_error, strict=True)
+    for name, value, error in rows:
+        scale, ours = sliders[name].scale, slopes.slopes[name]
         assert abs(ours.value - value * scale) <= ours.error + error * scale
         assert ours.error < 10 * error * scale
 
@@ -141,29 +138,23 @@ def test_every_slider_that_moves_continuously_has_a_slope(small_arm, slopes):
     assert {name for name in sliders if known[name].whole} == sliders - set(slopes.slopes) != set()
 
 
-def test_where_there_is_no_volume_there_is_no_slope(trunk):
-    flat = trunk.replace(actuators=trunk.actuators[1:])
-    assert volume_slopes(reach_of(flat), QUALITY, nothing).slopes == {}
-
-
 def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
-    from softreach.studio import figures as module
-    from softreach.support.errors import InvalidInput
-
-    plain = module.gradient_of
+    plain = figures.gradient_of
 
     def without_taper(solid, names, *rest):
         if "taper" in names:
             raise InvalidInput("taper", 0.0, "one that holds no bundle")
         return plain(solid, names, *rest)
 
-    monkeypatch.setattr(module, "gradient_of", without_taper)
+    monkeypatch.setattr(figures, "gradient_of", without_taper)
     slopes = volume_slopes(reach_of(trunk), QUALITY, nothing).slopes
     assert "taper" not in slopes
     assert len(slopes) > 5
 
 
-def test_a_set_that_loads_tear_has_no_slopes_and_what_takes_too_long_is_left_out(trunk):
+def test_a_set_that_is_flat_or_torn_has_no_slopes_and_what_takes_too_long_is_left_out(trunk):
+    flat = trunk.replace(actuators=trunk.actuators[1:])
+    assert volume_slopes(reach_of(flat), QUALITY, nothing).slopes == {}
     reach = reach_of(trunk)
     torn = SimpleNamespace(dimension=3, volume=1.0, lost_share=0.1, is_torn=False)
     assert volume_slopes(replace(reach, exact=torn), QUALITY, nothing).slopes == {}
@@ -191,18 +182,16 @@ def share_of(html: str) -> float:
 
 def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
     sliders = {each.name: (each, each.high - each.low) for each in slider_parameters(trunk)}
-    found = VolumeSlopes(
-        trunk, 0.7, {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
-    )
+    slopes = {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
+    found = VolumeSlopes(trunk, 0.7, slopes)
     bars = slope_bars(found, sliders, old=False)
     assert list(bars) == [name for name in sliders if name in found.slopes]
     changes = {name: found.slopes[name].value * sliders[name][1] for name in bars}
     shares = {name: share_of(html) for name, html in bars.items()}
     most = max(map(abs, changes.values()))
     assert max(map(abs, shares.values())) == 1
-    np.testing.assert_allclose(
-        list(shares.values()), [change / most for change in changes.values()], atol=1e-3
-    )
+    wanted = [change / most for change in changes.values()]
+    np.testing.assert_allclose(list(shares.values()), wanted, atol=1e-3)
     assert "\N{MINUS SIGN}1.00 ± 0.01 %" in bars["taper"]  # of V for 0.07 of its 7 degrees
     assert "∂V/∂(taper) = -0.100 ± 0.001 m³ per deg" in bars["taper"]
     assert "0.07 deg" in bars["taper"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -12,11 +10,9 @@ from softreach.arm import Marker, designs
 from softreach.arm.parameters import changed
 from softreach.calibration.measurements import read_measurements
 from softreach.rod.kinematics import marker_positions
-from softreach.studio import Studio
 from softreach.studio.found import Bench
 from softreach.studio.session import Session
 from tests.calibration.arms import table
-from tests.studio.sockets import page
 
 ARM = designs.minimal_trunk().replace(
     markers=(Marker(name="half", station=0.5, offset=(0.07, 0.0, 0.0)), Marker(name="tool"))
@@ -26,13 +22,6 @@ INPUTS = ARM.bounds[:, 0] * np.random.default_rng(3).random((20, 3))
 NAMES, MARKERS = ("a", "b", "c"), ("half", "tool")
 NOISE = 2e-4 * np.random.default_rng(4).standard_normal((20, 2, 3))
 PLACES = marker_positions(REAL, INPUTS) + NOISE
-
-
-@pytest.fixture(scope="module")
-def opened(studio: Studio) -> Iterator[Session]:
-    with page(studio) as session:
-        session.update(lambda state: state.replace(design=ARM))
-        yield session
 
 
 @pytest.fixture
@@ -50,9 +39,8 @@ def shown(session, number=0, inputs=INPUTS) -> None:
         name.removesuffix("_N"): values.tolist()
         for name, values in table(PLACES, inputs, NAMES, MARKERS).items()
     }
-    bench = Bench(
-        data=read_measurements(ARM, columns), arm=ARM, number=number, free=("pose", "taper")
-    )
+    data = read_measurements(ARM, columns)
+    bench = Bench(data=data, arm=ARM, number=number, free=("pose", "taper"))
     session.update(bench.posed)
     session.learn({"bench": bench})
     session.settle()

@@ -26,17 +26,6 @@ def pose(tab, activation):
     return tip
 
 
-def drag_tip(tab, begin, end, steps=12):
-    """Grab the ball at a point [L] and pull it to another; the button stays down."""
-    mouse = tab.page.mouse
-    mouse.move(*tab.screen(begin))
-    tab.page.wait_for_timeout(100)
-    mouse.down()
-    for part in np.linspace(0, 1, steps + 1)[1:]:
-        mouse.move(*tab.screen(begin + part * (end - begin)))
-        tab.page.wait_for_timeout(30)
-
-
 def around(tab, point):
     """What the page shows where a point of the scene [L] is, RGB from 0 to 1."""
     from matplotlib.image import imread
@@ -75,7 +64,7 @@ def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
 def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse_tab):
     tab = inverse_tab
     begin = pose(tab, (-0.2, -0.1, -0.1))
-    drag_tip(tab, begin, begin + [0.0, 0.0, 0.35])
+    tab.drag_tip(begin, begin + [0.0, 0.0, 0.35])
     tab.wait(lambda: tab.session.found.lag and tab.session.found.lag.dragged.gap > 0.02, "a gap")
     tab.settle()
     pull = tab.session.found.lag
@@ -99,7 +88,7 @@ def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_t
     begin = pose(tab, FOLDED)
     tab.wait(lambda: tab.drawn("/arm/0").opacity == 0.6, "an arm before its tip is not")
     tab.wait(lambda: around(tab, begin).min() < 0.45, "the ball is seen")  # the body is lighter
-    drag_tip(tab, begin, begin + [0.0, 0.0, 0.02])
+    tab.drag_tip(begin, begin + [0.0, 0.0, 0.02])
     tab.wait(lambda: tab.session.found.lag, "the arm follows")
     tab.page.mouse.up()
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")

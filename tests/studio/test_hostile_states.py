@@ -17,7 +17,7 @@ from softreach.studio.captions import size_text
 from softreach.studio.found import Found
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.colors import sample_values
-from softreach.studio.scene.surfaces import in_slice
+from softreach.studio.scene.scene import in_slice
 from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
 from softreach.studio.state import Slice, StudioState
 from softreach.studio.tabs.export import FILES, content_of, state_from
@@ -47,6 +47,8 @@ HOSTILE = {
     "nested.json": "[" * 100_000,
     "50 MB.json": " " * 50_000_000,
     "mouse.json": look_with(mouse=["tip"]),
+    "section.json": look_with(section=1),
+    "swept.json": look_with(swept=None),
     "huge level.json": look_with(level=10**4000),
     "digits.json": '{"softreach_studio": 2, "activation": ' + "9" * 5000 + "}",
     "infinite activation.json": state_with(activation=[float("inf")] * 3),
@@ -159,7 +161,8 @@ def test_a_design_file_changes_the_design_alone(trunk):
         state_from("x.toml", tight.to_toml().encode(), state)
 
 
-def test_a_saved_state_is_begun_with(trunk, tmp_path):
+def test_a_design_is_begun_with_at_rest_and_a_saved_state_as_it_is(trunk, tmp_path):
+    assert start_on_design(trunk).state.activation == (0.0, 0.0, 0.0)
     state = StudioState(design=trunk, activation=(-1.0, 0.0, -0.2)).showing(level=14)
     (tmp_path / "state.json").write_text(state.to_json(), encoding="utf-8")
     assert start_on_state(tmp_path / "state.json").state == state
@@ -176,8 +179,3 @@ def test_a_cloud_from_a_file_is_shown_as_it_is(trunk, tmp_path):
     assert start.state.design == trunk
     with pytest.raises(InvalidInput, match="Zarr store"):
         start_on_cloud(tmp_path / "nothing.zarr")
-
-
-def test_a_design_starts_at_rest():
-    start = start_on_design(designs.redundant_trunk())
-    assert start.state.activation == (0.0, 0.0, 0.0, 0.0)

@@ -113,25 +113,7 @@ def test_a_job_that_fails_forgets_what_it_knew_and_takes_away_what_it_drew(studi
 # Laws of background work
 
 
-def test_of_waiting_work_only_the_last_is_done():
-    done, started, go = [], threading.Event(), threading.Event()
-    latest = Latest(done.append)
-
-    def first(check):
-        started.set()
-        go.wait(600)
-        done.append("first")
-
-    latest.submit(first)
-    assert started.wait(600)
-    for name in ("second", "third", "fourth"):
-        latest.submit(lambda check, name=name: done.append(name))
-    go.set()
-    assert latest.join(600)
-    assert done == ["first", "fourth"]
-
-
-def test_stale_work_is_dropped_between_its_stages():
+def test_of_waiting_work_only_the_last_is_done_and_stale_work_ends_between_its_stages():
     done, coarse, go = [], threading.Event(), threading.Event()
     latest = Latest(done.append)
 
@@ -139,15 +121,17 @@ def test_stale_work_is_dropped_between_its_stages():
         done.append("coarse")
         coarse.set()
         go.wait(600)
+        done.append("unchecked")
         check()
         done.append("fine")
 
     latest.submit(staged)
     assert coarse.wait(600)
-    latest.submit(lambda check: done.append("newer"))
+    for name in ("second", "third", "fourth"):
+        latest.submit(lambda check, name=name: done.append(name))
     go.set()
     assert latest.join(600)
-    assert done == ["coarse", "newer"]
+    assert done == ["coarse", "unchecked", "fourth"]
 
 
 def test_trouble_is_told_the_next_work_is_done_and_none_after_closing():

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import Marker, designs
+from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.captions import size_text
 from softreach.support import palette
 from tests.calibration.arms import table
+from tests.studio.test_calibrate import ARM, INPUTS, MARKERS, NAMES, PLACES
 
 ORANGE = (0.92, 0.35, 0.0)
 """Color of targets and of measured markers."""
@@ -77,20 +78,15 @@ def test_an_arm_is_designed_loaded_seen_to_shrink_and_exported(tab, tmp_path):
 
 
 def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(tab, tmp_path):
-    page, mouse = tab.page, tab.page.mouse
+    page = tab.page
     tab.open("Move")
     start, end = (-0.7, -0.4, -0.9), (-0.6, -0.55, -0.8)
     pulled(tab, start)
     begin, goal = sr.tip_positions(TRUNK, [start, end])
     page.get_by_text(f"tip at ({begin[0]:.6f}, {begin[1]:.6f}, {begin[2]:.6f}) m").first.wait_for()
     tab.settle()
-    mouse.move(*tab.screen(begin))
-    page.wait_for_timeout(100)
-    mouse.down()
-    for part in np.linspace(0, 1, 13)[1:]:
-        mouse.move(*tab.screen(begin + part * (goal - begin)))
-        page.wait_for_timeout(30)
-    mouse.up()
+    tab.drag_tip(begin, goal)
+    page.mouse.up()
     page.get_by_text(re.compile(r"\d activations? reach")).first.wait_for()
     tab.settle()
     here = sr.tip_positions(TRUNK, [tab.session.state.activation])[0]
@@ -184,16 +180,10 @@ def test_requirements_are_seen_met_and_missed_and_follow_a_slider(tab):
 
 def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, tmp_path):
     page = tab.page
-    markers = (Marker(name="half", station=0.5, offset=(0.07, 0.0, 0.0)), Marker(name="tool"))
-    arm = TRUNK.replace(markers=markers)
-    real = changed(arm, {"taper": 0.012}).replace(base=sr.Base(position=(0.05, -0.02, 0.1)))
-    inputs = arm.bounds[:, 0] * np.random.default_rng(3).random((20, 3))
-    noise = 2e-4 * np.random.default_rng(4).standard_normal((20, 2, 3))
-    places = marker_positions(real, inputs) + noise
-    columns = table(places, inputs, ("a", "b", "c"), ("half", "tool"))
+    columns = table(PLACES, INPUTS, NAMES, MARKERS)
     rows = np.column_stack(list(columns.values()))
     bench = written(tmp_path / "bench.csv", rows, [key.removesuffix("_N") for key in columns])
-    arm.save(tmp_path / "arm.toml")
+    ARM.save(tmp_path / "arm.toml")
 
     tab.show_surface(False)
     tab.open("Export")
@@ -205,8 +195,8 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     page.get_by_text("bench.csv: 20 samples of half, tool").wait_for()
     assert tab.like(ORANGE) > 20
     for sample in (0, 1):
-        predicted = marker_positions(arm, inputs[sample])[0]
-        half, tool = 1e3 * np.linalg.norm(places[sample] - predicted, axis=1)
+        predicted = marker_positions(ARM, INPUTS[sample])[0]
+        half, tool = 1e3 * np.linalg.norm(PLACES[sample] - predicted, axis=1)
         page.get_by_text(f"half {half:.3g} mm, tool {tool:.3g} mm").wait_for()
         tab.slider("sample").press("ArrowRight")
     page.get_by_label("taper φ", exact=True).check()
@@ -217,4 +207,4 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     assert tab.session.state.design.profile.taper == pytest.approx(0.012, abs=3e-4)
     tab.press("Undo")
     tab.settle()
-    assert tab.session.state.design == arm
+    assert tab.session.state.design == ARM

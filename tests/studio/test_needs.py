@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -13,23 +12,15 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
 from softreach.rod.kinematics import tip_positions
-from softreach.studio import Studio
 from softreach.studio.session import Session
 from softreach.studio.state import requirements_of
 from softreach.studio.tabs import click, goals
 from softreach.support.errors import SoftreachError
-from tests.studio.sockets import page
 
 ARM = designs.minimal_trunk(length=0.4)
 POSE = (-0.7, -0.4, -0.9)
 REACHED = tip_positions(ARM, [POSE])[0]
 FAR = (0.3, 0.1, 0.42)
-
-
-@pytest.fixture(scope="module")
-def opened(studio: Studio) -> Iterator[Session]:
-    with page(studio) as session:
-        yield session
 
 
 @pytest.fixture
@@ -98,16 +89,10 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
     added(session, "box to stay inside")
     added(session, "box to avoid", "-20, -20, 90, 20, 20, 140")
     inside, avoid = drawn(session, "/region 0"), drawn(session, "/region 1")
-    np.testing.assert_allclose(
-        [inside.points.min(axis=(0, 1)), inside.points.max(axis=(0, 1))],
-        session.scene.axes.corners,
-        atol=1e-5,
-    )
-    broken = [
-        tuple(np.asarray(node.colors).ravel()[:3]) == goals.VERDICTS["missed"]
-        for node in (inside, avoid)
-    ]
-    assert broken == [False, True]
+    corners = inside.points.min(axis=(0, 1)), inside.points.max(axis=(0, 1))
+    np.testing.assert_allclose(corners, session.scene.axes.corners, atol=1e-5)
+    colors = [tuple(np.asarray(node.colors).ravel()[:3]) for node in (inside, avoid)]
+    assert [color == goals.VERDICTS["missed"] for color in colors] == [False, True]
     assert "the arm keeps" in verdict(session)
     assert "inside or too near" in verdict(session)
 

@@ -66,16 +66,13 @@ def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
 # Paths of the tip as values: kept in a state, refused
 
 
-@pytest.mark.parametrize(
-    "points",
-    [
-        [[0, 0, 1]],
-        [[0, 0, 1]] * (MOST_POINTS + 1),
-        [[0, 0, 1], [0, 0, np.inf]],
-        [[0, 0], [1, 1]],
-        [["a", 0, 0], [0, 0, 0]],
-    ],
+UNFIT = (
+    *([[0, 0, 1]], [[0, 0, 1]] * (MOST_POINTS + 1), [[0, 0, 1], [0, 0, np.inf]]),
+    *([[0, 0], [1, 1]], [["a", 0, 0], [0, 0, 0]]),
 )
+
+
+@pytest.mark.parametrize("points", UNFIT)
 def test_a_path_that_cannot_be_followed_is_refused(points):
     with pytest.raises(InvalidInput, match="path"):
         TipPath.through(points)
@@ -92,9 +89,3 @@ def test_every_end_of_a_path_is_said_in_words(end):
     text = end_text(xr.Dataset(known, attrs=about), STATE.design.length_unit)
     assert text.endswith(".")
     assert "{" not in text
-
-
-@pytest.mark.parametrize("changes", [{"section": 1}, {"swept": None}])
-def test_plot_settings_of_another_kind_are_refused(changes):
-    with pytest.raises(InvalidInput, match="appearance"):
-        STATE.showing(**changes)

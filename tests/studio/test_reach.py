@@ -38,8 +38,7 @@ from softreach.studio.scene.colors import (
     sample_values,
     surface_colors,
 )
-from softreach.studio.scene.scene import Scene
-from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
+from softreach.studio.scene.scene import Scene, Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.studio.tabs.design import (
     base_field,
@@ -98,16 +97,9 @@ def test_every_color_that_is_offered_colors_every_point_that_is_shown(both):
     multiplicity = sample_colors(fine, 10, "multiplicity").key
     assert isinstance(multiplicity, BundleKey)
     assert multiplicity.names[0].startswith("1: ")
-
-
-def test_an_unknown_color_is_that_of_the_activations(both):
-    plain = sample_colors(both[1], 10, "rgb").rgb
-    np.testing.assert_array_equal(sample_colors(both[1], 10, "bundle 9").rgb, plain)
-
-
-def test_multiplicity_is_offered_where_it_is_finite(trunk):
-    assert "multiplicity" in color_names(trunk)
-    assert "multiplicity" not in color_names(designs.redundant_trunk())
+    assert "multiplicity" not in color_names(designs.redundant_trunk())  # where it is not finite
+    unknown, plain = (sample_colors(fine, 10, color).rgb for color in ("bundle 9", "rgb"))
+    np.testing.assert_array_equal(unknown, plain)
 
 
 def test_points_are_colored_by_the_determinant_of_the_tips_velocities(both, trunk):
@@ -132,9 +124,9 @@ def test_a_slice_shows_what_lies_within_its_thickness(rng):
 
 def test_a_ray_picks_the_nearest_of_the_points_on_it():
     eye, points = np.zeros(3), np.array([[0, 0, 5.0], [0, 0, 2.0], [1, 0, 1.0], [0, 0, -1.0]])
-    assert picked_point(points, eye, (0, 0, 3), 0.01) == 1
-    assert picked_point(points, eye, (1, 0, 1), 0.01) == 2
-    assert picked_point(points, eye, (0, 1, 0), 0.01) is None
+    assert picked_point(points, eye, (0, 0, 3)) == 1
+    assert picked_point(points, eye, (1, 0, 1)) == 2
+    assert picked_point(points, eye, (0, 1, 0)) is None
 
 
 def test_the_box_holds_every_point_and_its_numbers_are_round(rng):
@@ -201,9 +193,8 @@ def test_a_surface_is_read_back_from_its_file():
     scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
     surface, lines = scene.geometry.values()
     np.testing.assert_allclose(surface.vertices, vertices)
-    np.testing.assert_array_equal(
-        surface.visual.vertex_attributes["color"][0], (255, 255, 255, 128)
-    )
+    color = surface.visual.vertex_attributes["color"][0]
+    np.testing.assert_array_equal(color, (255, 255, 255, 128))
     np.testing.assert_allclose(lines.vertices, vertices[:2])
 
 
@@ -259,6 +250,8 @@ def test_numbers_stand_outside_and_the_name_of_an_axis_keeps_its_distance_from_t
 
 
 HANGING = GRAVITIES["up"]
+LOADS = ("gravity", "payload", "payload_arm", "tip_force")
+NOTHING = dict.fromkeys(LOADS, (0.0, 0.0, 0.0)) | {"payload": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -275,20 +268,11 @@ def loaded(arm, **typed):
 
 
 def typed_loads(arm):
-    names = ("gravity", "payload", "payload_arm", "tip_force")
-    return {name: load_field(name).read(StudioState(design=arm)) for name in names}
+    return {name: load_field(name).read(StudioState(design=arm)) for name in LOADS}
 
 
 def hanging(arm, grams: float):
     return loaded(arm, gravity=HANGING, payload=grams)
-
-
-NOTHING = {
-    "gravity": (0.0, 0.0, 0.0),
-    "payload": 0.0,
-    "payload_arm": (0.0, 0.0, 0.0),
-    "tip_force": (0.0, 0.0, 0.0),
-}
 
 
 def test_what_is_typed_is_what_the_design_has(lce):
@@ -303,9 +287,6 @@ def test_what_is_typed_is_what_the_design_has(lce):
     np.testing.assert_allclose(arm.loads.payload_arm, (0.001, 0, -0.003))
     assert typed_loads(arm) == typed
     assert typed_loads(lce) == NOTHING
-
-
-def test_without_any_load_an_arm_is_an_arm_without_loads(lce):
     assert loaded(lce, **NOTHING) == lce
     assert loaded(hanging(lce, 5.0), **NOTHING) == lce
 
@@ -362,17 +343,14 @@ def test_matter_that_lacks_what_loads_need_is_named_in_one_line(trunk):
     assert "tab Parts" in line
 
 
-@pytest.mark.parametrize("wrong", [-1.0, 1e9, math.nan, math.inf])
-def test_a_payload_that_cannot_be_is_refused_in_grams(lce, wrong):
-    with pytest.raises(InvalidInput, match=r"payload = .* g: must be 0 to 1,000,000 g"):
-        hanging(lce, wrong)
-
-
-@pytest.mark.parametrize("field", ["gravity", "payload_arm", "tip_force"])
-@pytest.mark.parametrize("wrong", [1e9, -1e9, math.nan])
-def test_a_vector_that_cannot_be_is_refused(lce, field, wrong):
-    with pytest.raises(InvalidInput, match=r"must be -1,000,000 to 1,000,000"):
-        loaded(lce, **{field: (0.0, wrong, 0.0)})
+@pytest.mark.parametrize("wrong", [-1e9, 1e9, math.nan, math.inf])
+def test_loads_that_cannot_be_are_refused_in_their_unit(lce, wrong):
+    for grams in (wrong, -1.0):
+        with pytest.raises(InvalidInput, match=r"payload = .* g: must be 0 to 1,000,000 g"):
+            hanging(lce, grams)
+    for name in ("gravity", "payload_arm", "tip_force"):
+        with pytest.raises(InvalidInput, match=r"must be -1,000,000 to 1,000,000"):
+            loaded(lce, **{name: (0.0, wrong, 0.0)})
 
 
 def test_a_loaded_cloud_comes_before_its_volume(lce):
@@ -454,9 +432,6 @@ def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
     assert (fine.samples, fine.wanted) == (1 << 10, 1 << 14)
 
 
-@pytest.mark.parametrize(
-    ("error", "text"),
-    [(9e-5, "volume 0.25642 ± 0.00009 m³"), (4e-9, "volume 0.256423 ± 0.000001 m³")],
-)
-def test_digits_of_a_size_follow_its_error(error, text):
-    assert size_text(Size("volume", 0.2564231, error, 3), designs.minimal_trunk()) == text
+def test_digits_of_a_size_follow_its_error(trunk):
+    for error, text in ((9e-5, "0.25642 ± 0.00009"), (4e-9, "0.256423 ± 0.000001")):
+        assert size_text(Size("volume", 0.2564231, error, 3), trunk) == f"volume {text} m³"

@@ -11,6 +11,7 @@ from softreach.arm import designs
 from softreach.studio import Start, Studio, StudioState
 from tests.studio.conftest import SMALL
 from tests.studio.tab import CHEAP, Tab
+from tests.studio.test_hostile_states import design_with
 
 STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
 QUOTED = STRIKE.replace('"', '\\"')
@@ -24,12 +25,6 @@ def state_with(**changes) -> str:
         place, _, name = path.rpartition("__")
         {"": values, "look": look, "slice": look["slice"]}[place][name] = value
     return json.dumps(values)
-
-
-def design_with(old: str, new: str) -> str:
-    text = designs.minimal_trunk().to_toml()
-    assert old in text
-    return text.replace(old, new)
 
 
 NAMED = design_with('name = "left"', f'name = "{QUOTED}"')

@@ -72,10 +72,8 @@ def test_a_path_ends_in_a_ball_where_the_arm_follows_it_no_further():
 
     def drawn(followed: int) -> dict:
         status = np.where(np.arange(11) < followed, PathStatus.FOLLOWED, PathStatus.FOLD)
-        values = {
-            "status": ("point", status),
-            "activation": (("point", "bundle"), np.zeros((11, 3))),
-        }
+        activation = ("point", "bundle"), np.zeros((11, 3))
+        values = {"status": ("point", status), "activation": activation}
         track = xr.Dataset(values | {"end_position": ("axis", end)})
         job.draw(SimpleNamespace(state=state, found=Found(track=track), scene=Scene(meshes)))
         return meshes.added
@@ -102,9 +100,9 @@ def test_numbers_along_the_axes_are_places_in_the_unit_of_the_design(unit, size)
     for label in labels:
         if label.text[0] in "xyz":
             axis += 1
-            continue
-        number = float(label.text.replace("\N{MINUS SIGN}", "-"))
-        assert number * size == pytest.approx(label.position[axis] * arm.length, abs=1e-12)
+        else:
+            number = float(label.text.replace("\N{MINUS SIGN}", "-"))
+            assert number * size == pytest.approx(label.position[axis] * arm.length, abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", MADE_ARMS)
@@ -123,8 +121,7 @@ def test_every_kind_of_arm_is_drawn_and_moves(kind):
 
 def test_a_body_is_clear_only_where_it_hides_a_bundle():
     def opacity(kind):
-        meshes = Meshes()
-        arm = MADE_ARMS[kind]()
+        meshes, arm = Meshes(), MADE_ARMS[kind]()
         Scene(meshes).draw_arm(arm, np.zeros(arm.bundles).tolist())
         return [meshes.added[path].opacity for path in sorted(meshes.added)]
 
@@ -237,12 +234,11 @@ def test_only_the_parameters_that_differ_have_rows_and_changes_are_from_the_kept
     assert rows["taper φ [deg]"].change == pytest.approx(-2)
 
 
-@pytest.mark.parametrize(("liters", "title"), [(0.5, "volume [mL]"), (1.2, "volume [liters]")])
-def test_volumes_are_compared_in_liters_from_one_liter_on(liters, title):
+def test_volumes_are_compared_in_liters_from_one_liter_on():
     arm = designs.lce_arm().replace(display_unit="mm")
-    (row, *_), _ = compared((arm, reach(4e-4)), (arm, reach(1e-3 * liters)))
-    assert row.title == title
-    assert row.now == pytest.approx(liters * (1000 if "mL" in title else 1))
+    for liters, title, now in ((0.5, "volume [mL]", 500), (1.2, "volume [liters]", 1.2)):
+        (row, *_), _ = compared((arm, reach(4e-4)), (arm, reach(1e-3 * liters)))
+        assert (row.title, row.now) == (title, pytest.approx(now))
 
 
 def test_what_is_not_known_of_a_design_has_no_change():

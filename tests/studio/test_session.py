@@ -20,7 +20,6 @@ from softreach.studio.reach import (
     count_activations,
     shown_samples,
     stages,
-    uncounted,
 )
 from softreach.studio.scene.colors import key_html, sample_colors, sample_values
 from softreach.studio.session import Session
@@ -132,7 +131,9 @@ def test_the_key_has_the_color_and_the_share_of_each_number_of_activations(folde
     assert "activations" in key_html(key)
 
 
-def test_what_was_counted_before_it_was_stopped_is_kept(folded):
+def test_coarse_clouds_are_not_counted_and_what_was_before_it_was_stopped_is_kept(folded):
+    coarse = next(stages(folded.arm, LEVEL, SMALL, lambda: None))
+    assert isinstance(sample_values(coarse, 8, "multiplicity"), str)  # colored by activations
     reach = fine_reach(*FOLDED[1])
     rows = np.arange(1 << LEVEL)
 
@@ -141,12 +142,7 @@ def test_what_was_counted_before_it_was_stopped_is_kept(folded):
 
     with pytest.raises(Dropped):
         count_activations(reach, rows[:5000], report=stop)
-    assert len(uncounted(reach, rows)) == len(rows) - 5000
-
-
-def test_coarse_clouds_are_colored_by_activations_until_all_is_counted(folded):
-    coarse = next(stages(folded.arm, LEVEL, SMALL, lambda: None))
-    assert isinstance(sample_values(coarse, 8, "multiplicity"), str)
+    assert np.isnan(reach.counts[rows]).sum() == len(rows) - 5000
 
 
 # Work comes back from its file, and files that are none of ours are refused
@@ -156,10 +152,7 @@ TRUNK = designs.minimal_trunk()
 STATE = StudioState(design=TRUNK)
 
 
-BROKEN = ("", "[]", "{}", "[" * 100_000)
-
-
-@pytest.mark.parametrize("text", BROKEN)
+@pytest.mark.parametrize("text", ["", "[]", "{}", "[" * 100_000])
 def test_kept_work_that_is_none_of_ours_is_named_in_one_line(text, tmp_path):
     (tmp_path / "latest.json").write_text(text)
     work = KeptWork(tmp_path)
@@ -168,14 +161,11 @@ def test_kept_work_that_is_none_of_ours_is_named_in_one_line(text, tmp_path):
     assert len(work.complaint.splitlines()) == 1
 
 
-def test_work_is_found_again(tmp_path):
+def test_work_is_found_again_and_a_folder_that_cannot_be_written_is_named(tmp_path):
     work = KeptWork(tmp_path / "new")
     work.keep(STATE.replace(activation=(-0.5, 0.0, 0.0)))
     assert KeptWork(tmp_path / "new").latest == work.latest
     assert KeptWork(tmp_path / "new", goes_on=False).latest is None
-
-
-def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     work = KeptWork(tmp_path / "file" / "below")
     work.keep(STATE)
@@ -189,22 +179,13 @@ def home(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_the_command_goes_on_with_the_work_on_its_design_unless_it_is_to_begin_afresh(home):
+def test_the_command_goes_on_with_the_work_on_its_design_alone_unless_it_is_to_begin_afresh(home):
     bent = STATE.replace(activation=(-0.5, 0.0, 0.0))
     work_on(TRUNK).keep(bent)
     for fresh, latest in ((False, bent), (True, None)):
         assert begun("minimal_trunk", fresh=fresh)[1].latest == latest
     assert home in next(home.rglob("latest.json")).parents
-
-
-def test_a_state_that_is_opened_by_its_file_is_shown_as_it_is(home, tmp_path):
-    work_on(TRUNK).keep(STATE.replace(activation=(-0.5, 0.0, 0.0)))
-    file = tmp_path / "state.json"
-    file.write_text(STATE.to_json())
+    file = home / "state.json"
+    file.write_text(STATE.to_json())  # is shown as it is
     assert begun(str(file), fresh=False)[1].latest is None
-
-
-@pytest.mark.usefixtures("home")
-def test_every_design_has_work_of_its_own():
-    work_on(TRUNK).keep(STATE)
-    assert work_on(changed(TRUNK, {"taper": 0.0})).latest is None
+    assert work_on(changed(TRUNK, {"taper": 0.0})).latest is None  # each has work of its own

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.studio import Quality
 from tests.studio.tab import Tab
 
-COARSE = Quality(coarse_level=12, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.1)
 SHEET = "[style*='max-height: 60%']"
-SIZES = {"laptop": (1366, 768), "phone": (390, 844)}
+SIZES = {"laptop": {"width": 1366, "height": 768}, "phone": {"width": 390, "height": 844}}
 
 
 @pytest.fixture
@@ -19,23 +17,11 @@ def opened(tab):
     """The tab in a window of a kind."""
 
     def opened(kind: str) -> Tab:
-        tab.page.set_viewport_size(dict(zip(("width", "height"), SIZES[kind], strict=True)))
+        tab.page.set_viewport_size(SIZES[kind])
         see_all(tab)
         return tab
 
     return opened
-
-
-def in_canvas(tab, points) -> np.ndarray:
-    """Places of points [L] in the page, pixels to the right and down, shape (n, 2)."""
-    canvas = tab.page.locator("canvas").first.bounding_box()
-    places = np.array([tab.projected(np.asarray(point)) for point in points])
-    return places * (canvas["width"], canvas["height"]) + (canvas["x"], canvas["y"])
-
-
-def labels(tab) -> list:
-    found = [tab.drawn(f"/axes/label {k}") for k in range(60)]
-    return [label for label in found if label is not None]
 
 
 @pytest.mark.large
@@ -48,7 +34,7 @@ def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
         places = [one.bounding_box() for one in tab.page.get_by_role("tab").all()]
         right = max(place["x"] + place["width"] for place in places)
         lines = len({round(place["y"]) for place in places})
-        return len(places) == 8 and lines == 1 and right <= SIZES[kind][0] + 0.5
+        return len(places) == 8 and lines == 1 and right <= SIZES[kind]["width"] + 0.5
 
     tab.wait(fit, "the page is laid out, all tabs in one line")
     letters = "e => [parseFloat(getComputedStyle(e).fontSize), getComputedStyle(e).letterSpacing]"
@@ -62,7 +48,7 @@ def test_the_arm_is_in_sight_above_the_sheet_of_a_phone(opened):
     tab = opened("phone")
     tab.settle()
     sheet = tab.page.locator(SHEET).bounding_box()["y"]
-    places = in_canvas(tab, [np.zeros(3), np.array([0, 0, 1.0])])
+    places = np.array([tab.screen(point) for point in (np.zeros(3), np.array([0, 0, 1.0]))])
     assert (places > 0).all()
     assert (places < (390, sheet)).all()
 
@@ -155,13 +141,12 @@ def test_arm_and_numbers_stay_in_sight_where_the_scene_gets_narrow_and_wide_agai
             tab.open("Plots")
             tab.page.get_by_label("section", exact=True).set_checked(on)
         else:
-            size = SIZES["phone" if on else "laptop"]
-            tab.page.set_viewport_size(dict(zip(("width", "height"), size, strict=True)))
+            tab.page.set_viewport_size(SIZES["phone" if on else "laptop"])
 
     def in_sight() -> bool:
         canvas = tab.page.locator("canvas").first.bounding_box()
-        points = [(0, 0, 0), (0, 0, 1.0), *(one.position for one in labels(tab))]
-        right = in_canvas(tab, points)[:, 0] - canvas["x"]
+        points = [(0, 0, 0), (0, 0, 1.0), *(one.position for one in tab.labels())]
+        right = np.array([tab.projected(np.array(point))[0] for point in points]) * canvas["width"]
         return canvas["width"] < wide and bool(((right > 0) & (right < canvas["width"])).all())
 
     narrow(True)

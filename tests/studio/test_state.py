@@ -124,7 +124,7 @@ def walked(states, times=None):
     history = History()
     for k, (old, new) in enumerate(pairwise(states)):
         now = 10.0 * k if times is None else times[k]
-        history = history.after(old, new, goes_on=True, clock=lambda now=now: now)
+        history = history.after(old, new, goes_on=True, now=now)
     return history
 
 
@@ -140,38 +140,36 @@ def test_steps_back_and_forth_lead_through_every_state():
     for following in STEPS[1:]:
         history, state = history.step(state, back=False)
         assert state == following
-
-
-@pytest.mark.parametrize("back", [True, False])
-def test_where_there_is_nothing_to_go_to_the_state_stays(back):
-    assert History().step(START, back=back) == (History(), START)
+    for back in (True, False):  # where there is nothing to go to
+        assert History().step(START, back=back) == (History(), START)
 
 
 def test_a_change_after_a_step_back_forgets_what_was_undone():
     history, state = walked(STEPS).step(STEPS[-1], back=True)
-    history = history.after(state, posed(state, -0.1), goes_on=True)
+    history = history.after(state, posed(state, -0.1), goes_on=True, now=0.0)
     assert history.future == ()
     assert history.step(posed(state, -0.1), back=True)[1] == state
 
 
-def test_changes_of_one_kind_in_short_order_are_one_step():
+def test_changes_in_short_order_are_one_step_if_they_are_of_one_kind():
     states = [START, *(tapered(START, 0.001 * k) for k in range(1, 6))]
     history = walked(states, times=[0.1 * k for k in range(5)])
     assert history.step(states[-1], back=True)[1] == START
+    states = [START, tapered(START, 0.01), posed(tapered(START, 0.01), -0.5)]
+    history = walked(states, times=[0.0, 0.1])
+    assert history.step(states[-1], back=True)[1] == states[1]
 
 
 def test_a_change_that_does_not_go_on_is_a_step_of_its_own():
     one, two = tapered(START, 0.01), tapered(START, 0.02)
-    history = History().after(START, one, goes_on=True)
-    assert history.after(one, two, goes_on=False).step(two, back=True)[1] == one
-    assert history.after(one, two, goes_on=True).step(two, back=True)[1] == START
-    assert replace(history, kind="").after(one, two, goes_on=True).step(two, back=True)[1] == one
+    history = History().after(START, one, goes_on=True, now=0.0)
 
+    def before(history, goes_on):
+        return history.after(one, two, goes_on=goes_on, now=0.1).step(two, back=True)[1]
 
-def test_changes_of_different_kinds_are_steps_of_their_own():
-    states = [START, tapered(START, 0.01), posed(tapered(START, 0.01), -0.5)]
-    history = walked(states, times=[0.0, 0.1])
-    assert history.step(states[-1], back=True)[1] == states[1]
+    assert before(history, goes_on=False) == one
+    assert before(history, goes_on=True) == START
+    assert before(replace(history, kind=""), goes_on=True) == one
 
 
 def test_the_view_is_not_undone():

@@ -79,9 +79,8 @@ def test_what_is_typed_may_have_a_unit_lie_beyond_the_slider_or_be_refused_below
     is_shown("400")
     tab.type("revolution Ω [deg]", "0.5 rad")
     is_shown("28.6478897565")
-    assert find_parameter(tab.session.state.design, "revolution").value(
-        tab.session.state.design
-    ) == pytest.approx(0.5)
+    design = tab.session.state.design
+    assert find_parameter(design, "revolution").value(design) == pytest.approx(0.5)
     before = tab.session.state
     tab.type("taper φ [deg]", "50")
     assert "taper φ [deg] = 50" in alerts.first.inner_text()
@@ -93,6 +92,9 @@ def test_what_is_typed_may_have_a_unit_lie_beyond_the_slider_or_be_refused_below
     is_shown("90")
     tab.wait(lambda: alerts.count() == 0, "what was refused is given up")
     page.locator("input[value='2']").locator("visible=true").first.wait_for()
+    tab.open("Parts")
+    tab.type("name", "renamed")  # which makes the fields of the part anew
+    assert tab.session.note == ""
 
 
 def test_a_slider_follows_others_but_is_not_set_back_while_it_is_in_the_hand(tab):
@@ -230,9 +232,8 @@ def test_a_running_computation_is_canceled_and_taken_up_again(tab):
     tab.press("Compute what is missing")
     tab.wait(lambda: tab.session.found.reach.fine, "the rest is computed")
     tab.settle()
-    tab.page.get_by_text(
-        size_text(tab.session.found.reach.size, tab.session.found.reach.arm)
-    ).first.wait_for()
+    reach = tab.session.found.reach
+    tab.page.get_by_text(size_text(reach.size, reach.arm)).first.wait_for()
 
 
 @pytest.mark.large
@@ -248,9 +249,8 @@ def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, mo
     monkeypatch.undo()
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
-    tab.page.get_by_text(
-        size_text(tab.session.found.reach.size, tab.session.found.reach.arm)
-    ).first.wait_for()
+    reach = tab.session.found.reach
+    tab.page.get_by_text(size_text(reach.size, reach.arm)).first.wait_for()
 
 
 @pytest.mark.large

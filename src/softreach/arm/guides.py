@@ -139,20 +139,24 @@ class Guides:
         arcs[:, :count, 0] += np.diff(self._edges)
         return arcs[:, self._chords.arc]
 
+    @lazy
+    def _onto(self) -> Array:
+        """1 where the arc of a chord at a place is one of all, shape (chord, place, arc)."""
+        return (self._chords.arc[..., None] == np.arange(len(self._edges) - 1)).astype(float)
+
     def _on_arcs(self, values: Array) -> Array:
         """Sums over chords by tendon and arc, (n, chord, place, 4) to (n, tendon, 4 arc)."""
-        chords, count = self._chords, len(self._edges) - 1
-        total = np.zeros((len(values), len(self.columns), count + 1, 4))
-        for j in range(chords.arc.shape[1]):
-            np.add.at(total, (slice(None), chords.tendon, chords.arc[:, j]), values[:, :, j])
-        return total[:, :, :count].reshape(len(values), len(self.columns), 4 * count)
+        n, tendons = len(values), np.arange(len(self.columns))
+        of_tendon = (self._chords.tendon[:, None] == tendons).astype(float)
+        onto = np.einsum("ct,cja->cjta", of_tendon, self._onto)
+        total = _summed(values, onto).reshape(n, 4, len(tendons), -1)
+        return np.moveaxis(total, 1, 3).reshape(n, len(tendons), -1)
 
     def lengths(self, works: Array) -> Array:
         """ℓ of each guided tendon [m] by the works of arcs, shape (n, tendon)."""
         each = _pulled(self._arcs(works), self._chords)[0]
-        total = np.zeros((len(works), len(self.columns)))
-        np.add.at(total, (slice(None), self._chords.tendon), each)
-        return total
+        first = np.searchsorted(self._chords.tendon, np.arange(len(self.columns)))
+        return np.add.reduceat(each, first, axis=1)
 
     def slopes(self, works: Array) -> Array:
         """∂ℓ/∂(λ, ω) of all arcs, shape (n, tendon, 4 arc)."""
@@ -168,19 +172,17 @@ class Guides:
 
     def on_arcs_slopes(self, works: Array, tension: Array) -> tuple[Array, Array]:
         """∂w by the works, shape (n, 4 arc, 4 arc), and by the tensions, (n, 4 arc, tendon)."""
-        arcs, chords = self._arcs(works), self._chords
-        n, count, places = len(works), len(self._edges) - 1, chords.arc.shape[1]
-        by_works = np.zeros((n, count + 1, 4, count + 1, 4))
-        for j in range(places):
+        arcs, (n, count) = self._arcs(works), (len(works), len(self._edges) - 1)
+        by_works = np.zeros((n, 4, count, count, 4))
+        for j in range(arcs.shape[2]):
+            onto = np.einsum("cia,cb->ciab", self._onto, self._onto[:, j])
             for k in range(4):
                 moved = arcs.astype(complex)
                 moved[:, :, j, k] += 1j * _COMPLEX
-                second = _pulled(moved, chords)[1].imag / _COMPLEX
-                second *= tension[:, chords.tendon, None, None]
-                for i in range(places):
-                    at = (slice(None), chords.arc[:, i], slice(None), chords.arc[:, j], k)
-                    np.subtract.at(by_works, at, np.swapaxes(second[:, :, i], 0, 1))
-        by_works = by_works[:, :count, :, :count].reshape(n, 4 * count, 4 * count)
+                second = _pulled(moved, self._chords)[1].imag / _COMPLEX
+                second *= tension[:, self._chords.tendon, None, None]
+                by_works[..., k] -= _summed(second, onto).reshape(n, 4, count, count)
+        by_works = np.moveaxis(by_works, 1, 2).reshape(n, 4 * count, 4 * count)
         return by_works, -np.swapaxes(self.slopes(works) - self._straight, 1, 2)
 
     def settled(self, inner: Array, works_of: Callable[[Array], Array]) -> Array:
@@ -223,6 +225,13 @@ def _series(x: Array) -> list[Array]:
     return series
 
 
+def _summed(values: Array, onto: Array) -> Array:
+    """Sums over chords and places, (n, chord, place, 4) to (n, 4, all that `onto` leads to)."""
+    chords = onto.shape[0] * onto.shape[1]
+    across = np.swapaxes(values.reshape(len(values), chords, 4), 1, 2)
+    return np.matmul(across, onto.reshape(chords, -1))
+
+
 def _dot(a: Array, b: Array) -> Array:
     return (a * b).sum(axis=-1)
 
@@ -250,7 +259,7 @@ def _slopes_along(arc: Array, point: Array, along: Array) -> Array:
         ahead * _dot(point, turn) + length * _dot(turn, side),
         length * ahead * turn[..., 2],
     )
-    rates = -0.5 * sum(v * (s[k + 1] - k * s[k + 2]) for k, v in enumerate(values))
+    rates = np.sum([v * (k * s[k + 2] - s[k + 1]) / 2.0 for k, v in enumerate(values)], axis=0)
     s1, s2, s3 = (each[..., None] for each in s[1:4])
     by_turn = 2.0 * rates[..., None] * turn + s1 * np.cross(point, along)
     by_turn += s2 * (along * _dot(point, turn)[..., None] + point * ahead[..., None])

@@ -300,9 +300,9 @@ class Section(Part):
     def load_faults(self) -> list[Fault]:
         """Faults that keep loads from acting on an arm."""
         faults = self.modulus_faults("where loads act")
-        if self.bending_ratio != 1.0:
-            given = getattr(self.measured, "bending_stiffness")  # noqa: B009
+        if self.measured is not None and self.bending_ratio != 1.0:
             allowed = "must be one number where loads act or compliance is computed"
+            given = self.measured.bending_stiffness
             faults.append(Fault("measured.bending_stiffness", given, allowed))
         return faults
 

@@ -18,24 +18,19 @@ from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _GROUPS = (
-    ("Design", "design:design search:check search:search listing:list studio:studio"),
+    ("Design", "design:design search:check search:search demo:list studio:studio"),
     ("Bench", "bench:plan-poses bench:calibrate"),
-    ("Reach", "reach:reach cloud:cloud cloud:volume reach:payload reach:gradient"),
+    ("Reach", "reach:reach reach:cloud reach:volume reach:payload reach:gradient"),
     ("Places", "places:solve places:track places:equilibria"),
-    ("Output", "cloud:show convert:export convert:import"),
+    ("Output", "reach:show convert:export convert:import"),
     ("Families", "atlas:atlas"),
-    ("More", "demo:demo demo:example warmup:doctor demo:paper warmup:warmup"),
+    ("More", "demo:demo demo:example demo:doctor demo:paper demo:warmup"),
 )
 """Titles of the help, and commands behind the modules that they are in."""
 MODULES = {
     name: module for _, words in _GROUPS for module, name in (w.split(":") for w in words.split())
 }
 _FUNCTIONS = {"import": "import_file", "list": "listing"}  # where Python needs the name itself
-
-
-def _shown_default(value: object) -> Any:
-    """A default worth showing: not that nothing is given, and not that a flag is not set."""
-    return None if value is None or value is False else str(value)
 
 
 class _Flowing:
@@ -71,7 +66,9 @@ Start with
     help_format="plaintext",
     help_formatter=_Flowing(),
     console=cast(Any, HelpConsole()),
-    default_parameter=Parameter(negative=(), show_default=_shown_default),
+    default_parameter=Parameter(
+        negative=(), show_default=lambda x: None if x is None or x is False else str(x)
+    ),
 )
 _groups = [Group(_title, sort_key=_rank - 9) for _rank, (_title, _) in enumerate(_GROUPS)]
 for _group, (_, _words) in zip(_groups, _GROUPS, strict=True):
@@ -85,32 +82,26 @@ for _flag in ("--help", "--version", "--install-completion"):
     app[_flag].group = _groups[-1]
 
 
-def _always(*names: str, help: str) -> Parameter:
+def _always(help: str, *names: str) -> Parameter:
     group = Group("Options of every command", sort_key=9)
     return Parameter(name=names, group=group, show_default=False, help=help)
+
+
+_QUIET = _always("Print results and errors only: no warnings, no progress.", "--quiet", "-q")
+_VERBOSE = _always("Print more: what is compiled, and where errors come from.", "--verbose", "-v")
+_IMPORT = _always(
+    "Module, or .py file, with actuators, profiles or metrics of your own, which is run. "
+    "May be repeated.",
+    "--import",
+)
 
 
 @app.meta.default
 def _start(
     *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
-    quiet: Annotated[
-        bool,
-        _always("--quiet", "-q", help="Print results and errors only: no warnings, no progress."),
-    ] = False,
-    verbose: Annotated[
-        bool,
-        _always(
-            "--verbose", "-v", help="Print more: what is compiled, and where an error comes from."
-        ),
-    ] = False,
-    imports: Annotated[
-        list[str] | None,
-        _always(
-            "--import",
-            help="Module, or .py file, with actuators, profiles or metrics of your own, which is "
-            "run. May be repeated.",
-        ),
-    ] = None,
+    quiet: Annotated[bool, _QUIET] = False,
+    verbose: Annotated[bool, _VERBOSE] = False,
+    imports: Annotated[list[str] | None, _IMPORT] = None,
 ) -> int | None:
     if quiet and verbose:
         raise NotPossible("choose --quiet or --verbose")

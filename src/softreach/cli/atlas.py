@@ -10,9 +10,8 @@ from cyclopts import App, Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import console
-from softreach.cli.values import Whole, pairs_in, read_as, rows_of
+from softreach.cli.console import console, rows_of
+from softreach.cli.options import UNCHANGED, Changes, Whole, design_from, pairs_in, read_as
 from softreach.support.arguments import POSITIVE, as_integer
 from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
 from softreach.support.files.text import read_text
@@ -70,6 +69,9 @@ def build(
         scheduler: Dask scheduler: tcp://host:port
         scheduler_file: Dask scheduler file.
     """
+    first, _, count = shard.partition("/")
+    if not (shard.isascii() and first.isdigit() and count.isdigit() and len(shard) < 20):
+        raise InvalidInput("shard", shard or "''", "i/k with 0 <= i < k")
     groups = tuple(sr.atlas.METRIC_GROUPS if metrics is None else metrics.split(","))
     if "concave" not in groups:
         options.refuse("without the metrics concave", alpha=alpha)
@@ -81,7 +83,7 @@ def build(
         metrics=groups,
         keep_clouds=keep_clouds,
         executor=_executor(scheduler, scheduler_file),
-        shard=_shard(shard),
+        shard=(int(first), int(count)),
         durable=durable,
     )
     status(store, json=json)
@@ -148,14 +150,12 @@ def best(
 
     options.check_output(out, DESIGN_FILE, overwrite)
     atlas = sr.open_atlas(store)
-    designs = sr.atlas.best_designs(
-        atlas, metric, smallest=smallest, where=where or (), count=count
-    )
+    where = where or []
+    designs = sr.atlas.best_designs(atlas, metric, smallest=smallest, where=where, count=count)
     if out is not None:
         if not designs.sizes["rank"]:
-            raise NotPossible(f"no design of {store} meets {' and '.join(where or ())}")
-        parameters = command_of(atlas).space.names
-        first = {name: float(designs[name][0]) for name in parameters}
+            raise NotPossible(f"no design of {store} meets {' and '.join(where)}")
+        first = {name: float(designs[name][0]) for name in command_of(atlas).space.names}
         sr.atlas.atlas_design(atlas, **first).save(out, overwrite=overwrite)
     console.rows(f"best {metric} of {store}", rows_of(designs), json)
 
@@ -229,10 +229,3 @@ def _over_length(text: str) -> float:
     allowed = "a radius > 0 over the length of each design, like 0.05L"
     bare = text[:-1] if text.endswith("L") else ""
     return read_as("alpha", text, lambda _: read_number(bare), allowed, POSITIVE)
-
-
-def _shard(text: str) -> tuple[int, int]:
-    first, _, count = text.partition("/")
-    if not (text.isascii() and first.isdigit() and count.isdigit() and len(text) < 20):
-        raise InvalidInput("shard", text or "''", "i/k with 0 <= i < k")
-    return int(first), int(count)

@@ -10,9 +10,8 @@ from cyclopts import Group, Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, pairs_in, read_as
+from softreach.cli.console import as_read, console
+from softreach.cli.options import UNCHANGED, Changes, Number, Whole, design_from, pairs_in, read_as
 from softreach.support import progress
 from softreach.support.arguments import POSITIVE
 from softreach.support.errors import InvalidInput

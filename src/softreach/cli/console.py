@@ -1,36 +1,42 @@
-"""The console: results on standard output; errors, warnings and progress on standard error."""
+"""The console: values as people and machines read them, on standard output.
+
+Errors, warnings and progress are printed on standard error.
+"""
 
 from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import re
 import shutil
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from enum import Enum
 from io import TextIOWrapper
 from typing import TYPE_CHECKING, Any
 
 import softreach as sr
-from softreach.cli.values import Rows, for_machines, for_people, plain, shown
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
-from softreach.support.quantity import columns
-from softreach.support.units import METER, LengthUnit
+from softreach.support.quantity import columns, five_digits, quantity
+from softreach.support.units import METER, POWERS, LengthUnit
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from rich.console import Console as RichConsole
+    import xarray as xr
 
+Rows = dict[str, tuple[Any, str]]  # name -> (value, unit)
+ERROR = " error"  # behind the name of a row with the error of another
+_READ_AS = {"m2": "m²", "m3": "m³", "1": ""}
+_PLAIN = str.maketrans({"³": "3", "²": "2", "/": "_per_", " ": "_", "(": "", ")": ""})
 _NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
-
-
+# characters that a terminal obeys: of names and paths that others gave
 _COMMANDS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
-"""Characters that a terminal obeys: of names and paths that others gave."""
 
 
 def _printable(text: object) -> str:
@@ -38,15 +44,10 @@ def _printable(text: object) -> str:
 
 
 class Console:
-    """Prints for all commands.
+    """Prints for all commands."""
 
-    Attributes:
-        quiet: Results and errors only.
-        verbose: Also what is compiled, and where an error comes from.
-    """
-
-    quiet = False
-    verbose = False
+    quiet = False  # Results and errors only
+    verbose = False  # Also what is compiled, and where an error comes from
 
     def set(self, *, quiet: bool = False, verbose: bool = False) -> None:
         """Set how much is printed."""
@@ -64,13 +65,9 @@ class Console:
     def rows(
         self, title: str, rows: Rows, as_json: bool, arm: sr.Manipulator | None = None
     ) -> None:
-        """Named values with their units, one below the other.
+        """Named values in SI units below a title; in JSON, names with their units are the keys.
 
-        Args:
-            title: Heading for people.
-            rows: Name -> (value, unit) in SI units; JSON keys are the names with their units.
-            as_json: Print JSON.
-            arm: The design whose unit people see, and whose length is the unit L for machines.
+        People see the unit of the arm, and machines values in its length L too.
         """
         if as_json:
             self.json(for_machines(rows, None if arm is None else arm.length))
@@ -122,20 +119,15 @@ class Console:
             log.setLevel(level)
 
     def flush(self) -> None:
-        """Write what was printed, so that a full disk is found before the end.
-
-        Raises:
-            NotWritten: It cannot be written.
-            BrokenPipeError: Whoever read it has gone.
-        """
+        """Write what was printed, so that a full disk is found before the end."""
         try:
             sys.stdout.flush()
         except BrokenPipeError:
             raise
         except OSError as error:
             self.discard()
-            reason = error.strerror or str(error)
-            raise NotWritten("standard output", error.errno or 0, reason) from None
+            why = error.errno or 0, error.strerror or str(error)
+            raise NotWritten("standard output", *why) from None
 
     def discard(self) -> None:
         """Drop output that cannot be written; Python would print an error."""
@@ -152,17 +144,14 @@ class HelpConsole:
     """The console that help is laid out on, made when it is needed as Rich takes its time."""
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(_rich_console(), name)
+        from rich.console import Console as RichConsole
 
+        class StrictConsole(RichConsole):
+            def on_broken_pipe(self) -> None:
+                raise BrokenPipeError
 
-def _rich_console() -> RichConsole:
-    from rich.console import Console as RichConsole
-
-    class StrictConsole(RichConsole):
-        def on_broken_pipe(self) -> None:
-            raise BrokenPipeError
-
-    return StrictConsole(width=max(_NARROWEST, shutil.get_terminal_size().columns))
+        width = max(_NARROWEST, shutil.get_terminal_size().columns)
+        return getattr(StrictConsole(width=width), name)
 
 
 class _Compilations(logging.Handler):
@@ -181,3 +170,98 @@ class _Compilations(logging.Handler):
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
     if issubclass(category, SoftreachWarning):
         console.note(f"warning: {message}")
+
+
+def to_degrees(angles: Any) -> Any:
+    """Angles [rad] in degrees, without the digits that come of the conversion."""
+    import numpy as np
+
+    return np.round(np.degrees(angles), 9).tolist()
+
+
+def as_read(values: Any, unit: str) -> tuple[Any, str]:
+    """Numbers and their unit as people read them: degrees for radians, m³ for m3."""
+    if unit == "rad":
+        return to_degrees(values), "deg"
+    return plain(values), _READ_AS.get(unit, unit)
+
+
+def rows_of(dataset: xr.Dataset) -> Rows:
+    """The numbers of a result, by the names and units that its dataset has."""
+    rows: Rows = {}
+    for name, column in dataset.variables.items():
+        if column.dtype.kind in "fi":
+            unit = str(column.attrs.get("units", "1"))
+            rows[str(name).replace("_", " ")] = as_read(column.values, unit)
+    return rows | ({"route": (dataset.attrs["route"], "")} if "route" in dataset.attrs else {})
+
+
+def fields_of(values: Mapping[str, Any], *lengths: str) -> Rows:
+    """The fields of a result as rows; those that are lengths [m] by name."""
+    return {name: (value, "m" if name in lengths else "") for name, value in values.items()}
+
+
+def for_people(rows: Rows, unit: LengthUnit) -> Iterable[tuple[str, str]]:
+    """The rows as text: lengths, areas and volumes in the unit, and errors beside their values."""
+    for name, (value, symbol) in rows.items():
+        if name.endswith(ERROR) and name.removesuffix(ERROR) in rows:
+            continue  # it stands beside the value
+        size, power = 1.0, POWERS.get(symbol)
+        if power is not None:
+            size, symbol = unit.scale(power), unit.symbol(power)
+        text = _shown_in(value, rows.get(f"{name}{ERROR}", (None, ""))[0], size)
+        yield name, f"{text} {'' if text == '-' else symbol}".rstrip()
+
+
+def _shown_in(value: Any, error: Any, size: float) -> str:
+    """Numbers in a unit of this size, each to the first digit of its error if that is known."""
+    if isinstance(value, list):
+        errors = error if isinstance(error, list) else [error] * len(value)
+        return ", ".join(_shown_in(*pair, size) for pair in zip(value, errors, strict=True))
+    if value is None or error is None:
+        return shown(value if value is None or size == 1.0 else value / size)
+    return quantity(value / size, "", error / size)
+
+
+def for_machines(rows: Rows, length: float | None = None) -> dict[str, Any]:
+    """The rows by names with their units; lengths, areas and volumes in SI units and in L."""
+    from softreach.arm.written import written_name
+
+    fields: dict[str, Any] = {}
+    for name, (value, unit) in rows.items():
+        values = {unit: value}
+        if length is not None and (power := POWERS.get(unit)):
+            import numpy as np
+
+            relative = LengthUnit("L", length)
+            values[relative.symbol(power)] = np.asarray(plain(value), float) / relative.scale(power)
+        for own, number in values.items():
+            key = written_name(name.translate(_PLAIN), own or "1").translate(_PLAIN)
+            fields[key] = plain(number)
+    return fields
+
+
+def shown(value: Any) -> str:
+    """A value in a table, with five digits that count; a dash where there is none."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return "-"
+    if isinstance(value, float):
+        return five_digits(value)
+    if isinstance(value, int) and not isinstance(value, bool):
+        return f"{value:,}"
+    if isinstance(value, list | tuple):
+        return ", ".join(shown(item) for item in value)
+    return str(value)
+
+
+def plain(value: Any) -> Any:
+    """Arrays as lists, members of an enumeration by name, and None for what JSON does not have."""
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {name: plain(item) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return plain(value.tolist()) if hasattr(value, "tolist") else value

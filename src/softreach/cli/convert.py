@@ -9,9 +9,8 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
-from softreach.cli.console import console
-from softreach.cli.values import Number, Rows
+from softreach.cli.console import Rows, console
+from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible
 
 Format = Annotated[
@@ -43,6 +42,9 @@ def export(
     Args:
         out: The file to write; its suffix chooses the format.
     """
+    from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
+    from softreach.export.surfaces import SURFACE_FILES
+
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
     if options.is_stored(source):
@@ -54,9 +56,18 @@ def export(
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
     elif out.suffix == ".jl":
         options.refuse("on a filament's definition, which has none", activation=activation)
-        _export_filament(design_from(source, changes), out, overwrite, unit)
+        arm = design_from(source, changes)
+        options.refuse(_OTHER, unit=unit)
+        options.check_output(out, FILAMENT_SCRIPT, overwrite)
+        write_design(arm, out, overwrite=overwrite)
+        console.line(out)
     else:
-        _export_arm(design_from(source, changes, unit), out, activation, overwrite)
+        arm = design_from(source, changes, unit)
+        options.check_output(out, SURFACE_FILES, overwrite)
+        shape, written = options.shape_of(activation, arm), options.written_unit(arm)
+        sr.export.export_arm(arm, shape, out, unit=written, overwrite=overwrite)
+        console.written(out, written)
+        console.line(out)
 
 
 def _export_cloud(source: str, out: Path, overwrite: bool, unit: str | None) -> None:
@@ -80,25 +91,6 @@ def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> N
     write_cloud(sr.open_cloud(source), out, overwrite=overwrite)
     for path in written:
         console.line(path)
-
-
-def _export_filament(arm: sr.Manipulator, out: Path, overwrite: bool, unit: str | None) -> None:
-    from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
-
-    options.refuse(_OTHER, unit=unit)
-    options.check_output(out, FILAMENT_SCRIPT, overwrite)
-    write_design(arm, out, overwrite=overwrite)
-    console.line(out)
-
-
-def _export_arm(arm: sr.Manipulator, out: Path, activation: str | None, overwrite: bool) -> None:
-    from softreach.export.surfaces import SURFACE_FILES
-
-    options.check_output(out, SURFACE_FILES, overwrite)
-    shape, written = options.shape_of(activation, arm), options.written_unit(arm)
-    sr.export.export_arm(arm, shape, out, unit=written, overwrite=overwrite)
-    console.written(out, written)
-    console.line(out)
 
 
 def import_file(

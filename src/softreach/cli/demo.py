@@ -1,26 +1,38 @@
-"""`softreach demo`, `example` and `paper`: the main job, files to begin with, all of the paper."""
+"""`softreach demo`, `example`, `list`, `paper`, `doctor`, `warmup`: what to begin with."""
 
 from __future__ import annotations
 
+import os
+import platform
+import re
+from collections.abc import Iterator
 from functools import partial
+from importlib.metadata import PackageNotFoundError, requires, version
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 import softreach as sr
-from softreach.cli.changes import design_from
-from softreach.cli.cloud import check_hull_memory, volume_rows
-from softreach.cli.console import console
-from softreach.cli.options import DEFAULT, OUT, Output, Overwrite, check_output, written_unit
-from softreach.cli.values import Whole
+from softreach.cli import options
+from softreach.cli.console import as_read, console
+from softreach.cli.options import UNCHANGED, Changes, Whole, design_from
+from softreach.cli.reach import HULL_BYTES, volume_rows
 from softreach.support import parallel
-from softreach.support.errors import InvalidInput
+from softreach.support.arguments import as_one_of
+from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PICTURES
 from softreach.support.files.text import write_text
+from softreach.support.memory import check_memory, free_memory
+from softreach.support.progress import bar
 
+Kind = Literal[
+    "designs", "examples", "materials", "actuators", "metrics", "objectives", "parameters"
+]
+Table = Iterator[tuple[Any, ...]]  # names of the columns, then rows
 _FILES = {
     "tentacle": ("tentacle.toml", "tentacle.csv"),
     "three_fibers": ("three_fibers.toml", "five_places.toml"),
@@ -32,8 +44,8 @@ _FILES = {
 def demo(
     *,
     n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 400_000,
-    out: Annotated[Path, OUT] = Path("out"),
-    output: Output = DEFAULT,
+    out: Annotated[Path, options.OUT] = Path("out"),
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Start here: cloud, volumes and picture of the paper's design.
 
@@ -54,11 +66,11 @@ def demo(
     formats = {"design.toml": DESIGN_FILE, "cloud.zarr": CLOUD_STORE, "cloud.png": PICTURES}
     formats |= {"cloud.ply": CLOUD_FILES, "hull.ply": CLOUD_FILES}
     for name, kinds in formats.items():
-        check_output(out / name, kinds, output.overwrite)
-    check_hull_memory(n)
+        options.check_output(out / name, kinds, output.overwrite)
+    check_memory("n", n, HULL_BYTES * n)
     cloud = sr.compute_cloud(arm, n)
     computed = perf_counter() - start
-    written = written_unit(arm)
+    written = options.written_unit(arm)
     hulls = partial(sr.concave_hull, cloud.tip, bias=True), partial(sr.convex_hull, cloud.tip)
     with parallel.meanwhile(lambda: [make() for make in hulls]) as made:
         arm.save(out / "design.toml", overwrite=output.overwrite)
@@ -79,12 +91,15 @@ def demo(
 
 
 def example(
-    name: str, /, *, out: Annotated[Path, OUT] = Path(), overwrite: Overwrite = False
+    name: str,
+    /,
+    *,
+    out: Annotated[Path, options.OUT] = Path(),
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Write an example here: a design and the data and scripts that go with it.
 
-    softreach list examples prints their names. Designs of the gallery are examples
-    of one file.
+    softreach list examples prints their names, designs of the gallery among them.
 
     Example: softreach example tentacle
 
@@ -115,11 +130,115 @@ def _folder(name: str) -> Path:
     return package / name if (package / name).is_dir() else package.parents[1] / name
 
 
+def listing(
+    kind: Kind,
+    design: Annotated[str | None, Parameter(help="Design, for its parameters alone.")] = None,
+    /,
+    *,
+    changes: Changes = UNCHANGED,
+    json: options.AsJson = False,
+) -> None:
+    """List designs, examples, materials, actuators, metrics, objectives, or parameters.
+
+    Parameters are those of a design, with their values, as --set and --vary name
+    them. A dash means that the design gives no single number, or that parts which
+    share the parameter differ; it can still be set. Actuators and metrics of your
+    own are listed with --import, or if a package declares them. Metrics of an
+    atlas that are single numbers can be objectives of a search too.
+
+    Example: softreach list parameters minimal_trunk
+
+    Args:
+        kind: What to list.
+    """
+    if kind != "parameters":
+        options.refuse(f"with list {kind}", **changes.given)
+        if design is not None:
+            raise NotPossible(f"list {kind} takes no design; list parameters {design} does")
+        columns, *rows = _TABLES[kind]()
+    elif design is None:
+        raise NotPossible("name the design, as in softreach list parameters minimal_trunk")
+    else:
+        columns, *rows = _parameters(design_from(design, changes))
+    console.table([dict(zip(columns, row, strict=True)) for row in rows], json)
+
+
+def _designs() -> Table:
+    yield "design", "bundles", "length_m", "description"
+    for name in sr.designs.__all__:
+        make = getattr(sr.designs, name)
+        arm = make()
+        yield name, arm.bundles, arm.length, _summary(make).rstrip(".").replace("`", "")
+
+
+def _summary(documented: object) -> str:
+    return (documented.__doc__ or "").strip().partition("\n")[0]
+
+
+def _examples() -> Table:
+    yield "example", "files", "description"
+    for name, files in examples().items():
+        heading = files[0].read_text("utf-8").partition("\n")[0].lstrip("# ").rstrip(".")
+        yield name, " ".join(file.name for file in files), heading
+
+
+def _materials() -> Table:
+    from softreach.arm.material import material_record
+
+    yield "material", "young_modulus_pa", "poisson_ratio", "density_kg_m3", "modulus"
+    for name in sr.arm.material_names():
+        of, modulus = (record := material_record(name)).material, record.modulus
+        yield name, of.young_modulus, of.poisson_ratio, of.density, modulus
+
+
+def _actuators() -> Table:
+    from softreach.arm.design_file.keys import every_kind
+
+    yield "kind", "activation", "unit", "module", "description"
+    for name, kind in every_kind(sr.arm.Actuator).items():
+        yield name, kind.activation, kind.unit, kind.__module__, _summary(kind)
+
+
+def _metrics() -> Table:
+    from softreach.atlas.metrics import own_metrics
+
+    yield "metric", "group", "unit", "meaning"
+    groups = sr.atlas.METRIC_GROUPS | {name: (one,) for name, one in own_metrics().items()}
+    for group, members in groups.items():
+        yield from ((one.name, group, one.unit, one.meaning) for one in members)
+
+
+def _objectives() -> Table:
+    yield "objective", "unit", "asks", "derivatives", "meaning"
+    for one in sr.optimization.OBJECTIVES.values():
+        yield one.name, one.unit, one.asks, "yes" if one.smooth else "no", one.meaning
+
+
+def _parameters(arm: sr.Manipulator) -> Table:
+    from softreach.arm.parameters import parameters
+    from softreach.arm.written import written_name
+
+    yield "parameter", "value", "unit", "symbol", "meaning"
+    for name, one in parameters(arm).items():
+        value, unit = as_read(one.value(arm), one.unit)
+        yield written_name(name, one.unit), value, unit, one.symbol, one.meaning
+
+
+_TABLES = {
+    "designs": _designs,
+    "examples": _examples,
+    "materials": _materials,
+    "actuators": _actuators,
+    "metrics": _metrics,
+    "objectives": _objectives,
+}
+
+
 def paper(
     *,
     quick: bool = False,
-    out: Annotated[Path, OUT] = Path("paper"),
-    overwrite: Overwrite = False,
+    out: Annotated[Path, options.OUT] = Path("paper"),
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Recompute the paper's figures and statements into a report.
 
@@ -134,3 +253,141 @@ def paper(
     from softreach.paper import reproduce_paper
 
     console.line(reproduce_paper(out, quick=quick, overwrite=overwrite, say=console.note))
+
+
+def warmup(*, only: str | None = None) -> int:
+    """Compile all kernels now, so that no later command has to.
+
+    A cache on disk keeps them; if it has them already, this takes seconds.
+    Exits with 1 if the cache cannot be written.
+
+    Example: softreach warmup --only free
+
+    Args:
+        only: free (kernels of arms without loads) or loaded (the others): both if left out.
+    """
+    from softreach.kernels.compiler import not_kept
+
+    if only is not None:
+        as_one_of("only", only, [*_JOBS])
+    with bar("compiling", None) as done, no_warnings():  # of clouds and grids too coarse
+        for _ in chain(*(jobs() for name, jobs in _JOBS.items() if only in (None, name))):
+            if not_kept:
+                break
+            done(1)
+    if not_kept:
+        reason = f"nothing could be kept: {not_kept[0]}"
+        console.error(f"{reason}; set NUMBA_CACHE_DIR to a folder that can be written")
+        return 1
+    console.line(f"all kernels{'' if only is None else f' of {only} arms'} are compiled")
+    return 0
+
+
+def _free() -> Iterator[object]:
+    """Results that need the kernels of arms without loads, each computed when it is asked for."""
+    import numpy as np
+
+    from softreach.picture.zbuffer import Extent, ZBuffer
+
+    arm, redundant = sr.designs.minimal_trunk(), sr.designs.redundant_trunk()
+    hanging = arm.replace(base=sr.Base(points="down"))
+    target, beyond = (0.2, 0.1, 0.6), (2.0, 0.0, 0.0)
+    path = (target, (0.2, 0.1, 0.61))
+    yield _hulls()
+    yield ZBuffer(Extent(0, 1, 0, 1), 4).draw_triangles(np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
+    yield _calibration()
+    yield sr.tip_jacobian(arm, [[-1.0, 0.0, -0.4]])
+    yield sr.tip_jacobian(hanging, [[-1.0, 0.0, -0.4]])
+    yield sr.configuration(arm, [-1.0, 0.0, -0.4])
+    reached = sr.reachable_set(arm, accuracy=0.1)
+    yield reached.contains(target)
+    yield reached.distance(beyond)
+    yield sr.solve_inverse(arm, [target, beyond])
+    yield sr.inverse.prepared_map(arm).tree
+    yield sr.track_path(arm, path)
+    yield sr.reachable_set(redundant, accuracy=0.1)
+    yield sr.solve_inverse(redundant, [target], near=[-0.5] * 4)
+    yield sr.solve_inverse(redundant, [target])
+    yield sr.track_path(redundant, path)
+
+
+def _calibration() -> None:
+    import numpy as np
+
+    tendon = sr.arm.LengthTendon(distance=0.01, bundles=3, activation_bounds=(0.0, 0.01))
+    arm = sr.Manipulator.tapered(
+        length=0.2, outer_radius=0.01, inner_radius=0.005, young_modulus=1e6, actuators=[tendon]
+    )
+    inputs = 0.01 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 1.0]])
+    data = {f"{name}_m": values for name, values in zip(arm.input_names, inputs.T, strict=True)}
+    places = np.array([[0.0, 0.0, 0.2], [0.01, 0.0, 0.2], [0.0, 0.01, 0.2]])
+    data |= {f"{axis}_m": values for axis, values in zip("xyz", places.T, strict=True)}
+    sr.calibrate(arm, data, free=["pose.x"], rivals=False)
+
+
+def _hulls() -> None:
+    import numpy as np
+
+    from softreach.geometry.alpha_shape import alpha_hull
+    from softreach.geometry.surface import Surface
+
+    cloud = sr.compute_cloud(sr.designs.minimal_trunk(), 2000)
+    sr.concave_hull(cloud.tip, alpha=0.2)
+    hull = sr.concave_hull(cloud.tip, alpha="critical")
+    Surface(vertices=hull.vertices, faces=hull.faces).distance(hull.vertices[:2])
+    tips = cloud.tip.values
+    alpha_hull(tips, 0.1, boxes=2)
+    sr.concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
+    for design in (sr.designs.minimal_trunk(), sr.designs.redundant_trunk()):
+        sr.activation_distance(sr.compute_cloud(design, 2000), 0.1)
+
+
+def _loaded() -> Iterator[object]:
+    free = sr.designs.lce_arm()
+    rest, pulled = [0.0] * free.bundles, free.input_bounds[:, 0].tolist()
+    weight = free.replace(loads=sr.Loads(gravity=(0, 0, 9.81), payload=0.001))
+    follower = free.replace(loads=sr.Loads(follower_force=(0, 0.001, 0)))
+    for arm in (weight, follower):
+        yield sr.tip_positions(arm, [rest])
+        yield sr.tip_jacobian(arm, [rest])
+        yield sr.configuration(arm, rest)
+    yield sr.equilibria(weight, pulled)
+
+
+_JOBS = {"free": _free, "loaded": _loaded}
+
+
+def doctor(*, json: options.AsJson = False) -> None:
+    """Print versions, cores, memory and caches, for the report of a fault.
+
+    Example: softreach doctor --json
+    """
+    from softreach.kernels.compiler import not_kept
+    from softreach.kernels.rod import tips
+
+    cache = getattr(tips._tips, "_cache", None)
+    kept = str(getattr(cache, "cache_path", "nowhere: not compiled"))
+    kept = f"nowhere: {not_kept[0]}" if not_kept else kept
+    names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
+    has_screen = platform.system() in ("Windows", "Darwin")
+    has_screen = has_screen or bool({"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ})
+    rows = {
+        "softreach": (sr.__version__, ""),
+        "installed in": (str(Path(sr.__file__).parent), ""),
+        "Python": (platform.python_version(), ""),
+        "system": (platform.platform(), ""),
+        "cores": (os.cpu_count(), ""),
+        "threads used": (parallel.thread_count(), ""),
+        "free memory": (round(free_memory() / 1e9, 1), "GB"),
+        "kernels are kept in": (kept, ""),
+        "screen": ("yes" if has_screen else "none: headless", ""),
+    }
+    rows |= {name: (_version(name), "") for name in names if name != "softreach"}
+    console.rows("this machine and this installation", rows, json)
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

@@ -5,27 +5,23 @@ from __future__ import annotations
 import math
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import softreach as sr
-from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import console
-from softreach.cli.options import DEFAULT, Design, Out, Output, check_output, refuse
-from softreach.cli.values import Rows, to_degrees
+from softreach.cli import options
+from softreach.cli.console import Rows, console, to_degrees
+from softreach.cli.options import UNCHANGED, Changes, design_from
 from softreach.support.errors import NotPossible, no_warnings
-
-if TYPE_CHECKING:
-    from softreach.rest import Rest
 
 
 def design(
-    design: Design | None = None,
+    design: options.Design | None = None,
     /,
     *,
     schema: bool = False,
     changes: Changes = UNCHANGED,
-    out: Out = None,
-    output: Output = DEFAULT,
+    out: options.Out = None,
+    output: options.Output = options.DEFAULT,
 ) -> None:
     """Describe a design: angles, radii, stiffness, weight, warnings.
 
@@ -42,7 +38,7 @@ def design(
 
     if schema:
         given = {"out": out, "overwrite": output.overwrite, "unit": output.unit}
-        refuse("with --schema", **given, **changes.given)
+        options.refuse("with --schema", **given, **changes.given)
         from softreach.arm.design_file.schema import json_schema
 
         console.json(json_schema(), indent=2)
@@ -51,7 +47,7 @@ def design(
         raise NotPossible("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
         arm = design_from(design, changes, output.unit)
-    check_output(out, DESIGN_FILE, output.overwrite)
+    options.check_output(out, DESIGN_FILE, output.overwrite)
     facts = sr.describe(arm)
     if out is not None:
         arm.save(out, overwrite=output.overwrite)
@@ -150,22 +146,17 @@ def load_rows(arm: sr.Manipulator) -> Rows:
     if loads is None:
         return rows
     if any(loads.gravity):
-        rows = {
-            "gravity": (list(loads.gravity), "m/s²"),
-            "base": (_posture(loads.seen_from(arm.base)) + (f": {arm.base}" if posed else ""), ""),
-        }
+        gravity = loads.seen_from(arm.base).gravity  # a straight arm points along +z there
+        angle = to_degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
+        words = {0: "upright", 90: "sideways", 180: "hanging"}
+        posture = words.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
+        posture += f": {arm.base}" if posed else ""
+        rows = {"gravity": (list(loads.gravity), "m/s²"), "base": (posture, "")}
     for field, number in fields_of(type(loads)).items():
         value = getattr(loads, field)
         if field != "gravity" and (any(value) if isinstance(value, tuple) else value):
             rows[field.replace("_", " ")] = (value, number.unit)
     return rows | ({"point loads": (len(loads.point_loads), "")} if loads.point_loads else {})
-
-
-def _posture(loads: sr.Loads) -> str:
-    """The way the base stands by gravity in its own frame: a straight arm points along +z there."""
-    angle = to_degrees(math.acos(-loads.gravity[2] / math.hypot(*loads.gravity)))
-    names = {0: "upright", 90: "sideways", 180: "hanging"}
-    return names.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
 
 
 def _rest_rows(arm: sr.Manipulator) -> Rows:
@@ -193,7 +184,7 @@ def _rest_rows(arm: sr.Manipulator) -> Rows:
     }
 
 
-def _rest(arm: sr.Manipulator) -> Rest | None:
+def _rest(arm: sr.Manipulator) -> sr.rest.Rest | None:
     """The arm at rest; None under loads too large to compute it."""
     from softreach.rod.tip_map import InvalidLoads
 

@@ -1,33 +1,82 @@
-"""Options that commands share: how they are called, what they mean, how they are read."""
+"""Options that commands share: how they are called, what they mean, how they are read.
+
+The design that a command works on is among them, and the options that change it first.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, Token
 
 import softreach as sr
-from softreach.cli.changes import Changes, design_from, say_limits, shown_in
 from softreach.cli.console import console
-from softreach.cli.values import Whole, read_as
-from softreach.support.arguments import POSITIVE
-from softreach.support.errors import InvalidInput, NotPossible, check_installed
-from softreach.support.files.atomic import check_place
-from softreach.support.files.formats import (
-    PAGES,
-    PICTURES,
-    FileFormat,
-    Formats,
-    format_of,
+from softreach.support import quantity
+from softreach.support.arguments import POSITIVE, as_one_of
+from softreach.support.errors import (
+    InvalidDesign,
+    InvalidInput,
+    NotPossible,
+    Range,
+    check_installed,
+    did_you_mean,
+    warn,
 )
+from softreach.support.files.atomic import check_place
+from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
 from softreach.support.files.text import MEGABYTE, read_text
-from softreach.support.quantity import numbers_in
-from softreach.support.units import METER, TYPED, LengthUnit, read_length
+from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_POSTURES = {"upright": "up", "hanging": "down"}  # words for the way that a base points
+_MATTER = {"young_modulus": "1MPa", "density": "1000kg/m3"}
+"""Examples of what loads need to know of a material."""
+
+
+def read_as(
+    name: str, text: Any, read: Callable[[Any], Any], allowed: str, limits: Range | None = None
+) -> Any:
+    """What a reader makes of a text; refused where it raises ValueError or leaves the limits."""
+    try:
+        value = read(text)
+        if limits is None or limits.admits(value):
+            return value
+    except ValueError:
+        pass
+    raise InvalidInput(name, text or "''", allowed)
+
+
+def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
+    def convert(kind: Any, tokens: Sequence[Token]) -> float:
+        del kind
+        name = (tokens[0].keyword or "number").lstrip("-").replace("-", "_")
+        return read_as(name, tokens[0].value, read, allowed)
+
+    return Parameter(converter=convert)
+
+
+Whole = Annotated[int, _read_by(quantity.read_whole_number, "a whole number such as 20000 or 2e4")]
+Number = Annotated[float, _read_by(quantity.read_number, "a finite number such as 0.5 or 1e-3")]
+
+
+def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, str]:
+    """Names and values of NAME=VALUE, each name once; a name may hold another =."""
+    pairs: dict[str, str] = {}
+    for text in texts or ():
+        key, sign, value = (part.strip() for part in text.rpartition("="))
+        if not sign or not key or not value:
+            raise InvalidInput(name, text, allowed)
+        if key in pairs:
+            raise InvalidInput(name, text, f"given once for {key}")
+        pairs[key] = value
+    return pairs
+
 
 OUTPUT = Group("Output options", sort_key=3)
 OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
@@ -42,9 +91,8 @@ def _output(help: str, name: str | None = None) -> Parameter:
     return Parameter(name=name, group=OUTPUT, help=help)
 
 
-Design = Annotated[
-    str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
-]
+_DESIGN = "Design file (.toml), or a built-in design such as minimal_trunk."
+Design = Annotated[str, Parameter(help=_DESIGN)]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
 _ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
 Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]
@@ -55,6 +103,8 @@ Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
 View = Annotated[str | None, _output("View: oblique (if left out), front, side, top.")]
+Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
+"""Text that may begin with a minus."""
 
 
 @Parameter(name="*")
@@ -101,6 +151,174 @@ class Sampling:
 SAMPLING = Sampling()
 
 
+@Parameter(name="*", group=Group("Changes of the design", sort_key=2))
+@dataclass(frozen=True, kw_only=True)
+class Changes:
+    """Changes that a command makes to the design that it takes.
+
+    Attributes:
+        base: The way the arm points: up (upright), down (hanging), x, -x, y or -y.
+        revolution_deg: Revolution of every helical fiber; each keeps its handedness.
+        taper_deg: Taper angle.
+        payload: Mass at the tip with its unit: 200g.
+        gravity: down, up, sideways, none, or x,y,z [m/s²]; default down if there are loads.
+        tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5
+        point: Marker that counts as the tip, such as that of a tool.
+        settings: Value of any parameter, as in taper=2deg. May be repeated.
+    """
+
+    base: Signed = None
+    revolution_deg: Number | None = None
+    taper_deg: Number | None = None
+    payload: Signed = None
+    gravity: Signed = None
+    tip_force: Signed = None
+    point: str | None = None
+    settings: Annotated[list[str] | None, Parameter(name="--set")] = None
+
+    @property
+    def given(self) -> dict[str, object]:
+        """The options that were given, by their names."""
+        options = vars(self) | {"set": ", ".join(self.settings) if self.settings else None}
+        del options["settings"]
+        return {name: value for name, value in options.items() if value is not None}
+
+    def applied_to(self, arm: sr.Manipulator) -> sr.Manipulator:
+        """The changed design: parameters first, which may give what loads need to know."""
+        from softreach.arm.base import POINTS
+        from softreach.arm.parameters import changed
+
+        if self.base is not None:
+            words = _POSTURES | {points: points for points in POINTS}
+            points = words[as_one_of("base", self.base, words)]
+            arm = arm.replace(base=arm.base.replace(points=points))
+        texts, given = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg"), self.given
+        of_loads = {name: texts.pop(name) for name in [*texts] if name.startswith("loads.")}
+        angles = [(name, given[name]) for name in ("revolution_deg", "taper_deg") if name in given]
+        arm = changed(arm, _values(arm, [*angles, *texts.items()]))
+        if of_loads or {"payload", "gravity", "tip_force"} & given.keys():
+            arm = self._loaded(arm, keep=bool(of_loads))
+            arm = changed(arm, _values(arm, [*of_loads.items()]))
+        return arm.at_point(self.point)
+
+    def _loaded(self, arm: sr.Manipulator, *, keep: bool) -> sr.Manipulator:
+        """The arm with the loads it has and those given; none where all are zero and none stay."""
+        from softreach.arm.loads import GRAVITIES
+
+        new: dict[str, object] = {}
+        if self.payload is not None:
+            new["payload"] = read_mass("payload", self.payload)
+        if self.gravity is not None:
+            words = f"{', '.join(GRAVITIES)}, or "
+            vector = GRAVITIES.get(self.gravity)
+            new["gravity"] = vector or _vector("gravity", self.gravity, "m/s²", words)
+        if self.tip_force is not None:
+            new["tip_force"] = _vector("tip_force", self.tip_force, "N")
+        loads = (arm.loads or sr.Loads()).replace(**new)
+        if not keep and loads == sr.Loads(gravity=GRAVITIES["none"]):
+            return arm.replace(loads=None)
+        lacking = {
+            fault.path: _MATTER[field]
+            for fault in loads.section_faults(arm.section, arm.length)
+            if (field := fault.path.rpartition(".")[2]) in _MATTER
+        }
+        if lacking:
+            options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
+            needed = " and ".join(lacking)
+            raise NotPossible(f"loads need {needed}: add them to the design file, or {options}")
+        return arm.replace(loads=loads)
+
+
+UNCHANGED = Changes()
+
+
+def design_from(text: str, changes: Changes = UNCHANGED, unit: str | None = None) -> sr.Manipulator:
+    """The design of that name or file, changed as asked, to be shown in a unit."""
+    from softreach.arm import design_file
+    from softreach.arm.tables import check_extension
+
+    arm = _unchanged(text)
+    try:
+        changed = shown_in(unit, changes.applied_to(arm))
+        check_extension(changed)
+    except InvalidDesign as error:
+        one_option = len(error.faults) == 1 and changes.given
+        raise design_file.in_file_terms(error, "" if one_option else text) from None
+    say_limits(changed)
+    return changed
+
+
+def shown_in(unit: str | None, arm: sr.Manipulator) -> sr.Manipulator:
+    """The design, shown in the unit that was asked for if there is one."""
+    return arm if unit is None else arm.replace(display_unit=as_unit(unit, arm.length).name)
+
+
+def say_limits(arm: sr.Manipulator) -> None:
+    """Warn where the design leaves what the linear law covers."""
+    from softreach.arm.lines import law_warning
+
+    if text := law_warning(arm):
+        warn(text)
+
+
+_POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".mat", ".ply", ".stl", ".obj")
+"""Suffixes of points, surfaces and tables, which are no designs."""
+
+
+def _unchanged(text: str) -> sr.Manipulator:
+    names = sr.designs.__all__
+    if text in names:
+        return getattr(sr.designs, text)()
+    path = Path(text)
+    suffix = path.suffix.lower()
+    if suffix in _POINTS:
+        raise NotPossible(
+            f"{text} is no design: give a .toml file; in Python, softreach.concave_hull(points, "
+            "alpha=0.05) computes the volume of points [m] of shape (n, 3)"
+        )
+    is_json = suffix == ".json" and path.is_file()
+    if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
+        return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
+    hint = did_you_mean(text, names)
+    if suffix == ".json":
+        hint = f"if it is a filament: softreach import {text} {text[:-5]}.toml"
+    raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(names)}", hint)
+
+
+def read_mass(name: str, text: str) -> float:
+    """A mass [kg] that was written with its unit."""
+    allowed = f"a mass >= 0 with its unit ({', '.join(quantity.unit_names('kg'))}), such as 200g"
+    return read_as(name, text, lambda text: quantity.read_quantity(text, "kg"), allowed, Range(0.0))
+
+
+def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:
+    """Three numbers x,y,z, in the SI unit if none follows the last."""
+    names = quantity.unit_names(unit)
+
+    def read(text: str) -> tuple[float, ...]:
+        written = max((name for name in names if text.endswith(name)), key=len, default=names[0])
+        x, y, z = text.removesuffix(written).split(",")
+        return tuple(quantity.read_quantity(f"{part}{written}", unit) for part in (x, y, z))
+
+    allowed = f"{others}three finite numbers x,y,z in {unit} ({', '.join(names)})"
+    return read_as(name, text.rstrip(), read, allowed)
+
+
+def _values(arm: sr.Manipulator, written: Sequence[tuple[str, object]]) -> dict[str, float]:
+    from softreach.arm.parameters import find_parameter
+    from softreach.arm.written import Written
+
+    values: dict[str, float] = {}
+    names = Written.of(arm) if written else Written({})
+    for key, value in written:
+        name = key if key in names.by_key else find_parameter(arm, key).name
+        own = names.by_key[name].name
+        if own in values:
+            raise InvalidInput("set", key, "given once, under one of its names")
+        values[own] = read_as(key, value, partial(names.number, name), names.allowed(name))
+    return values
+
+
 def refuse(where: str, **options: object) -> None:
     """Refuse options that would be ignored there, such as "without --out", if any is given."""
     for name, value in options.items():
@@ -135,7 +353,7 @@ def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.input_bounds[:, 0].tolist()
-    if (values := numbers_in(text, arm.inputs)) is not None:
+    if (values := quantity.numbers_in(text, arm.inputs)) is not None:
         return values
     allowed = f"{arm.inputs} comma-separated numbers ({', '.join(arm.input_names)})"
     raise InvalidInput(name, text, allowed)

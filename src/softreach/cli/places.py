@@ -7,9 +7,8 @@ from typing import Annotated
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, Signed, design_from
-from softreach.cli.console import console
-from softreach.cli.values import Whole, fields_of, for_machines
+from softreach.cli.console import console, fields_of, for_machines
+from softreach.cli.options import UNCHANGED, Changes, Signed, Whole, design_from
 from softreach.support.errors import NotPossible
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
@@ -132,9 +131,6 @@ def equilibria(
         at = activation_text(arm, result.activation)
         console.line(f"equilibria{f' at {at}' if at else ''}: {result}")
     if out is not None:
-        look = {"view": view or "oblique", "unit": arm.length_unit}
-        page = options.is_page(out)
-        figure = (
-            sr.plot.plot_3d([result], **look) if page else sr.plot.plot_equilibria(result, **look)
-        )
+        draw = sr.plot.plot_3d if options.is_page(out) else sr.plot.plot_equilibria
+        figure = draw(result, view=view or "oblique", unit=arm.length_unit)
         options.save_picture(figure, out, output.overwrite)

@@ -12,15 +12,13 @@ from cyclopts import Group, Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.changes import UNCHANGED, Changes, design_from, shown_in
-from softreach.cli.console import console
-from softreach.cli.values import Number, Whole, as_read, fields_of, for_machines, pairs_in
+from softreach.cli.console import as_read, console, fields_of, for_machines
+from softreach.cli.options import UNCHANGED, Changes, Number, Whole, design_from, pairs_in, shown_in
 from softreach.support import progress
 from softreach.support.files.text import read_text
 
 _ASKED = Group("Override the file", sort_key=1)
-_EXIT = {"met": 0, "missed": 1, "undecided": 3}
-"""Verdict -> exit code; 2 is that of wrong input."""
+_EXIT = {"met": 0, "missed": 1, "undecided": 3}  # verdict -> exit code; 2 is that of wrong input
 
 
 def check(
@@ -68,14 +66,10 @@ def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
     return {
         **for_machines(fields, result.arm.length),
-        "findings": [_finding(finding) for finding in result.findings],
+        "findings": [{**vars(each), "met": each.met} for each in result.findings],
         "payloads_kg": result.payloads,
         "coverages": [coverage._asdict() for coverage in result.coverages],
     }
-
-
-def _finding(finding: sr.requirements.Finding) -> dict[str, Any]:
-    return {**vars(finding), "met": finding.met}
 
 
 def search(
@@ -133,12 +127,9 @@ def search(
         "minimize": None if minimize is None else minimize.split(","),
         "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2") or None,
         "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4") or None,
-        "polish": polish,
-        "designs": designs,
-        "seed": seed,
-        "accuracy": accuracy,
-        "sampler": sampler,
     }
+    asked_for |= {"polish": polish, "designs": designs, "seed": seed}
+    asked_for |= {"accuracy": accuracy, "sampler": sampler}
     given = {name: value for name, value in asked_for.items() if value is not None}
     text = read_text("requirements", needs, LONGEST)
     designs_from = partial(design_from, changes=Changes(point=point))
@@ -165,8 +156,7 @@ def _searched(asked: dict[str, Any], storage: Path) -> sr.optimization.Search:
 
 
 class _Watch:
-    def __init__(self) -> None:
-        self._met, self._excess = 0, math.inf
+    _met, _excess = 0, math.inf
 
     def __call__(self, candidate: sr.optimization.Candidate) -> None:
         self._met += candidate.is_feasible
@@ -185,7 +175,7 @@ def _found(result: sr.optimization.Search, out: Path) -> dict[str, Any]:
     return {
         **{name: getattr(result, name) for name in names},
         "front": [_design(result, each) for each in result.front],
-        "findings": [_finding(finding) for finding in result.findings],
+        "findings": [{**vars(each), "met": each.met} for each in result.findings],
         "folder": str(out),
     }
 

@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.atlas import grid_of
-from softreach.cli.changes import design_from
 from softreach.cli.console import console
-from softreach.cli.options import OUTPUT, Overwrite, Unit, is_stored, refuse
-from softreach.cli.values import Whole
+from softreach.cli.options import OUTPUT, Overwrite, Unit, Whole, design_from, is_stored, refuse
 from softreach.support import progress
 from softreach.support.errors import NotPossible, counted
 from softreach.support.interruption import wait_for_signal
@@ -22,8 +20,10 @@ if TYPE_CHECKING:
     from softreach.studio import Start
     from softreach.studio.start import KeptWork
 
-
 _HERE = "127.0.0.1"
+_USE = "can use this studio and this machine's processor; what is sent is not encrypted"
+_WITH_TOKEN = f"warning: everyone who has an address with its token {_USE}"
+_WITHOUT_TOKEN = f"warning: everyone in the network, without a token, {_USE}"
 
 
 def studio(
@@ -77,7 +77,7 @@ def studio(
             console.line(f"{url}  (for other machines)")
         console.flush()
         if not is_local(host):
-            console.note(_warning(with_token=with_token))
+            console.note(_WITH_TOKEN if with_token else _WITHOUT_TOKEN)
         if open_page:
             webbrowser.open(running.url)
         wait_for_signal()
@@ -99,14 +99,6 @@ def _write_static(
     gaps = f", {counted(written.gaps, 'gap')}" if written.gaps else ""
     console.line(str(written.page))
     console.line(f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB")
-
-
-def _warning(*, with_token: bool) -> str:
-    who = "who has an address with its token" if with_token else "in the network, without a token,"
-    return (
-        f"warning: everyone {who} can use this studio and this machine's processor; "
-        "what is sent is not encrypted"
-    )
 
 
 def begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:

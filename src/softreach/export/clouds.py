@@ -15,24 +15,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.export.formats import (
-    format_file,
-    write_by_suffix,
-    write_ply,
-    write_vtu,
-)
+from softreach.export.formats import write_by_suffix, write_ply, write_vtu
 from softreach.schema import a_cloud, activation_units
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.formats import Formats
+from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.palette import activation_colors
 from softreach.support.units import METER, LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
 
 _BLOCK = 1 << 18
 _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
@@ -155,16 +149,10 @@ def export_cloud(
 
 
 def path_csv(found: xr.Dataset) -> str:
-    """Activations and tip errors [m] at the points of a path, one line each, as CSV.
-
-    Args:
-        found: From `track_path`; what is beyond the end of the branch is nan.
-    """
-    names = [str(name) for name in found["bundle"].values]
-    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
-    header = ",".join([*column_names(names), "tip_error_m"])
-    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
-    return "\n".join([*lines, ""])
+    """Activations and tip errors [m] at the points that `track_path` found, as lines of CSV."""
+    names = [*column_names(found["bundle"].values.astype(str).tolist()), "tip_error_m"]
+    rows = np.column_stack([found.activation.values, found.tip_error.values]).tolist()
+    return "\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in rows), ""])
 
 
 def _length(cloud: xr.Dataset) -> float | None:
@@ -222,8 +210,8 @@ def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str
 
 
 def _write_npz(table: CloudTable, file: BufferedWriter) -> None:
-    described = {key: np.array(value) for key, value in table.metadata.items()}
-    arrays: dict[str, Any] = {**described, **_arrays(table), "bundle": np.array(table.bundles)}
+    content = table.metadata | _arrays(table) | {"bundle": table.bundles}
+    arrays: dict[str, Any] = {name: np.array(values) for name, values in content.items()}
     np.savez(file, **arrays)
 
 
@@ -234,8 +222,7 @@ def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
     if size >= _MAT_LIMIT:
         raise InvalidInput("cloud", f"{size} bytes", "below 2 GiB for MAT", "use .parquet or .npz")
     bundle = np.array(table.bundles, dtype=object)
-    content = {**_arrays(table), "bundle": bundle, "metadata": table.metadata}
-    savemat(file, content, oned_as="row")
+    savemat(file, {**_arrays(table), "bundle": bundle, "metadata": table.metadata}, oned_as="row")
 
 
 def _arrays(table: CloudTable) -> dict[str, NDArray[Any]]:
@@ -251,11 +238,10 @@ def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
 
 
 CLOUD_FILES: Formats = {
-    ".ply": format_file(_write_ply),
-    ".csv": format_file(_write_csv),
-    ".parquet": format_file(_write_parquet, "pyarrow"),
-    ".npz": format_file(_write_npz),
-    ".mat": format_file(_write_mat),
-    ".vtu": format_file(_write_vtu, "meshio"),
+    ".ply": FileFormat(write=_write_ply),
+    ".csv": FileFormat(write=_write_csv),
+    ".parquet": FileFormat(("pyarrow",), _write_parquet),
+    ".npz": FileFormat(write=_write_npz),
+    ".mat": FileFormat(write=_write_mat),
+    ".vtu": FileFormat(("meshio",), _write_vtu),
 }
-"""Formats of clouds."""

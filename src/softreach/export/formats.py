@@ -1,9 +1,9 @@
-"""Rows of the tables of formats, and the writers that clouds and surfaces share."""
+"""Writers that clouds and surfaces share."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from io import BufferedWriter
 from os import PathLike
@@ -13,14 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.support.files.atomic import writing
-from softreach.support.files.formats import FileFormat, Formats, format_of
+from softreach.support.files.formats import Formats, format_of
 
 _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
-
-
-def format_file(write: Callable[[Any, BufferedWriter], None], library: str = "") -> FileFormat:
-    """A row of a table of formats: the writer, and the library that it needs."""
-    return FileFormat((library,) if library else (), write)
 
 
 def write_by_suffix(
@@ -51,12 +46,8 @@ def write_ply(
 ) -> None:
     """Write points or triangles as a binary PLY (Turk's polygon format, version 1.0).
 
-    Args:
-        file: Where to.
-        count: Points of all blocks together.
-        blocks: Points as equally named columns of float64, float32 or uint8, in order.
-        description: Goes into the header, one comment per line of text.
-        faces: Corners of triangles, shape (f, 3); None for points alone.
+    Blocks hold `count` points as equally named columns of float64, float32 or uint8; faces are the
+    corners of triangles, shape (f, 3). The header has a comment for each line of the description.
     """
     for number, columns in enumerate(blocks):
         fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]

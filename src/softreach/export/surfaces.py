@@ -13,29 +13,21 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.manipulator import a_manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import arm_surface, bundle_surfaces, inside
-from softreach.export.formats import (
-    format_file,
-    write_by_suffix,
-    write_ply,
-    write_vtu,
-)
+from softreach.export.formats import write_by_suffix, write_ply, write_vtu
 from softreach.geometry.surface import SurfaceMesh, parted
 from softreach.geometry.tube import joined
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
-from softreach.support.files.formats import Formats
+from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.palette import BODY, Color, bundle_color
 from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.arm.manipulator import Manipulator
-
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 _CORE_3MF = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -168,8 +160,7 @@ def _write_ply(scene: Scene, file: BufferedWriter) -> None:
     colors = np.concatenate([_colors(part) for part in scene.parts])
     columns = dict(zip("xyz", surface.vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    units = {"units": scene.unit.name}
-    write_ply(file, len(surface.vertices), [columns], units, surface.faces)
+    write_ply(file, len(surface.vertices), [columns], {"units": scene.unit.name}, surface.faces)
 
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
@@ -192,16 +183,15 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     # as a node and not in the numbers, so that a reader gets back the vertices we have
     meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
     for part in scene.parts:
-        visual = trimesh.visual.TextureVisuals(
-            material=trimesh.visual.material.PBRMaterial(
-                name=part.name,
-                baseColorFactor=[*part.color, part.opacity],
-                alphaMode="BLEND" if part.opacity < 1 else None,
-                metallicFactor=0.0,
-                roughnessFactor=0.6,
-                doubleSided=True,
-            )
+        material = trimesh.visual.material.PBRMaterial(
+            name=part.name,
+            baseColorFactor=[*part.color, part.opacity],
+            alphaMode="BLEND" if part.opacity < 1 else None,
+            metallicFactor=0.0,
+            roughnessFactor=0.6,
+            doubleSided=True,
         )
+        visual = trimesh.visual.TextureVisuals(material=material)
         mesh = trimesh.Trimesh(part.vertices, part.faces, visual=visual, process=False)
         names = {"node_name": part.name, "geom_name": part.name}
         meshes.add_geometry(mesh, parent_node_name="z_up", **names)
@@ -239,8 +229,7 @@ def _write_3mf(scene: Scene, file: BufferedWriter) -> None:
 def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
     surface = joined(scene.parts)
     number = np.repeat(np.arange(len(scene.parts)), [len(part.faces) for part in scene.parts])
-    cells = [("triangle", surface.faces)]
-    write_vtu(file, surface.vertices, cells, cell_data={"part": [number]})
+    write_vtu(file, surface.vertices, [("triangle", surface.faces)], cell_data={"part": [number]})
 
 
 def _said_unit(scene: Scene) -> str:
@@ -258,11 +247,10 @@ def _colors(part: Part) -> NDArray[np.uint8]:
 
 
 SURFACE_FILES: Formats = {
-    ".ply": format_file(_write_ply),
-    ".stl": format_file(_write_stl, "trimesh"),
-    ".obj": format_file(_write_obj, "trimesh"),
-    ".glb": format_file(_write_glb, "trimesh"),
-    ".3mf": format_file(_write_3mf),
-    ".vtu": format_file(_write_vtu, "meshio"),
+    ".ply": FileFormat(write=_write_ply),
+    ".stl": FileFormat(("trimesh",), _write_stl),
+    ".obj": FileFormat(("trimesh",), _write_obj),
+    ".glb": FileFormat(("trimesh",), _write_glb),
+    ".3mf": FileFormat(write=_write_3mf),
+    ".vtu": FileFormat(("meshio",), _write_vtu),
 }
-"""Formats of surfaces and arms."""

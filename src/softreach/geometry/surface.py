@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.kernels.points.triangles import distances_to_faces
-from softreach.picture.shading import vertex_normals
+from softreach.picture.zbuffer import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Points
 from softreach.support.errors import check_installed
 from softreach.support.lazy import lazy

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from html import escape
 from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
@@ -232,6 +233,9 @@ class Solutions(Sequence[Solution]):
             parts.append(f"largest residual {self.residuals.max():.1e} m")
         targets = counted(len(self), "target")
         return f"<Solutions for {targets}{': ' if parts else ''}{', '.join(parts)}>"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(repr(self)[1:-1])}</p>{self.to_dataset()._repr_html_()}"
 
     def _of(self, rows: Mapping[str, Any]) -> dict[str, Any]:
         return {name: getattr(self, name)[rows[axes[0]]] for name, (_, axes, _) in _COLUMNS.items()}

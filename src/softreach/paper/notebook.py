@@ -65,13 +65,11 @@ QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)  # Coarse numbers in u
 class Notebook:
     """Numbers and figures of one part; its file is written last, so that a rerun skips the part."""
 
-    folder: Path
-    """Of the figures, within that of all results."""
+    folder: Path  # Of the figures, within that of all results
     part: str
     key: Mapping[str, Any]
     """Everything that the results depend on; a notebook of another key is stale."""
-    numbers: dict[str, Any] = field(default_factory=dict)
-    """What JSON can hold."""
+    numbers: dict[str, Any] = field(default_factory=dict)  # What JSON can hold
     pictures: list[tuple[str, str, str]] = field(default_factory=list)
     """Number of each figure in the paper, such as "2a", or empty for one of our own; name of its
     files, without suffix; caption."""

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softreach.paper.notebook import FULL, QUICK, Finding, Notebook, Numbers, Settings, Verdict
-from softreach.paper.sections import misprints, model, redundancy, sweep, uniqueness, volume
+from softreach.paper.sections import model, redundancy, sweep
 from softreach.plot.style import pyplot
 from softreach.support.arguments import as_path
 from softreach.support.errors import InvalidInput, check_installed
@@ -31,13 +31,13 @@ from softreach.support.report import Report, Section
 
 SECTIONS: dict[str, Any] = {
     "model": model,
-    "misprints": misprints,
+    "misprints": model,
     "redundancy": redundancy,
-    "volume": volume,
+    "volume": sweep,
     "sweep": sweep,
-    "uniqueness": uniqueness,
+    "uniqueness": redundancy,
 }
-"""Name of a part -> module that computes its numbers and judges them; short ones first."""
+"""Name of a part -> module whose function of that name computes its numbers; short ones first."""
 
 
 class Claim(NamedTuple):
@@ -58,8 +58,9 @@ class Claim(NamedTuple):
 
 _TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
 CLAIMS = tuple(
-    Claim(name.partition(".")[0], name.partition(".")[2], **row)
-    for name, row in tomllib.loads(_TEXT).items()
+    Claim(*name.split("."), section=section, **row)
+    for section, rows in tomllib.loads(_TEXT).items()
+    for name, row in rows.items()
 )
 """Every statement that is checked, in the paper's order."""
 
@@ -110,7 +111,7 @@ def reproduce_paper(
     for number, (name, section) in enumerate(SECTIONS.items(), 1):
         say(f"[{number}/{len(SECTIONS)}] {name}")
         notes = Notebook.opened(pages, name, key)
-        notes = notes or Notebook(pages, name, key).fill(section.computed, settings)
+        notes = notes or Notebook(pages, name, key).fill(getattr(section, name), settings)
         notebooks[name] = notes
         say(f"      {notes.seconds:.1f} s")
     _report(notebooks, settings, quick).save(path, overwrite=overwrite)

@@ -24,43 +24,28 @@ _FLAT = 0.25  # of its length, that a tick along the floor has at least in the p
 class Edge(NamedTuple):
     """The edge that carries the numbers of an axis."""
 
-    high: tuple[bool, ...]
-    """True where it is at the high side, along x, y and z."""
-    outward: int
-    """The axis along which its ticks lead out of the box."""
+    high: tuple[bool, ...]  # True where it is at the high side, along x, y and z
+    outward: int  # The axis along which its ticks lead out of the box
 
 
 class Side(NamedTuple):
     """Side from which a box is seen: all that its drawing depends on."""
 
-    visible: tuple[int, ...]
-    """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""
-    edges: tuple[Edge | None, ...]
-    """With the numbers of x, y and z; None of an axis that is seen end on."""
-    steps: tuple[float, ...]
-    """From one number to the next [L]."""
-    names: tuple[float, ...]
-    """From an edge to the name of its axis, in ticks."""
+    visible: tuple[int, ...]  # Face across x, y and z seen from outside: 1 the high one, -1 the low
+    edges: tuple[Edge | None, ...]  # With the numbers of x, y and z; None if it is seen end on
+    steps: tuple[float, ...]  # From one number to the next [L]
+    names: tuple[float, ...]  # From an edge to the name of its axis, in ticks
 
 
 class AxesBox(NamedTuple):
     """Lines and texts [L]."""
 
-    lines: Array
-    """Shape (n, 2, 3)."""
-    labels: list[tuple[str, Array]]
-    """Text and where it stands."""
+    lines: Array  # Shape (n, 2, 3)
+    labels: list[tuple[str, Array]]  # Text and where it stands
 
 
 def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf) -> Side:
-    """The side of a box that a camera sees.
-
-    Args:
-        camera: Where it is [L].
-        low: Lowest corner of the box [L].
-        high: Highest [L].
-        focal: Focal length of the camera [pixel]: numbers have room between each other.
-    """
+    """The side of a box [L] that a camera sees; numbers keep apart by its focal length [pixel]."""
     place = np.asarray(camera, float)
     visible = tuple(((place > high).astype(int) - (place < low)).tolist())
     toward = place - (low + high) / 2
@@ -87,8 +72,7 @@ def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf)
 
 def _seen(ends: Array, toward: Array, picture: Array) -> Array:
     """Distances of two points to the right and up, in focal lengths, shape (2,)."""
-    depth = np.maximum(-ends @ toward, 1e-3)
-    first, last = ends @ picture.T / depth[:, None]
+    first, last = ends @ picture.T / np.maximum(-ends @ toward, 1e-3)[:, None]
     return np.abs(last - first)
 
 
@@ -119,14 +103,7 @@ def axes_box(
     focal: float = np.inf,
     label: Callable[[str], str] = "{} / L".format,
 ) -> AxesBox:
-    """The box around points, shapes (n, 3), without the edges that would run across them.
-
-    Args:
-        points: What is in the box [L].
-        camera: From where it is seen [L].
-        focal: As `seen_from` takes it.
-        label: From "x", "y" or "z" to the name of that axis, with its unit.
-    """
+    """The box around points [L], shapes (n, 3), without the edges that would run across them."""
     low, high = round_box(*points)
     side = seen_from(camera, low, high, focal)
     lines, labels = [*_edges(low, high, side)], []

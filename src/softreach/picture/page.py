@@ -1,8 +1,6 @@
 """A figure in space as one web page, which turns in a browser and asks nothing of a network.
 
-The page has its own few lines of WebGL. Arrays are in it as base64: a place in 16 bits of the box
-along each axis, a 65,536th of its side, a corner of a triangle in 16 bits where they suffice, and a
-color in 8 bits a channel.
+Arrays are base64: places in 16 bits of the box along each axis, colors in 8 bits a channel.
 """
 
 from __future__ import annotations
@@ -32,38 +30,29 @@ class PagePart(NamedTuple):
     """Something to show; parts of one name are switched on and off together."""
 
     name: str
-    shape: Dots | Skin
-    """In the unit of the page."""
+    shape: Dots | Skin  # In the unit of the page
     opacity: float = 1.0
-    through: bool = False
-    """True if it shows through what hides it."""
-    surface: bool = False
-    """True if a slider changes its opacity."""
-    size: float = 0.0
-    """Diameter of dots, in the unit of the page."""
+    through: bool = False  # True if it shows through what hides it
+    surface: bool = False  # True if a slider changes its opacity
+    size: float = 0.0  # Diameter of dots, in the unit of the page
 
 
-PackedPart = dict[str, Any]
-"""A part as the script of a page reads it."""
+PackedPart = dict[str, Any]  # a part as the script of a page reads it
 
 
 class Swatches(NamedTuple):
     """Key of colors that stand for something each."""
 
-    entries: Sequence[tuple[str, str]]
-    """Label and color, as CSS has it."""
-    title: str = ""
-    """Meaning of the colors."""
+    entries: Sequence[tuple[str, str]]  # Label and color, as CSS has it
+    title: str = ""  # Meaning of the colors
 
 
 class ColorScale(NamedTuple):
     """Key of colors that stand for numbers."""
 
     label: str
-    colors: Sequence[str]
-    """In even steps, as CSS has them."""
-    numbers: Sequence[str]
-    """Below the scale, in even steps from end to end."""
+    colors: Sequence[str]  # In even steps, as CSS has them
+    numbers: Sequence[str]  # Below the scale, in even steps from end to end
 
 
 @dataclass(frozen=True)
@@ -97,21 +86,11 @@ def web_page(
     more: str = "",
     scripts: str = "",
 ) -> str:
-    """The page as HTML.
+    """The page as HTML: parts in a box, lower and upper corner in a unit, shape (2, 3).
 
-    Args:
-        parts: What it shows.
-        box: Lower and upper corner around it, in the unit, shape (2, 3).
-        unit: Of places.
-        keys: To the colors.
-        caption: Text below the figure.
-        note: Small text below that.
-        view: The direction of sight at first.
-        more: HTML at the end of the page, whose scripts know the names of the page's own.
-        scripts: Where else scripts may come from, as a Content-Security-Policy has it.
-
-    Raises:
-        InvalidInput: An unknown view.
+    Keys explain the colors; the caption, and a note in small letters, stand below the figure.
+    `more` is HTML at the end, whose scripts know the names of the page's own; `scripts` says where
+    else scripts may come from, as a Content-Security-Policy has it.
     """
     content = {
         "box": box.tolist(),
@@ -124,18 +103,16 @@ def web_page(
         "note": note,
         "parts": [part if isinstance(part, dict) else _packed(part, box) for part in parts],
     }
-    text = script_text(content)
     page = files("softreach.picture").joinpath("page.html").read_text(encoding="utf-8")
     title = html.escape(caption.partition("\n")[0] or "softreach")
     head, body = page.split("@DATA@")
     head = head.replace("@SCRIPTS@", scripts and f" {scripts}").replace("@TITLE@", title)
-    return head + text + body.replace("@MORE@", more)
+    return head + script_text(content) + body.replace("@MORE@", more)
 
 
 def script_text(content: Any) -> str:
     """A value as JSON, no text of which can end the script that it stands in."""
-    text = json.dumps(content, ensure_ascii=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c")
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def packed(part: PagePart, box: Array) -> PackedPart:

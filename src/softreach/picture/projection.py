@@ -35,14 +35,7 @@ _PLANES = {
 
 
 def view_axes(view: View) -> Array:
-    """Unit vectors to the right of the paper, up it, and out of it to the camera, shape (3, 3).
-
-    Args:
-        view: One of `VIEWS`, or azimuth (from x, about z) and elevation of the camera [rad].
-
-    Raises:
-        InvalidInput: Neither a known name nor two finite angles.
-    """
+    """Unit vectors to the right of the paper, up it, and out of it to the camera, shape (3, 3)."""
     azimuth, elevation = view_angles(view)
     sa, ca, se, ce = np.sin(azimuth), np.cos(azimuth), np.sin(elevation), np.cos(elevation)
     axes = np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
@@ -51,20 +44,12 @@ def view_axes(view: View) -> Array:
 
 
 def project(points: ArrayLike, view: View) -> Array:
-    """Right, up and toward the camera, in the units of the points, shape (n, 3).
-
-    Raises:
-        InvalidInput: An unknown view.
-    """
+    """Right, up and toward the camera, in the units of the points, shape (n, 3)."""
     return np.asarray(points, float) @ view_axes(view).T
 
 
 def on_paper(points: ArrayLike, view: View) -> Array:
-    """Right and up on axes, where the coordinate of a mirrored view grows to the left, (n, 2).
-
-    Raises:
-        InvalidInput: An unknown view.
-    """
+    """Right and up on axes, where the coordinate of a mirrored view grows to the left, (n, 2)."""
     return project(points, view)[..., :2] * (-1 if is_mirrored(view) else 1, 1)
 
 
@@ -74,11 +59,7 @@ def plane_of(view: View) -> tuple[str, str] | None:
 
 
 def sight_axis(view: View) -> str:
-    """The coordinate that a view looks along, on which a slice or slab has its place.
-
-    Raises:
-        InvalidInput: A view that is not along an axis.
-    """
+    """The coordinate that a view looks along, on which a slice or slab has its place."""
     if not isinstance(view, str) or view not in _PLANES:
         raise InvalidInput("view", view, f"one of {', '.join(_PLANES)}, for a plane across an axis")
     return _PLANES[view][2]
@@ -90,16 +71,9 @@ def is_mirrored(view: View) -> bool:
 
 
 def view_angles(view: View) -> tuple[float, float]:
-    """Azimuth and elevation of the camera [rad].
-
-    Raises:
-        InvalidInput: Neither a known name nor two finite angles.
-    """
-    known = ", ".join(VIEWS) + ", or (azimuth, elevation) in radians"
-    if isinstance(view, str):
-        if view not in VIEWS:
-            raise InvalidInput("view", view, known)
+    """Azimuth (from x, about z) and elevation of the camera [rad]."""
+    if isinstance(view, str) and view in VIEWS:
         return VIEWS[view]
-    if np.shape(view) != (2,) or not np.isfinite(view).all():
-        raise InvalidInput("view", view, known)
+    if isinstance(view, str) or np.shape(view) != (2,) or not np.isfinite(view).all():
+        raise InvalidInput("view", view, f"{', '.join(VIEWS)}, or (azimuth, elevation) in radians")
     return view[0], view[1]

@@ -12,13 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.projection import View, project
-from softreach.picture.shading import draw_mesh, faces_to_eye, seen_through
-from softreach.picture.zbuffer import Extent, ZBuffer
-from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.picture.zbuffer import Extent, ZBuffer, draw_mesh, faces_to_eye, seen_through
 from softreach.support.palette import STEEL, Color
 
-_COLOR_TYPES = {3: 2, 4: 6}  # channels -> RGB or RGBA
 _WIDTH = 220  # pixels
 _MARGIN = 0.03
 _MOST = 100_000  # points; more do not show at this size
@@ -26,24 +22,13 @@ _FINE = 20_000  # faces; more are about a pixel each, whose edges need no smooth
 
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:
-    """The content of a PNG file.
-
-    Args:
-        image: RGB or RGBA from 0 to 255, from top to bottom, shape (rows, columns, 3 or 4).
-
-    Raises:
-        InvalidInput: An image of another shape.
-    """
-    if image.ndim != 3 or image.shape[2] not in _COLOR_TYPES or not image.size:
-        raise InvalidInput("image.shape", image.shape, "(rows, columns, 3 or 4)")
-    rows, columns, channels = image.shape
-    header = struct.pack(">2I5B", columns, rows, 8, _COLOR_TYPES[channels], 0, 0, 0)
-    # each row begins with its filter: 0, none
-    lines = np.pad(image.astype(np.uint8).reshape(rows, -1), ((0, 0), (1, 0)))
+    """A PNG file of RGBA from 0 to 255, from top to bottom, shape (rows, columns, 4)."""
+    rows, columns, _ = image.shape
+    header = struct.pack(">2I5B", columns, rows, 8, 6, 0, 0, 0)  # 8 bits a channel, RGBA
+    lines = np.pad(image.reshape(rows, -1), ((0, 0), (1, 0)))  # each begins with its filter: none
     content = zlib.compress(lines.tobytes(), 9)
-    parts = ((b"IHDR", header), (b"IDAT", content), (b"IEND", b""))
     file = b"\x89PNG\r\n\x1a\n"
-    for kind, data in parts:
+    for kind, data in ((b"IHDR", header), (b"IDAT", content), (b"IEND", b"")):
         checksum = struct.pack(">I", zlib.crc32(kind + data))
         file += struct.pack(">I", len(data)) + kind + data + checksum
     return file
@@ -52,33 +37,22 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
 class Skin(NamedTuple):
     """A lit surface."""
 
-    vertices: ArrayLike
-    """Shape (v, 3)."""
-    faces: ArrayLike
-    """Shape (f, 3)."""
+    vertices: ArrayLike  # Shape (v, 3)
+    faces: ArrayLike  # Shape (f, 3)
     color: Color = STEEL
-    clear: bool = False
-    """True if the outward sides of all that is not so show through it."""
+    clear: bool = False  # True if the outward sides of all that is not so show through it
 
 
 class Dots(NamedTuple):
     """Points."""
 
-    points: ArrayLike
-    """Shape (n, 3)."""
-    colors: ArrayLike = (64, 100, 150)
-    """RGB from 0 to 255, shape (n, 3) or (3,)."""
+    points: ArrayLike  # Shape (n, 3)
+    colors: ArrayLike = (64, 100, 150)  # RGB from 0 to 255, shape (n, 3) or (3,)
 
 
-def html_card(text: str, *parts: Skin | Dots, view: View = "oblique") -> str:
-    """HTML that shows parts above a text, for `_repr_html_`; the text alone if they are empty.
-
-    Args:
-        text: Text of the value, such as its `repr`; it is escaped here.
-        *parts: What to show, in common units.
-        view: The direction of sight.
-    """
-    shown = thumbnail(*parts, view=view)
+def html_card(text: str, *parts: Skin | Dots) -> str:
+    """HTML that shows parts in common units above a text, which is escaped, for `_repr_html_`."""
+    shown = thumbnail(*parts)
     said = f"<pre>{html.escape(text)}</pre>"
     if shown is None:
         return said
@@ -87,29 +61,21 @@ def html_card(text: str, *parts: Skin | Dots, view: View = "oblique") -> str:
 
 
 def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) -> bytes | None:
-    """A small PNG of surfaces and points in one view, transparent around them.
-
-    Args:
-        *parts: What to show, in common units.
-        view: The direction of sight.
-        width: Columns and rows [pixels].
-
-    Returns:
-        The content of a PNG file; None if there is nothing finite to show.
-
-    Raises:
-        InvalidInput: An unknown view.
-    """
+    """A small square PNG of parts in common units; None if there is nothing finite to show."""
     parts = tuple(_thinned(part) if isinstance(part, Dots) else part for part in parts)
     seen = [project(np.reshape(part[0], (-1, 3)), view) for part in parts]
-    extent = _square_around(seen)
-    if extent is None:
+    flat = np.concatenate([np.empty((0, 2)), *(points[:, :2] for points in seen)])
+    flat = flat[np.isfinite(flat).all(axis=1)]
+    if not len(flat):
         return None
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    half = (0.5 + _MARGIN) * max(float((high - low).max()), 1e-9)
+    (left, bottom), (right, top) = (low + high) / 2 - half, (low + high) / 2 + half
+    extent = Extent(left, right, bottom, top)
     faces = sum(len(np.asarray(part.faces)) for part in parts if isinstance(part, Skin))
     clear = any(isinstance(part, Skin) and part.clear for part in parts)
-    buffer, within = (
-        ZBuffer(extent, width, oversample=1 if faces > _FINE else 2, color_step=4) for _ in range(2)
-    )
+    oversample = 1 if faces > _FINE else 2
+    buffer, within = (ZBuffer(extent, width, oversample, color_step=4) for _ in range(2))
     for part, points in zip(parts, seen, strict=True):
         if isinstance(part, Dots):
             size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
@@ -122,17 +88,6 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
             toward = faces_to_eye(part.vertices, part.faces, view)
             draw_mesh(within, part.vertices, toward, part.color, view)
     return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
-
-
-def _square_around(seen: list[Array]) -> Extent | None:
-    flat = np.concatenate([points[:, :2] for points in seen]) if seen else np.empty((0, 2))
-    flat = flat[np.isfinite(flat).all(axis=1)]
-    if not len(flat):
-        return None
-    low, high = flat.min(axis=0), flat.max(axis=0)
-    middle = (low + high) / 2
-    half = (0.5 + _MARGIN) * max(float((high - low).max()), 1e-9)
-    return Extent(middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half)
 
 
 def _thinned(dots: Dots) -> Dots:

@@ -1,4 +1,4 @@
-"""A z-buffer: millions of points, and triangles, to one image where the nearest shows.
+"""A z-buffer: millions of points, and lit triangles, to one image where the nearest shows.
 
 Every pixel holds one 64-bit key, the depth above the color, and drawing takes the larger key. So
 the image does not depend on the order of what is drawn, and a point of several pixels is a shifted
@@ -14,10 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.projection import View, project
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, Index
 
 Keys = NDArray[np.uint64]
 _BLOCK = 1 << 15  # points at a time: temporary arrays stay in the cache, and in memory once touched
+_LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the camera
+_AMBIENT, _DIFFUSE, _GLOSS = 0.40, 0.62, 0.08
+_SHARE = 0.55  # of what is inside, in the color of a pixel
 
 
 class Extent(NamedTuple):
@@ -37,11 +40,8 @@ class Extent(NamedTuple):
 class ZBuffer:
     """An image under construction: (right, up, toward the camera) coordinates in, RGBA out.
 
-    Args:
-        extent: What the image covers, in the units of the coordinates.
-        width: Columns of the image; pixels are square, so the rows follow.
-        oversample: Each pixel is the mean of this many squared, which smooths edges.
-        color_step: Colors of the image are multiples of this; a coarse step keeps files small.
+    The width counts square pixels; each is the mean of `oversample` squared, which smooths edges.
+    Colors are multiples of `color_step`: a coarse one keeps files small.
     """
 
     def __init__(
@@ -59,14 +59,10 @@ class ZBuffer:
     def draw_points(
         self, points: ArrayLike, colors: ArrayLike, size: float = 1.0, *, view: View | None = None
     ) -> None:
-        """Draw discs that face the camera; points that are not finite or outside are left out.
+        """Draw points, shape (n, 3), that are finite, as discs that face the camera.
 
-        Args:
-            points: Shape (n, 3).
-            colors: RGB from 0 to 255, shape (n, 3) or (3,).
-            size: Diameter in pixels of the image.
-            view: The direction of the camera, for points in space; None for points that are already
-                seen from it.
+        Colors are RGB from 0 to 255, shape (n, 3) or (3,), and the size is in pixels of the image.
+        Without a view the points are already seen from the camera.
         """
         points = np.asarray(points, float)
         colors = np.broadcast_to(np.asarray(colors, np.uint8), points.shape)
@@ -83,12 +79,7 @@ class ZBuffer:
         np.maximum(self._keys, _grown(layer, size * self.oversample), out=self._keys)
 
     def draw_triangles(self, corners: ArrayLike, colors: ArrayLike) -> None:
-        """Draw filled triangles whose colors blend from corner to corner.
-
-        Args:
-            corners: Shape (n, 3 corners, 3).
-            colors: RGB from 0 to 255, shape (n, 3 corners, 3).
-        """
+        """Draw triangles; their colors, RGB from 0 to 255, blend. Shapes (n, 3 corners, 3)."""
         from softreach.kernels.points.triangles import fill_triangles  # lazily: Numba
 
         values = np.concatenate([np.asarray(corners, float), np.asarray(colors, float)], axis=2)
@@ -98,13 +89,11 @@ class ZBuffer:
 
     def rgba(self) -> NDArray[np.uint8]:
         """The image from top to bottom, shape (rows, columns, 4); transparent where nothing is."""
-        image = np.zeros((*self.shape, 4), np.uint8)
-        by = self.oversample
+        image, by, step = np.zeros((*self.shape, 4), np.uint8), self.oversample, self.color_step
         rows = _filled(self._keys, 1, by)
         keys = self._keys[by * rows.start : by * rows.stop]
         columns = _filled(keys, 0, by)
-        keys = keys[:, by * columns.start : by * columns.stop]
-        mean, step = _averaged(keys, by), self.color_step
+        mean = _averaged(keys[:, by * columns.start : by * columns.stop], by)
         levels = np.minimum(255, np.rint(np.arange(256) / step) * step).astype(np.uint8)
         image[rows, columns] = np.concatenate([levels[mean[..., :3]], mean[..., 3:]], axis=-1)
         return image
@@ -172,3 +161,56 @@ def _averaged(keys: Keys, by: int) -> NDArray[np.uint8]:
     full = np.maximum(opacity.astype(np.uint16) // 255, 1)
     channels = [color.astype(np.uint16) // full for color in (red, green, blue)]
     return np.stack([*channels, opacity // np.uint64(by**2)], axis=-1).astype(np.uint8)
+
+
+def draw_mesh(
+    buffer: ZBuffer,
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    color: ArrayLike,
+    view: View,
+    fade: float = 0.0,
+) -> None:
+    """Draw a lit mesh, shapes (v, 3) and (f, 3), in a color from 0 to 1 that fades toward white."""
+    points, faces = project(vertices, view), np.asarray(faces)
+    colors = shade(vertex_normals(points, faces), color)
+    colors += fade * (255 - colors)
+    buffer.draw_triangles(points[faces], colors[faces])
+
+
+def shade(normals: Array, color: ArrayLike) -> Array:
+    """RGB from 0 to 255 for unit normals as seen, shapes (n, 3), lit alike from both sides."""
+    facing = np.where(normals[:, 2:] < 0, -normals, normals)
+    # from 0 to 1 all around, so that the dark side has a shape too
+    light = (0.5 + 0.5 * (facing @ _LAMP) / np.linalg.norm(_LAMP))[:, None] ** 1.5
+    lit = (_AMBIENT + _DIFFUSE * light) * np.asarray(color, float) + _GLOSS * light**12
+    return 255 * np.clip(lit, 0.0, 1.0)
+
+
+def vertex_normals(points: Array, faces: NDArray[np.integer]) -> Array:
+    """Unit mean of the normals of the faces around each vertex, by area, shape (v, 3)."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    total = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(total, faces[:, k], normals)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+
+
+def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An image through which one of what is within shows: RGBA, 0 to 255, (rows, columns, 4)."""
+    front, back = image.astype(float), within.astype(float)
+    cover = front[..., 3:] / 255
+    weight = back[..., 3:] / 255 * (1.0 - (1.0 - _SHARE) * cover)
+    mixed = np.where(cover > 0, (1.0 - weight) * front + weight * back, back)
+    mixed[..., 3:] = np.maximum(front[..., 3:], back[..., 3:])
+    return np.rint(mixed).astype(np.uint8)
+
+
+def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> Index:
+    """Those of faces turning outwards, (f, 3), that are seen from outside, shape (n, 3)."""
+    points, faces = project(vertices, view)[:, :2], np.asarray(faces)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return faces[ux * vy > uy * vx]

@@ -1,4 +1,4 @@
-"""Pictures of arms, lit tubes with their bundles: alone, side by side, at their targets."""
+"""Pictures of arms, lit tubes with their bundles: side by side, at their targets, under loads."""
 
 from __future__ import annotations
 
@@ -11,26 +11,19 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
-from softreach.picture.projection import View, plane_of
-from softreach.picture.shading import draw_mesh, faces_to_eye
-from softreach.picture.zbuffer import ZBuffer
+from softreach.picture.projection import View, on_paper, plane_of
+from softreach.picture.zbuffer import ZBuffer, draw_mesh, faces_to_eye
+from softreach.plot import style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
-from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import (
-    WIDTH,
-    a_result,
-    figure_style,
-    legend_above,
-    new_figure,
-    some_bundles,
-)
 from softreach.rod.kinematics import rest_configuration
+from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import as_flag, as_given, as_instance, as_number
-from softreach.support.arrays import Array, as_stations
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number
+from softreach.support.arrays import Array, as_floats, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, MET, MISSED, bundle_color
+from softreach.support.quantity import round_below
 from softreach.support.units import LengthUnit, in_lengths
 
 if TYPE_CHECKING:
@@ -38,6 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from softreach.rod.loaded.all_equilibria import AllEquilibria
+    from softreach.workspace.payload import LargestPayload, PayloadCurve
 
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
@@ -51,6 +46,16 @@ _REGIONS = {
     "avoid": {"color": (0.75, 0.42, 0.05), "linestyle": "--", "label": "avoid"},
     "cover": {"color": MET, "linestyle": ":", "label": "to be covered"},
 }
+_STATIONS = 121
+_PALE = 0.7  # how far the colors of other stable arms go toward white
+_FOLLOWED, _STABLE, _UNSTABLE = "0.05", "#1f4e9e", "0.55"
+_BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
+_ARROW = 26  # length of the arrow of gravity [points]
+_SHORTEST_ARROW = 0.1  # part of a direction in the paper, below which an arrow says nothing
+_LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
+_LARGEST = 0.2  # L, the longest half axis if the force is not given
+_CORNERS = 120
+_COLOR = "tab:orange"
 
 
 def plot_arm(
@@ -62,14 +67,13 @@ def plot_arm(
     rest: bool = True,
     bundles: Collection[int] | None = None,
     box: ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw an arm; where both are shown, the arm at rest is pale and behind.
 
     Args:
         arm: The design.
-        configuration: One configuration of that arm or several along `sample`; None for the arm at
-            rest alone.
+        configuration: One of that arm or several along `sample`; None for the arm at rest alone.
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
         rest: Whether to draw the arm at rest beside its configurations.
@@ -82,9 +86,9 @@ def plot_arm(
         MissingExtra: matplotlib is not installed.
     """
     arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
-    shapes, counted = shapes_of(configuration), unit_for(arm.length, unit)
+    shapes, counted = shapes_of(configuration), style.unit_for(arm.length, unit)
     resting = [rest_configuration(arm)] if rest or not shapes else []
-    drawn = some_bundles(arm, bundles)
+    drawn = style.some_bundles(arm, bundles)
     points = np.concatenate([arm_points(arm, shape, counted) for shape in shapes + resting])
     with Panel.opened(points, counted, ax, view, box) as panel:
         draw_arms(panel, arm, resting, drawn, _FADE if shapes else 0.0)
@@ -108,8 +112,7 @@ def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
     out = (outline.outer_ratio > _BULGE) & outline.acts
     surfaces = [arm_surface(arm, shape, _SIDES)]
     if out.any():
-        skins = bundle_skins(arm, shape)
-        surfaces += [skin for k, skin in enumerate(skins) if out[:, k].any()]
+        surfaces += [skin for k, skin in enumerate(bundle_skins(arm, shape)) if out[:, k].any()]
     points = [surface.vertices for surface in surfaces]
     return unit.of(np.concatenate([*points, marker_points(arm.markers, shape)]))
 
@@ -130,8 +133,9 @@ def draw_arms(
 def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
     """Small dots where the markers of all shapes are."""
     if arm.markers:
-        points = [marker_points(arm.markers, shape) for shape in shapes]
-        panel.dot(np.concatenate(points), 1.0 - fade)
+        points = np.concatenate([marker_points(arm.markers, shape) for shape in shapes])
+        edge = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4, "zorder": 3}
+        panel.plot(panel.unit.of(points), "o", markersize=3, alpha=1.0 - fade, **edge)
 
 
 def arm_images(
@@ -175,7 +179,7 @@ def plot_designs(
     *,
     stations_over_length: Sequence[float] = (0.0,),
     width: float | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Figure:
     """Draw arms at rest, and under each its cross-sections, all at one scale (figures 1b-d, 4a).
 
@@ -196,18 +200,17 @@ def plot_designs(
     stations = as_stations("stations_over_length", stations_over_length).tolist()
     least = _LEAST if all(plane_of(p.view) for p in panels) else _LEAST_OBLIQUE
     usual = max(_LEAST * len(panels), least)
-    width = usual if width is None else as_number("width", width, WIDTH)
+    width = usual if width is None else as_number("width", width, style.WIDTH)
     box = bounding_box(
         *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
     )
     places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
-    with figure_style():
+    with style.figure_style():
         heights = [2.6, *[width / len(panels)] * len(stations)]
-        shape = {"height_ratios": heights, "squeeze": False}
-        size = (width, sum(heights) + 0.1)
-        figure = new_figure(figsize=size, layout="constrained")
-        axes = figure.subplots(len(heights), len(panels), **shape)
+        figure = style.new_figure(figsize=(width, sum(heights) + 0.1), layout="constrained")
+        shape = len(heights), len(panels)
+        axes = figure.subplots(*shape, height_ratios=heights, squeeze=False)
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
             drawn, shown = panel.bundles, length * box
@@ -224,7 +227,7 @@ def plot_designs(
 
 
 def plot_check(
-    check: Any, *, ax: Axes | None = None, view: View = "oblique", unit: Unit = None
+    check: Any, *, ax: Axes | None = None, view: View = "oblique", unit: style.Unit = None
 ) -> Axes:
     """Draw an arm at the places that it must reach, and the regions that it must keep to.
 
@@ -242,8 +245,8 @@ def plot_check(
         InvalidInput: Unknown view or unit, or no check.
         MissingExtra: matplotlib is not installed.
     """
-    arm = a_result("check", check, "Check", "check").arm
-    counted = unit_for(arm.length, arm.length_unit if unit is None else unit)
+    arm = style.a_result("check", check, "Check", "check").arm
+    counted = style.unit_for(arm.length, arm.length_unit if unit is None else unit)
     shapes = shapes_of(check.shapes(_POSES)) or [rest_configuration(arm)]
     points = [arm_points(arm, shape, counted) for shape in shapes]
     points.append(counted.of(check.places))
@@ -255,13 +258,13 @@ def plot_check(
     with Panel.opened(np.concatenate(points), counted, ax, view) as panel:
         draw_arms(panel, arm, shapes, range(arm.bundles), _CHECKED)
         for kind, each in lines.items():
-            style = {"linewidth": 0.9, **_REGIONS[kind]}
+            look = {"linewidth": 0.9, **_REGIONS[kind]}
             words = {each.verdict for each in check.findings if each.kind == kind} - {"met"}
-            style["label"] = ": ".join([str(style["label"]), *sorted(words)])
-            _draw_lines(panel, each, style)
+            look["label"] = ": ".join([str(look["label"]), *sorted(words)])
+            _draw_lines(panel, each, look)
         _draw_places(panel, check)
         if panel.ax.get_legend_handles_labels()[1]:
-            legend_above(panel.ax)
+            style.legend_above(panel.ax)
     return panel.ax
 
 
@@ -278,7 +281,206 @@ def _draw_places(panel: Panel, check: Any) -> None:
             panel.plot(panel.unit.of(check.places[rows]), marks, **look, **edge)
 
 
-def _draw_lines(panel: Panel, lines: Iterable[Array], style: dict[str, Any]) -> None:
+def _draw_lines(panel: Panel, lines: Iterable[Array], look: dict[str, Any]) -> None:
     for line in lines:
-        panel.plot(line, **style)
-        style = {**style, "label": None}
+        panel.plot(line, **look)
+        look = {**look, "label": None}
+
+
+def plot_equilibria(
+    equilibria: AllEquilibria,
+    *,
+    ax: Axes | None = None,
+    view: View = "front",
+    box: ArrayLike | None = None,
+    unit: style.Unit = None,
+) -> Axes:
+    """Draw every equilibrium of an arm: stable ones solid, unstable ones dashed.
+
+    The posture, which the tip map reports, is drawn as a body with its bundles, other stable ones
+    pale; of a ring one arm, and a dotted circle where its tip may be. An arrow shows the direction
+    of gravity, or of the force that stands for it.
+
+    Args:
+        equilibria: What `softreach.equilibria` returned.
+        ax: Axes to draw in; None for a new figure.
+        view: As in `plot_cloud`.
+        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+        unit: As in `plot_arm`.
+
+    Raises:
+        InvalidInput: Unknown view.
+        MissingExtra: matplotlib is not installed.
+    """
+    style.a_result("equilibria", equilibria, "AllEquilibria", "softreach.equilibria")
+    arm = equilibria.rod.arm
+    shapes = shapes_of(equilibria.configuration(_STATIONS))
+    stable = equilibria.status == TipStatus.STABLE
+    pale = [shapes[k] for k in np.flatnonzero(stable) if k != equilibria.followed]
+    followed = [] if equilibria.followed is None else [shapes[equilibria.followed]]
+    counted = style.unit_for(arm.length, unit)
+    rings = np.flatnonzero(equilibria.is_ring).tolist()
+    circles = {k: counted.of(_circle(equilibria, k)) for k in rings}
+    turn = np.linspace(0.0, 2.0 * np.pi, 65)
+    disk = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    disk *= _BASE * float(arm.profile.radius(0.0))
+    rim = counted.of(equilibria.rod.pose.to_world(disk))
+    points = [rim, *(arm_points(arm, shape, counted) for shape in shapes), *circles.values()]
+    with Panel.opened(np.concatenate(points), counted, ax, view, box) as panel:
+        draw_arms(panel, arm, pale, range(arm.bundles), _PALE)
+        draw_arms(panel, arm, followed, range(arm.bundles))
+        for k, circle in circles.items():
+            color = _STABLE if stable[k] else _UNSTABLE
+            panel.plot(circle, color=color, linestyle=":", linewidth=0.8, solid_capstyle="round")
+        for k, shape in enumerate(shapes):
+            follows, ring = k == equilibria.followed, " ring" * bool(equilibria.is_ring[k])
+            kind = ("stable" if stable[k] else "unstable") + ring
+            look = {"color": _FOLLOWED if follows else _STABLE if stable[k] else _UNSTABLE}
+            look |= {"linestyle": "-" if stable[k] else "--", "solid_capstyle": "round"}
+            look |= {"label": f"{kind}, the posture" if follows else kind}
+            wide = 1.4 if stable[k] or follows else 1.0
+            panel.plot(counted.of(shape["position"].values), linewidth=wide, **look)
+        panel.plot(rim, color="0.2", linewidth=2.0, solid_capstyle="round")
+        _gravity_arrow(panel, equilibria)
+        _add_legend(panel.ax, own_figure=ax is None)
+    return panel.ax
+
+
+def plot_compliance(
+    arm: Manipulator,
+    configuration: xr.Dataset,
+    compliance: ArrayLike,
+    *,
+    ax: Axes | None = None,
+    view: View = "front",
+    force: float | None = None,
+    box: ArrayLike | None = None,
+    unit: style.Unit = None,
+) -> Axes:
+    """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
+
+    They are to scale where the tip yields in proportion to the force.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm or several along `sample`.
+        compliance: That of each, from `tip_compliance` [m/N], shape (3, 3) or (n, 3, 3).
+        ax: Axes to draw in; None for a new figure.
+        view: As in `plot_cloud`.
+        force: Size of the force [N]; None for a round one.
+        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+        unit: As in `plot_arm`.
+
+    Raises:
+        InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
+        MissingExtra: matplotlib is not installed.
+    """
+    arm = a_manipulator("arm", arm)
+    shapes = shapes_of(a_configuration("configuration", configuration))
+    values = as_floats("compliance", compliance)
+    force = None if force is None else as_number("force", force, POSITIVE)
+    matrices = values if values.ndim == 3 else values[None]
+    if matrices.shape[1:] != (3, 3):
+        raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
+    if len(matrices) != len(shapes):
+        allowed = f"{len(shapes)}, one for each configuration"
+        raise InvalidInput("compliance", f"{len(matrices)} matrices", allowed)
+    if force is None:  # that keeps the ellipsoids small
+        softest = float(np.linalg.norm(matrices, ord=2, axis=(1, 2)).max())
+        if not 0 < softest < np.inf:
+            raise InvalidInput("compliance", f"{softest:g} m/N at most", "finite, and not zero")
+        force = round_below(_LARGEST * arm.length / softest)
+    counted = style.unit_for(arm.length, unit)
+    tips = counted.of([shape["position"].values[-1] for shape in shapes])
+    axes = counted.of(force * matrices)
+    with style.figure_style(ax):
+        if box is None:
+            surfaces = [arm_points(arm, shape, counted) for shape in shapes]
+            half = np.linalg.norm(axes, axis=2)  # of the boxes around the ellipsoids
+            box = counted.size * bounding_box(*surfaces, tips - half, tips + half)
+        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=False, box=box, unit=counted)
+        for outline in _outlines(tips, axes, view):
+            ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
+            ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
+        ax.set_title(f"tip under {force:g} N in any direction")
+    return ax
+
+
+def plot_payload_curve(
+    curve: PayloadCurve, *, ax: Axes | None = None, largest: Sequence[LargestPayload] = ()
+) -> Axes:
+    """Draw the share of the reachable volume against the payload, with its errors.
+
+    Args:
+        curve: What `payload_curve` gives.
+        ax: Axes to draw in; None for a new figure.
+        largest: Payloads to mark, from `PayloadCurve.largest_payload`.
+
+    Returns:
+        The axes, payloads in kg.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    points = [(0.0, 1.0), *((point.payload, point.share) for point in largest)]
+    points += zip(curve.payloads[1:], curve.shares[1:], strict=True)
+    mass, share = zip(*sorted(points), strict=True)
+    with style.styled_axes(ax, 3.4, 2.6) as ax:
+        (line,) = ax.plot(mass, share, linewidth=1.2)
+        look = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
+        ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **look)
+        for point in largest:
+            ax.vlines(point.payload, 0.0, point.share, color="0.3", linewidth=0.8, linestyle=":")
+            ax.hlines(point.share, 0.0, point.payload, color="0.3", linewidth=0.8, linestyle=":")
+            ax.plot(point.payload, point.share, "o", markersize=4, mfc="white", color="0.3")
+        ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
+        ax.set(xlim=(0.0, None), ylim=(0.0, None))
+    return ax
+
+
+def _circle(equilibria: AllEquilibria, k: int) -> Array:
+    """Where the tip of a ring of equilibria may be [m], shape (n, 3)."""
+    assert equilibria.solver is not None
+    pose, axis = equilibria.rod.pose, equilibria.solver.tables.axes[0]
+    tip, angle = pose.to_base(equilibria.tips[k]), np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
+    along, across = (tip @ axis) * axis, np.cross(axis, tip)
+    return pose.to_world(along + np.cos(angle) * (tip - along) + np.sin(angle) * across)
+
+
+def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
+    if equilibria.solver is None:
+        return
+    tables = equilibria.solver.tables
+    right, up = on_paper(equilibria.rod.pose.directions_to_world(tables.axes[0]), panel.view)
+    if np.hypot(right, up) < _SHORTEST_ARROW:
+        return
+    word, tail = "g" if any(tables.loads.gravity) else "force", (-_ARROW * right, -_ARROW * up)
+    place = {"xycoords": "axes fraction", "textcoords": "offset points", "zorder": 4}
+    look = {"ha": "center", "va": "center", "fontsize": 8, **place}
+    arrow = {"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0}
+    panel.ax.annotate(word, (0.09, 0.86), tail, arrowprops=arrow, **look)
+
+
+def _add_legend(ax: Axes, *, own_figure: bool) -> None:
+    """One entry for each kind: under the picture where the figure is ours."""
+    handles, labels = ax.get_legend_handles_labels()
+    kinds = dict(zip(labels, handles, strict=True))
+    if not own_figure:
+        ax.legend(kinds.values(), kinds.keys())
+        return
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(max(width, _LEAST_WIDTH), height + _ENTRY * len(kinds))
+    figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
+
+
+def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
+    """Outlines of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
+    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
+    circle = np.array([np.cos(turn), np.sin(turn)])
+    outlines = []
+    for tip, matrix in zip(tips, axes, strict=True):
+        left, half, _ = np.linalg.svd(on_paper(matrix.T, view).T, full_matrices=False)
+        outlines.append(on_paper(tip, view)[:, None] + (left * half) @ circle)
+    return outlines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,20 +17,12 @@ from softreach.cloud.curvature import curvature_statistics
 from softreach.cloud.volume import concave_hull
 from softreach.geometry.hull import Hull
 from softreach.picture.projection import View, view_axes
-from softreach.picture.shading import draw_mesh
-from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.picture.zbuffer import Extent, ZBuffer, draw_mesh
+from softreach.plot import coloring
 from softreach.plot.axes import view_extent
-from softreach.plot.clouds import drawn_tips, plot_opposite_sides, point_size
-from softreach.plot.coloring import (
-    COLORMAP,
-    bundle_activations,
-    color_samples,
-    draw_figure_key,
-    key_height,
-)
-from softreach.plot.lengths import unit_of
+from softreach.plot.reach import drawn_tips, plot_opposite_sides, point_size
 from softreach.plot.statistics import SIDES, plot_curvature
-from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes
+from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes, unit_of
 from softreach.schema import is_stable
 from softreach.support import parallel
 from softreach.support.arguments import as_integer
@@ -42,7 +34,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
 _KEY = 0.45  # inches for the key of colors at least
@@ -90,18 +81,12 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         ax.set_title(across.text(last), fontsize=9)
         yield "curvature", ax
     hulls = plot_hull_sheet(atlas, panels=panels)
-    if len(those) == len(SIDES):
-        _frame_compared(hulls)
-    yield "hulls", hulls
-
-
-def _frame_compared(hulls: Figure) -> None:
-    """Frame the two designs that figure 3c compares, the ends of the last column, in its colors."""
     grid = hulls.axes[0].get_gridspec()
-    assert grid is not None
-    rows, columns = grid.get_geometry()
-    for row, color in zip((rows - 1, 0), SIDES, strict=True):
-        hulls.axes[(row + 1) * columns - 1].spines[:].set(color=color, linewidth=1.6)
+    if len(those) == len(SIDES) and grid is not None:
+        rows, columns = grid.get_geometry()
+        for row, color in zip((rows - 1, 0), SIDES, strict=True):  # whose curvatures are compared
+            hulls.axes[(row + 1) * columns - 1].spines[:].set(color=color, linewidth=1.6)
+    yield "hulls", hulls
 
 
 def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
@@ -123,7 +108,7 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
         tips = drawn_tips(cloud, unit_of(cloud["tip"]))
         pixels = point_size(len(tips), box) * columns / extent.size[0]
         buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
-        colors = activation_colors(bundle_activations(cloud).values)
+        colors = activation_colors(coloring.bundle_activations(cloud).values)
         buffer.draw_points(tips, colors, max(1.0, pixels), view=_VIEW)
         return buffer
 
@@ -133,8 +118,7 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
 def plot_hull_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
     """A sheet of the lit α-shapes of an atlas at one scale (figure 3a).
 
-    Their radius is that of the metric `volume` of the atlas, 0.05 L without it. What is not
-    described here is as in `plot_cloud_sheet`.
+    The radius is that of the metric `volume`, or 0.05 L; all else is as in `plot_cloud_sheet`.
 
     Args:
         atlas: As in `plot_cloud_sheet`.
@@ -162,26 +146,18 @@ def hull_over_length(cloud: xr.Dataset, alpha: float) -> Hull:
 
 
 def box_over_length(atlas: xr.Dataset) -> Array:
-    """Corners around all clouds, each in its own L [-], shape (2, 3).
-
-    Raises:
-        InvalidInput: The atlas has no bounding boxes, or no design is done.
-    """
+    """Corners around all clouds, each in its own L [-], shape (2, 3)."""
     if "x_min" not in atlas:
         raise InvalidInput("atlas", "without bounding boxes", 'built with the metrics "extent"')
-    low = [float(over_length(atlas, f"{axis}_min").min()) for axis in "xyz"]
-    high = [float(over_length(atlas, f"{axis}_max").max()) for axis in "xyz"]
-    if not np.isfinite([low, high]).all():
+    low = [over_length(atlas, f"{axis}_min").min() for axis in "xyz"]
+    box = np.array([low, [over_length(atlas, f"{axis}_max").max() for axis in "xyz"]])
+    if not np.isfinite(box).all():
         raise InvalidInput("atlas", "no design is done", "at least one design")
-    return np.array([low, high])
+    return box
 
 
 def panel_extent(box: Array, view: View) -> Extent:
-    """Extent of a panel: tighter than a box in space, whose corners are empty.
-
-    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
-    clouds that bulge beyond it.
-    """
+    """Extent of the ellipsoid in a box, √Σ(hᵢ eᵢ)² along a unit vector e, and a fifth more."""
     middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
     limits = view_extent(box, view)
     axes = view_axes(view)[:2]
@@ -204,17 +180,16 @@ def _sheet(
     across, up = sheet_axes(picked)
     with figure_style():
         places = np.ndindex(picked["status"].shape if keyed else (0,))
-        clouds = (cloud for at in places if (cloud := _cloud_at(picked, *at)) is not None)
-        first = next(clouds, None)
-        key = None if first is None else color_samples(first.isel(sample=slice(1)), "rgb").key
+        clouds = (_cloud_at(picked, *at) for at in places)
+        first = next((cloud.isel(sample=slice(1)) for cloud in clouds if cloud is not None), None)
+        key = None if first is None else coloring.color_samples(first, "rgb").key
         extent = panel_extent(box, _VIEW)
         wide, high = extent.size.tolist()
         columns, rows = [wide] * len(across.values), [high] * len(up.values)
-        top = max(_KEY, key_height(key)) if keyed else _TOP
+        top = max(_KEY, coloring.key_height(key)) if keyed else _TOP
         figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
         grid = grid[::-1]  # row 0 at the bottom
-        _label_sheet(grid, across, up)
-        _name_axes(figure, (across, up), atlas, top)
+        _label_sheet(figure, grid, (across, up), atlas, top)
         across_each = max(16, round(grid[0, 0].get_position().width * PAGE * DPI))
 
         def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
@@ -227,30 +202,26 @@ def _sheet(
                 ax.imshow(rgba, extent=extent, interpolation="none", aspect="auto")
             ax.set(xlim=extent[:2], ylim=extent[2:], xticks=[], yticks=[])
         _draw_scale(figure, grid[0, 0])
-        draw_figure_key(figure, key, top)
+        coloring.draw_figure_key(figure, key, top)
     return figure
 
 
-def _label_sheet(grid: NDArray[Any], across: SheetAxis, up: SheetAxis) -> None:
+def _label_sheet(
+    figure: Figure, grid: NDArray[Any], axes: Sequence[SheetAxis], atlas: xr.Dataset, top: float
+) -> None:
+    """Both parameters: their values beside the panels, and how many of them are shown."""
     for ax in grid.ravel().tolist():
         ax.patch.set_visible(False)
         ax.spines[:].set(color="0.88", linewidth=0.4)
-    for ax, value in zip(grid[0], across.values, strict=True):
+    for ax, value in zip(grid[0], axes[0].values, strict=True):
         ax.set_xlabel(f"{value:.4g}", labelpad=3)
-    for ax, value in zip(grid[:, 0], up.values, strict=True):
+    for ax, value in zip(grid[:, 0], axes[1].values, strict=True):
         ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
-
-
-def _name_axes(
-    figure: Figure, axes: tuple[SheetAxis, SheetAxis], atlas: xr.Dataset, top: float
-) -> None:
-    """Symbols of both parameters, and how many of their values are shown."""
     width, height = figure.get_size_inches()
     middle = (_LEFT + width - _RIGHT) / 2 / width, (_BOTTOM + height - top) / 2 / height
-    sizes = zip(axes, (len(axis.values) for axis in axes), atlas["status"].shape, strict=True)
     across, up = (
-        axis.label if shown == size else f"{axis.label}, {shown} of {size} values"
-        for axis, shown, size in sizes
+        axis.label + f", {len(axis.values)} of {size} values" * (len(axis.values) < size)
+        for axis, size in zip(axes, atlas["status"].shape, strict=True)
     )
     figure.text(middle[0], 0.12 / height, across, ha="center", fontsize=9)
     figure.text(0.1 / width, middle[1], up, va="center", rotation=90, fontsize=9)
@@ -316,11 +287,7 @@ class SheetAxis(NamedTuple):
 
 
 def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:
-    """The two parameters of an atlas, for the horizontal and the vertical edge.
-
-    Raises:
-        InvalidInput: The atlas is no grid of two parameters.
-    """
+    """The two parameters of an atlas, for the horizontal and the vertical edge."""
     dims = atlas["status"].dims
     if len(dims) != 2:
         raise InvalidInput("atlas", f"of dimensions {dims}", "a grid of two parameters")
@@ -332,8 +299,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
     """Contours of a metric over the two parameters of an atlas (figure 3b); its best is marked.
 
     Volumes and lengths are relative to each design's own L. The best is the largest value, of
-    unreachability the smallest. Designs without a value stay white; where there are no contours, as
-    in a single row of designs, each design is a cell.
+    unreachability the smallest. Designs without a value stay white; each of a single row is a cell.
 
     Args:
         atlas: From `open_atlas`, a grid of two parameters.
@@ -353,7 +319,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
         if np.isfinite(values).any():
             _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         relative = _RELATIVE.get(atlas[metric].attrs.get("units", "1"), "")
-        label = _NAMES.get(metric, _plain(metric) + relative)
+        label = _NAMES.get(metric, metric.replace("_", " ") + relative)
         ax.figure.colorbar(filled, ax=ax, label=label)
         ax.set(xlabel=across.label, ylabel=up.label)
     return ax
@@ -363,23 +329,19 @@ def _axis(values: xr.DataArray) -> SheetAxis:
     si_unit = values.attrs.get("units", "1")
     unit = _UNITS.get(si_unit, si_unit)
     shown = np.degrees(values.values) if si_unit == "rad" else values.values
-    name = _plain(str(values.name))
+    name = str(values.name).replace("_", " ")
     if symbol := values.attrs.get("symbol"):
         name = _INDEXED.sub(lambda found: found[0].translate(_LOWERED), symbol)
         name += f" of {part}" if (part := values.attrs.get("part")) else ""
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
 
 
-def _plain(name: str) -> str:
-    return name.replace("_", " ")
-
-
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
     known = values.compressed()
     if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
-        return ax.pcolormesh(_edges(across), _edges(up), values, cmap=COLORMAP)
-    filled = ax.contourf(across.values, up.values, values, 14, cmap=COLORMAP)
-    _draw_contours(ax, across, up, values, np.asarray(filled.levels))
+        return ax.pcolormesh(_edges(across), _edges(up), values, cmap=coloring.COLORMAP)
+    filled = ax.contourf(across.values, up.values, values, 14, cmap=coloring.COLORMAP)
+    _contour(ax, across, up, values, np.asarray(filled.levels))
     return filled
 
 
@@ -392,17 +354,15 @@ def _edges(axis: SheetAxis) -> Array:
     return np.array([2 * values[0] - middle[0], *middle, 2 * values[-1] - middle[-1]])
 
 
-def _draw_contours(
-    ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array
-) -> None:
+def _contour(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array) -> None:
     ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(0, len(levels), 2)]
     lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
     low = np.array([across.values[0], up.values[0]])
     span = np.array([across.values[-1], up.values[-1]]) - low
-    paths = ((np.asarray(path.vertices, float) - low) / span for path in lines.get_paths())
     places = []
-    for path in paths:  # far from every edge
-        inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
+    for line in lines.get_paths():
+        path = (np.asarray(line.vertices, float) - low) / span
+        inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]  # far from every edge
         if len(inside):
             distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
             places.append(low + span * inside[distance.argmin()])
@@ -420,13 +380,7 @@ def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smalle
     # inside the axes, whichever edge the best lies at
     left = column > (len(across.values) - 1) / 2
     down = row > (len(up.values) - 1) / 2
-    ax.annotate(
-        f"{values[row, column]:.3f}",
-        place,
-        (-7 if left else 7, -6 if down else 6),
-        textcoords="offset points",
-        ha="right" if left else "left",
-        va="top" if down else "bottom",
-        fontsize=7,
-        bbox={"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8},
-    )
+    away = {"xytext": (-7 if left else 7, -6 if down else 6), "textcoords": "offset points"}
+    look = {"ha": "right" if left else "left", "va": "top" if down else "bottom", "fontsize": 7}
+    look["bbox"] = {"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8}
+    ax.annotate(f"{values[row, column]:.3f}", place, **away, **look)

@@ -11,17 +11,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.picture.projection import (
-    View,
-    is_mirrored,
-    on_paper,
-    plane_of,
-    project,
-    view_angles,
-    view_axes,
-)
-from softreach.picture.shading import seen_through
-from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, project, view_axes
+from softreach.picture.zbuffer import Extent, ZBuffer, seen_through
 from softreach.plot.style import DPI, as_axes, as_box, figure_style, small_axes
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -29,7 +20,6 @@ from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
 
 _TICK_GAP = 4.0  # points between an edge and its numbers
 _LABEL_GAP = np.array([23.0, 15.0])  # points between an edge beside or above its label and that
@@ -44,23 +34,18 @@ _UNIT_MARK = "_counted in "  # the label of an image, which no legend shows
 
 
 def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
-    """Draw the walls of a box, shape (2, 3), behind what it holds, and label its edges.
-
-    The frame of the axes, which hold an orthographic image of the inside, is hidden.
-    """
+    """Draw the walls of a box, shape (2, 3), behind the image of its inside; label its edges."""
     from matplotlib.collections import LineCollection
 
     edges = [_outer_edge(box, view, axis) for axis in range(3)]
     ticks = _ticks(ax, box, view, edges)
-    camera = view_axes(view)[2]
-    far, lines = np.where(camera > 0, box[0], box[1]), []
+    far, lines = np.where(view_axes(view)[2] > 0, box[0], box[1]), []
     for along, across in permutations(range(3), 2):
         for value in (*ticks[across], *box[:, across]):
             line = np.tile(far, (2, 1))
             line[:, along], line[:, across] = box[:, along], value
             lines.append(project(line, view)[:, :2])
-    walls = LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False)
-    ax.add_collection(walls)
+    ax.add_collection(LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False))
     for axis in range(3):
         _label_edge(ax, box, view, edges[axis], ticks[axis], unit.label("xyz"[axis]))
     ax.set_axis_off()
@@ -71,8 +56,7 @@ class Panel:
     """Axes that show a box in space from one side, at print resolution."""
 
     ax: Axes
-    box: Array
-    """Space shown: lower and upper corner in the units of the axes, shape (2, 3)."""
+    box: Array  # Space shown: lower and upper corner in the units of the axes, shape (2, 3)
     view: View
     unit: LengthUnit
 
@@ -81,12 +65,7 @@ class Panel:
     def opened(
         cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: object = None
     ) -> Iterator[Self]:
-        """Axes in our style for points in their unit, shape (..., 3), or a box [m], shape (2, 3).
-
-        Raises:
-            InvalidInput: Unknown view, no axes, no box, or no finite point to show.
-        """
-        view_angles(view)
+        """Axes in our style for points in their unit, shape (..., 3), or a box [m], (2, 3)."""
         with figure_style(as_axes(ax)):
             shown = bounding_box(points) if box is None else unit.of(as_box("box", box))
             if ax is None:
@@ -110,19 +89,13 @@ class Panel:
         return ZBuffer(self.extent, self._columns(), oversample, color_step)
 
     def show(self, buffer: ZBuffer, within: ZBuffer | None = None) -> None:
-        """Place the finished image, and what shows through it, in the axes and label them.
-
-        What is there stays in view.
-
-        Raises:
-            InvalidInput: What is there is counted in another unit.
-        """
+        """Place the image, and what shows through it, beside what is there, and label the axes."""
         ax, first, plane = self.ax, not self.ax.images, plane_of(self.view)
         marks = [str(image.get_label()).partition(_UNIT_MARK) for image in ax.images]
         if others := {name for _, mark, name in marks if mark} - {self.unit.name}:
             hint = "give one unit= to all that shares axes, or length= to all of it or to none"
-            found = f"counted in {', '.join(others)}"
-            raise InvalidInput("ax", found, f"in {self.unit.name}", hint)
+            counted = f"counted in {', '.join(others)}"
+            raise InvalidInput("ax", counted, f"in {self.unit.name}", hint)
         mirror = -1 if is_mirrored(self.view) else 1
         left, right, bottom, top = buffer.extent
         extent, order = (mirror * left, mirror * right, bottom, top), 2 + len(ax.images) / 100
@@ -138,26 +111,16 @@ class Panel:
         elif first:
             draw_box(ax, self.box, self.view, self.unit)
 
-    def dot(self, points: Array, opacity: float = 1.0) -> None:
-        """Draw small dots over the image, places [m], shape (n, 3)."""
-        style = {"color": "0.1", "markeredgecolor": "1", "markeredgewidth": 0.4, "zorder": 3}
-        self.plot(self.unit.of(points), "o", markersize=3, alpha=opacity, **style)
-
     def plot(self, points: Array, *marks: str, **style: Any) -> None:
         """Draw a line or marks over the image, in the units of the axes, shape (n, 3)."""
-        look: dict[str, Any] = {"zorder": _OVER, **style}
-        self.ax.plot(*on_paper(points, self.view).T, *marks, **look)
+        self.ax.plot(*on_paper(points, self.view).T, *marks, **{"zorder": _OVER, **style})
 
     def _columns(self) -> int:
         return max(16, round(_inches(self.ax, self.extent)[0] * DPI))
 
 
 def bounding_box(*points: ArrayLike) -> Array:
-    """Lower and upper corner around all finite points, with a margin, shape (2, 3).
-
-    Raises:
-        InvalidInput: No finite point to show.
-    """
+    """Lower and upper corner around all finite points, with a margin, shape (2, 3)."""
     corners: list[Array] = []
     for cloud in points:
         finite = np.asarray(cloud, float).reshape(-1, 3)
@@ -174,16 +137,14 @@ def bounding_box(*points: ArrayLike) -> Array:
 def view_extent(box: Array, view: View) -> Extent:
     """The part of the projection plane that a box fills."""
     corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
-    seen = project(corners, view)
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    return Extent(low[0], high[0], low[1], high[1])
+    right, up, _ = project(corners, view).T
+    return Extent(right.min(), right.max(), up.min(), up.max())
 
 
 def _ticks(ax: Axes, box: Array, view: View, edges: list[Array]) -> list[Array]:
     """Round numbers along each axis, as many as its edge has room for on paper."""
     extent, ticks = view_extent(box, view), []
-    shown = [project(edge, view)[:, :2] for edge in edges]
-    lengths = np.array([np.linalg.norm(edge[1] - edge[0]) for edge in shown])
+    lengths = np.linalg.norm(project(np.ptp(edges, axis=1), view)[:, :2], axis=1)
     inches = lengths * (_inches(ax, extent) / extent.size).min()
     counts = np.minimum(np.rint(6 * lengths / lengths.max()), inches // _BOX_TICK_ROOM)
     for (low, high), count in zip(box.T, np.maximum(2, counts).astype(int).tolist(), strict=True):
@@ -218,11 +179,11 @@ def _label_edge(ax: Axes, box: Array, view: View, edge: Array, ticks: Array, lab
 def _outer_edge(box: Array, view: View, axis: int) -> Array:
     """The edge along an axis on the outline of the box, lowest on paper (z: farthest left)."""
     others = [k for k in range(3) if k != axis]
-    edges = [box.copy() for _ in range(4)]
+    edges = np.tile(box, (4, 1, 1))
     for edge, pick in zip(edges, np.ndindex(2, 2), strict=True):
         edge[:, others] = box[pick, others]
-    place = 0 if axis == 2 else 1
-    return min(edges, key=lambda edge: project(edge, view)[:, place].mean())
+    places = project(edges, view)[..., 0 if axis == 2 else 1].mean(axis=1)
+    return edges[places.argmin()]
 
 
 def _inches(ax: Axes, extent: Extent) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,12 +20,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Pixels = NDArray[np.uint8]  # RGB from 0 to 255
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
 UNSTABLE = (255, 0, 200)
 """Magenta, RGB from 0 to 255, of unstable equilibria: no scale of colors has it."""
 _LINE, _PAGE = 44, 100  # characters above axes of a column's width, and above a figure
 _AROUND, _ROW = 0.1, 0.15  # heights around the rows of a legend, and of each [inch]
+_LETTER = 0.09  # width of one of a label [inch]
 _MIXED = 3  # bundles whose lights can be told apart in a mixture
 POWERS = str.maketrans("23", "²³")
 _WIDE = 8.0  # ratio of the largest to the smallest value from which ratios are shown
@@ -34,21 +37,16 @@ class BundleKey(NamedTuple):
     """Each bundle has a color, which it adds to a mixture or which stands for it."""
 
     names: tuple[str, ...]
-    colors: NDArray[np.uint8]
-    symbols: tuple[str, ...]
-    """Symbol of the activation of each: γ, τ or P."""
-    unstable: bool = False
-    """True if some samples are marked as unstable equilibria."""
-    title: str = ""
-    """Meaning of a color by itself; empty if it is one part of a mixture."""
+    colors: Pixels
+    symbols: tuple[str, ...]  # Symbol of the activation of each: γ, τ or P
+    unstable: bool = False  # True if some samples are marked as unstable equilibria
+    title: str = ""  # Meaning of a color by itself; empty if it is one part of a mixture
 
     @property
     def labels(self) -> tuple[str, ...]:
         """Label of each color."""
-        if self.title:
-            return self.names
         pairs = zip(self.symbols, self.names, strict=True)
-        return tuple(f"|{symbol}| {name}" for symbol, name in pairs)
+        return self.names if self.title else tuple(f"|{symbol}| {name}" for symbol, name in pairs)
 
 
 class ScalarKey(NamedTuple):
@@ -57,12 +55,10 @@ class ScalarKey(NamedTuple):
     label: str
     low: float
     high: float
-    unstable: bool = False
-    """True if some samples are marked as unstable equilibria."""
+    unstable: bool = False  # True if some samples are marked as unstable equilibria
     logarithmic: bool = False
     """True if equal ratios, and not equal differences, are equal steps of color."""
-    clipped: bool = False
-    """True if the ends stand for all values beyond them too."""
+    clipped: bool = False  # True if the ends stand for all values beyond them too
 
     @property
     def extend(self) -> str:
@@ -76,7 +72,7 @@ Key = BundleKey | ScalarKey
 class Coloring(NamedTuple):
     """RGB of every sample, shape (sample, 3), and what it means."""
 
-    rgb: NDArray[np.uint8]
+    rgb: Pixels
     key: Key | None
 
 
@@ -95,17 +91,13 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
             stand for all beyond them; or RGB from 0 to 1 per sample.
 
     Unstable equilibria of arms under loads are always magenta.
-
-    Raises:
-        InvalidInput: No such bundle, or an array of another length.
     """
     coloring = _colored(cloud, color)
     unstable = cloud["status"].values == 1 if "status" in cloud else np.zeros(0, bool)
     if not unstable.any():
         return coloring
     rgb = np.where(unstable[:, None], np.array(UNSTABLE, np.uint8), coloring.rgb)
-    key = None if coloring.key is None else coloring.key._replace(unstable=True)
-    return Coloring(rgb, key)
+    return Coloring(rgb, None if coloring.key is None else coloring.key._replace(unstable=True))
 
 
 def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring:
@@ -125,8 +117,7 @@ def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring
         return Coloring(activation_colors(_comparable(magnitude, units)), key)
     if color not in names and color not in range(len(names)):
         known = f"a bundle ({', '.join(names)}) or its index"
-        allowed = f'"rgb", "strongest", "effort", {known}, or an array'
-        raise InvalidInput("color", color, allowed)
+        raise InvalidInput("color", color, f'"rgb", "strongest", "effort", {known}, or an array')
     bundle = names.index(color) if isinstance(color, str) else int(color)
     unit = "" if units[bundle] == "1" else f" [{units[bundle]}]"
     label = f"|{symbols[bundle]}| {names[bundle]}{unit}"
@@ -184,13 +175,15 @@ def draw_key(ax: Axes, key: Key | None) -> None:
 
 def draw_figure_key(figure: Figure, key: Key | None, room: float) -> None:
     """Explain the colors once for a figure, in the room [inch] at its upper edge."""
-    top = room / figure.get_size_inches()[1]
+    width, height = figure.get_size_inches()
+    top = room / height
     place = (0.5, 1 - top / 2)
     if isinstance(key, ScalarKey):
         place = (0.88, 1 - 0.4 * top)
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
         figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=key.extend)
-        bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
+        label = textwrap.fill(key.label, int(0.38 * width / _LETTER))
+        bar.set_ylabel(label, rotation=0, ha="right", va="center")
     _draw_legend(figure, key, _PAGE, 4, loc="center", bbox_to_anchor=place)
 
 
@@ -252,18 +245,14 @@ def _given(color: ArrayLike, samples: int) -> Coloring:
     return Coloring(rgb, key._replace(clipped=bool(attrs.get("clipped"))))
 
 
-def _scalar(
-    values: Array, label: str, low: float | None = None
-) -> tuple[NDArray[np.uint8], ScalarKey]:
+def _scalar(values: Array, label: str, low: float | None = None) -> tuple[Pixels, ScalarKey]:
     known = values[np.isfinite(values)]
     start = low if low is not None else float(known.min()) if known.size else 0.0
     stop = float(known.max(initial=start)) if known.size else start + 1.0
     return scale_colors(values, start, stop), ScalarKey(label, start, stop)
 
 
-def scale_colors(
-    values: Array, low: float, high: float, missing: int = _MISSING
-) -> NDArray[np.uint8]:
+def scale_colors(values: Array, low: float, high: float, missing: int = _MISSING) -> Pixels:
     """Colors of numbers from low to high, and the gray of those that are missing, shape (n, 3)."""
     from matplotlib import colormaps
 

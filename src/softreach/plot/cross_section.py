@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import LENGTH, PLACE, some_bundles, styled_axes
+from softreach.arm.material import Material
+from softreach.arm.section import Section
+from softreach.plot.style import LENGTH, PLACE, Unit, some_bundles, styled_axes, unit_for
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, Color, bundle_color, material_fill
@@ -21,10 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Patch, Wedge
-
-    from softreach.arm.material import Material
-    from softreach.arm.section import Section
-
 
 _MOST = 12  # entries
 _HANDLE, _LETTER = 0.5, 0.056  # inches
@@ -58,8 +55,7 @@ def plot_cross_section(
         z: Station Z [m].
         ax: Axes to draw in; None for a new figure.
         bundles: Which to draw, by index; None for all.
-        half_width: Of what is shown [m], to draw several sections at one scale; None for this
-            section.
+        half_width: Of what is shown [m], for sections at one scale; None for this section alone.
         legend: Whether to name materials and bundles beside it; None where there are several
             materials, or bundles other than fibers.
         unit: As in `plot_arm`.
@@ -79,7 +75,7 @@ def plot_cross_section(
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     counted = unit_for(arm.length, unit)
     outer = float(counted.of(arm.profile.radius(z)))
-    placed = _placed_bundles(arm, z, outer, some_bundles(arm, bundles))
+    placed = _placed(arm, z, outer, some_bundles(arm, bundles))
     entries = [*_material_entries(arm.section), *_bundle_entries(arm, placed)] if legend else []
     labels = [label for _, label in entries[:_MOST]]
     if len(entries) > _MOST:
@@ -117,12 +113,8 @@ def _materials(section: Section) -> dict[Material, tuple[str, Material]]:
         parts.append(("core", section.core_material))
     different: dict[Material, tuple[str, Material]] = {}
     for part, material in parts:
-        different.setdefault(_nameless(material), (part, material))
+        different.setdefault(material.replace(name=""), (part, material))
     return different
-
-
-def _nameless(material: Material) -> Material:
-    return material.replace(name="")
 
 
 def _material_style(number: int) -> dict[str, Any]:
@@ -158,10 +150,7 @@ def _bundle_entries(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[t
 
 
 def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
-    """Layers; what is empty is white.
-
-    In a section of one material the core is paler than the rings; rings above others are clear.
-    """
+    """Layers: of one material the core is paler than the rings; rings above others are clear."""
     from matplotlib.patches import Circle
 
     materials = [*_materials(section)]
@@ -169,7 +158,7 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
     def draw(low: float, high: float, material: Material | None, alpha: float = 1.0) -> None:
         if material is not None and len(materials) > 1:
             fill = _annulus(outer * low, outer * high, "none")
-            style = _material_style(materials.index(_nameless(material)))
+            style = _material_style(materials.index(material.replace(name="")))
             fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
             fill.set_hatch_linewidth(0.4)
             ax.add_patch(fill)
@@ -224,7 +213,6 @@ class _Placed:
 
     @property
     def style(self) -> dict[str, Any]:
-        """That of a patch or of a dot."""
         color = self.color
         if self.shape == "line":
             edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
@@ -267,9 +255,7 @@ class _Placed:
         return LineCollection(list(np.stack(points, axis=1)), colors=ink, linewidths=0.7)
 
 
-def _placed_bundles(
-    arm: Manipulator, z: float, outer: float, bundles: Collection[int]
-) -> list[_Placed]:
+def _placed(arm: Manipulator, z: float, outer: float, bundles: Collection[int]) -> list[_Placed]:
     outline = arm.outline(z)
     ratios = outline.inner_ratio[0], outline.outer_ratio[0]
     sizes = outline.center[0], outline.extent, *(outer * ratio for ratio in ratios)

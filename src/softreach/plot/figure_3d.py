@@ -20,10 +20,9 @@ from softreach.picture.projection import View, view_angles
 from softreach.picture.thumbnail import Dots, Skin
 from softreach.plot.arm import shapes_of
 from softreach.plot.axes import bounding_box
-from softreach.plot.clouds import drawn_tips, point_size
 from softreach.plot.coloring import BundleKey, ScalarKey, color_map, color_samples, key_entries
-from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import a_surface
+from softreach.plot.reach import drawn_tips, point_size
+from softreach.plot.style import Unit, a_surface, unit_for
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_cloud, a_configuration
@@ -87,15 +86,9 @@ def plot_3d(
     scene = Scene(shown_in, color, kinds)
     scene.add(things)
     box = bounding_box(*scene.points())
-    page = web_page(
-        scene.parts,
-        box,
-        shown_in,
-        keys=scene.keys,
-        caption=". ".join(scene.captions) if said is None else said,
-        note=". ".join([*scene.notes, _HELP]),
-        view=view,
-    )
+    said = ". ".join(scene.captions) if said is None else said
+    words = {"caption": said, "note": ". ".join([*scene.notes, _HELP])}
+    page = web_page(scene.parts, box, shown_in, keys=scene.keys, view=view, **words)
     return Figure3D(page, "; ".join(scene.notes))
 
 
@@ -284,8 +277,7 @@ def page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
     if not isinstance(key, ScalarKey):
         return [] if key is None else [Swatches(marks, key.title)]
     scale = color_map(key)
-    shares = np.linspace(0.0, 1.0, 17)
-    colors = [css_color(rgb[:3]) for rgb in scale.cmap(shares)]
+    colors = [css_color(rgb[:3]) for rgb in scale.cmap(np.linspace(0.0, 1.0, 17))]
     values = np.asarray(scale.norm.inverse(np.array([0.0, 0.5, 1.0])), float)
     low, middle, high = (f"{value:.3g}" for value in values)
     ends = (f"≤ {low}", middle, f"≥ {high}") if key.clipped else (low, middle, high)

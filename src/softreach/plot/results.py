@@ -9,18 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
+from softreach.plot import style
 from softreach.plot.axes import bounding_box, draw_box, view_extent
 from softreach.plot.coloring import COLORMAP
-from softreach.plot.lengths import Unit, unit_for
-from softreach.plot.style import (
-    a_result,
-    figure_style,
-    legend_above,
-    new_figure,
-    pyplot,
-    remark,
-    write_note,
-)
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import BEST, MET, MISSED
 from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
@@ -37,7 +28,8 @@ _FAR = 4.0  # times the 95 % quantile, beyond which places would squash all othe
 _MILLIMETER = LengthUnit("mm", 1e-3)  # of inputs
 _MEASURED = "0.45"
 _ABOVE, _LINE, _ENDS = 2.5, 0.24, 0.75  # heights of panels, of a parameter, and around these [inch]
-_COARSE: dict[str, Any] = {"marker": "o", "s": 14, "facecolors": "none", "linewidths": 0.7}
+_COARSE: dict[str, Any] = {"marker": "o", "s": 14, "facecolors": "none", "edgecolors": MET}
+_COARSE["linewidths"] = 0.7
 _FINAL: dict[str, Any] = {"marker": "D", "s": 24, "color": BEST, "linewidths": 0, "zorder": 4}
 _OUT: dict[str, Any] = {"marker": "x", "s": 16, "color": MISSED, "linewidths": 0.8, "zorder": 3}
 _BARS: dict[str, Any] = {"fmt": "none", "ecolor": BEST, "elinewidth": 0.8, "zorder": 4}
@@ -45,7 +37,9 @@ _MOST_LINES = 200
 _LETTERS = 40  # beside or below a panel
 
 
-def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = None) -> Figure:
+def plot_calibration(
+    calibration: Any, *, view: View = "oblique", unit: style.Unit = None
+) -> Figure:
     """Draw how far measured and predicted places of the markers are apart.
 
     In space, with a line from each measured place to the predicted one; the distances by marker, in
@@ -61,15 +55,15 @@ def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = N
         InvalidInput: Unknown view or unit, or no calibration.
         MissingExtra: matplotlib is not installed.
     """
-    data = a_result("calibration", calibration, "Calibration", "calibrate").to_dataset()
+    data = style.a_result("calibration", calibration, "Calibration", "calibrate").to_dataset()
     view_angles(view)
     arm = calibration.arm
-    shown = _Errors(data, unit_for(arm.length, arm.length_unit if unit is None else unit))
+    shown = _Errors(data, style.unit_for(arm.length, arm.length_unit if unit is None else unit))
     inputs = shown.moving_inputs
     rows = math.ceil(len(inputs) / _COLUMNS)
-    with figure_style():
+    with style.figure_style():
         heights = [_SPACE, *[_ROW * rows] * (rows > 0)]
-        figure = new_figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
+        figure = style.new_figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
         parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
         grid = parts[0].add_gridspec(2, 2, width_ratios=[1.25, 1.0])
         _draw_places(parts[0].add_subplot(grid[:, 0]), shown, view)
@@ -100,7 +94,7 @@ class _Errors:
         known = self.distance[np.isfinite(self.distance)]
         limit = _FAR * float(np.quantile(known, 0.95)) if known.size else 1.0
         self.top = min(1.08 * float(known.max(initial=0.0)), limit) or 1.0
-        colors = pyplot().get_cmap("tab10")
+        colors = style.pyplot().get_cmap("tab10")
         self.colors = [colors(k % 10) for k in range(data.sizes["marker"])]
 
     def scatter(self, ax: Axes, x: Array) -> None:
@@ -113,9 +107,8 @@ class _Errors:
 
     def frame(self, ax: Axes) -> None:
         ax.set_ylim(0.0, self.top)
-        far = int((self.distance > self.top).sum())
-        if far:
-            write_note(ax, f"{far} beyond", 0.98, 0.96)
+        if far := int((self.distance > self.top).sum()):
+            style.write_note(ax, f"{far} beyond", 0.98, 0.96)
 
 
 def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
@@ -140,23 +133,23 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
         ax.set(xlabel=shown.unit.label(plane[0]), ylabel=shown.unit.label(plane[1]))
     else:
         draw_box(ax, box, view, shown.unit)
-    legend_above(ax, 2, handletextpad=0.2)
+    style.legend_above(ax, 2, handletextpad=0.2)
 
 
 def _draw_markers(ax: Axes, shown: _Errors) -> None:
     apart = 0.25 * (2.0 * np.random.default_rng(0).random(shown.distance.T.shape) - 1.0)
     shown.scatter(ax, np.arange(len(apart))[:, None] + apart)
     for k in range(len(shown.markers)):
-        for rows, style in ((~shown.held, "-"), (shown.held, ":")):
+        for rows, look in ((~shown.held, "-"), (shown.held, ":")):
             own = shown.distance[rows, k]
             if np.isfinite(own).any():
                 rms = float(np.sqrt(np.nanmean(own**2)))
-                ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=style, zorder=4)
+                ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=look, zorder=4)
     ax.set_xticks(range(len(shown.markers)), shown.markers)
     if len(shown.markers) > 4 or len("".join(shown.markers)) > _LETTERS:
         ax.tick_params(axis="x", labelrotation=40)
     ax.set(ylabel=shown.label, xlim=(-0.6, len(shown.markers) - 0.4))
-    remark(ax, "line: rms" + ("; hollow, dotted: held out" if shown.held.any() else ""))
+    style.remark(ax, "line: rms" + ("; hollow, dotted: held out" if shown.held.any() else ""))
     shown.frame(ax)
 
 
@@ -179,7 +172,7 @@ def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
     shown.frame(ax)
 
 
-def plot_search(search: Any, *, unit: Unit = None) -> Figure:
+def plot_search(search: Any, *, unit: style.Unit = None) -> Figure:
     """Draw what a search came to: designs that were judged, and the best in their ranges.
 
     Of one objective, its value against the designs that were looked at, with the best so far, and
@@ -188,22 +181,21 @@ def plot_search(search: Any, *, unit: Unit = None) -> Figure:
 
     Args:
         search: What `search` returned.
-        unit: Unit of lengths and volumes, m, cm, mm or L; None for that of the design, as in the
-            report.
+        unit: Of lengths and volumes, m, cm, mm or L; None for that of the design, as in the report.
 
     Raises:
         InvalidInput: Unknown unit, or no search.
         MissingExtra: matplotlib is not installed.
     """
-    data = a_result("search", search, "Search", "search").to_dataset()
+    data = style.a_result("search", search, "Search", "search").to_dataset()
     length = float(data.attrs["length"])
     name = data.attrs["display_unit"] or handy_unit(length)
-    shown = _Designs(data, unit_for(length, name if unit is None else unit))
+    shown = _Designs(data, style.unit_for(length, name if unit is None else unit))
     goals, below = data.sizes["objective"], _ENDS + _LINE * data.sizes["parameter"]
-    with figure_style():
-        figure = new_figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
+    with style.figure_style():
+        figure = style.new_figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
         grid = figure.add_gridspec(2, 2, height_ratios=[_ABOVE, below], width_ratios=[1.6, 1.0])
-        beside = goals == 1 or bool(goals and (~shown.feasible & ~shown.final).any())
+        beside = goals == 1 or bool(goals and shown.missed.any())
         draw = (_draw_missed, _draw_progress, _draw_front, _draw_objectives)[min(goals, 3)]
         draw(figure.add_subplot(grid[0, 0] if beside else grid[0, :]), shown)
         if beside:
@@ -220,6 +212,7 @@ class _Designs:
         count = data.sizes["design"]
         self.final: Mask = np.arange(count) >= count - int(data.attrs["finalists"])
         self.front: Mask = data["front"].values & self.final
+        self.met, self.missed = self.feasible & ~self.final, ~self.feasible & ~self.final
         self.looked_at, self.senses = data["looked_at"].values, data["sense"].values
         self.values, self.errors = data["objective_value"].values, data["objective_error"].values
         self.labels: list[str] = []
@@ -232,25 +225,28 @@ class _Designs:
             label = f"{objective} / {name}" if relative else f"{objective} [{name}]"
             self.labels.append(label if name else objective)
 
+    def mark(self, ax: Axes, rows: Mask, heights: Array, **look: Any) -> None:
+        """Marks of some designs, if any, over when they were looked at."""
+        if rows.any():
+            ax.scatter(self.looked_at[rows], heights[rows], **look)
+
 
 def _draw_progress(ax: Axes, shown: _Designs) -> None:
-    value, at = shown.values[:, 0], shown.looked_at
-    way, final = shown.feasible & ~shown.final, shown.feasible & shown.final
-    ax.scatter(at[way], value[way], edgecolors=MET, label="on the way", zorder=3, **_COARSE)
-    if way.any():
+    value, at, met = shown.values[:, 0], shown.looked_at, shown.met
+    ax.scatter(at[met], value[met], label="on the way", zorder=3, **_COARSE)
+    if met.any():
         best = np.maximum if shown.senses[0] > 0 else np.minimum
-        so_far = best.accumulate(value[way])
-        ends = [*at[way], shown.looked_at[-1]], [*so_far, so_far[-1]]
+        so_far = best.accumulate(value[met])
+        ends = [*at[met], at[-1]], [*so_far, so_far[-1]]
         ax.step(*ends, where="post", color="0.35", lw=0.9, zorder=2, label="best so far")
+    final = shown.feasible & shown.final
     if final.any():
         ax.errorbar(at[final], value[final], shown.errors[final, 0], capsize=2, **_BARS)
-        ax.scatter(at[final], value[final], label="full accuracy", **_FINAL)
-    out = ~shown.feasible & ~shown.final
-    if out.any():  # which have no value
-        places = {"transform": ax.get_xaxis_transform(), "clip_on": False}
-        ax.scatter(at[out], np.zeros(out.sum()), label="requirements missed", **places, **_OUT)
+    shown.mark(ax, final, value, label="full accuracy", **_FINAL)
+    edge = {"transform": ax.get_xaxis_transform(), "clip_on": False}  # what is missed has no value
+    shown.mark(ax, shown.missed, 0.0 * at, label="requirements missed", **edge, **_OUT)
     ax.set(xlabel="designs looked at", ylabel=shown.labels[0])
-    legend_above(ax, 4, handletextpad=0.3)
+    style.legend_above(ax, 4, handletextpad=0.3)
 
 
 def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
@@ -269,13 +265,12 @@ def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
     first = float(full[known][0])
     ax.axline((first, first), slope=1.0, color="0.7", lw=0.7, zorder=1)
     ax.set(xlabel=fill(f"{shown.labels[0]}, coarse", 2 * _LETTERS // 3), ylabel="full accuracy")
-    remark(ax, "the best, judged again")
+    style.remark(ax, "the best, judged again")
     ax.locator_params(nbins=4)
 
 
 def _draw_front(ax: Axes, shown: _Designs) -> None:
-    way = shown.feasible & ~shown.final
-    ax.scatter(*shown.values[way].T, edgecolors=MET, label="on the way", zorder=3, **_COARSE)
+    ax.scatter(*shown.values[shown.met].T, label="on the way", zorder=3, **_COARSE)
     rows = np.flatnonzero(shown.front & shown.feasible)
     if len(rows):
         points, errors = shown.values[rows].T, shown.errors[rows].T
@@ -289,24 +284,21 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
         for label, sense in zip(shown.labels, shown.senses, strict=True)
     ]
     ax.set(xlabel=words[0], ylabel=words[1])
-    legend_above(ax, handletextpad=0.3)
+    style.legend_above(ax, handletextpad=0.3)
 
 
 def _draw_missed(ax: Axes, shown: _Designs) -> None:
     """Excess of each design, in their order; infinite ones stand at the upper edge."""
-    excess, at = shown.data["excess"].values, shown.looked_at
-    met, never = shown.feasible & ~shown.final, ~np.isfinite(excess) & ~shown.final
-    out = ~(met | never | shown.final)
-    if met.any():
-        ax.scatter(at[met], excess[met], edgecolors=MET, label="met", **_COARSE)
-    if out.any():
-        ax.scatter(at[out], excess[out], label="missed", **_OUT)
-    if never.any():
-        style = {**_OUT, "marker": "v", "transform": ax.get_xaxis_transform(), "clip_on": False}
-        ax.scatter(at[never], np.ones(never.sum()), label="no such arm", **style)
+    excess = shown.data["excess"].values
+    never = ~np.isfinite(excess) & ~shown.final
+    missed = shown.missed & ~never
+    shown.mark(ax, shown.met, excess, label="met", **_COARSE)
+    shown.mark(ax, missed, excess, label="missed", **_OUT)
+    edge = {"marker": "v", "transform": ax.get_xaxis_transform(), "clip_on": False}
+    shown.mark(ax, never, np.ones(len(excess)), label="no such arm", **_OUT | edge)
     ax.set(xlabel="designs looked at", ylabel="requirements missed, sum [-]")
-    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]), top=None if out.any() else 1.0)
-    legend_above(ax, handletextpad=0.3)
+    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]), top=None if missed.any() else 1.0)
+    style.legend_above(ax, handletextpad=0.3)
 
 
 def _draw_objectives(ax: Axes, shown: _Designs) -> None:
@@ -319,7 +311,7 @@ def _draw_objectives(ax: Axes, shown: _Designs) -> None:
     low, high = values.min(axis=0), values.max(axis=0)
     shares = (values - low) / np.where(high > low, high - low, 1.0)
     shares = np.where(shown.senses > 0, shares, 1.0 - shares)
-    colors = pyplot().get_cmap(COLORMAP)(0.9 * shares[:, 0])
+    colors = style.pyplot().get_cmap(COLORMAP)(0.9 * shares[:, 0])
     places, wide = np.arange(values.shape[1]), max(8, 48 // values.shape[1])
     for share, color in zip(shares, colors, strict=True):
         ax.plot(places, share, "-D", color=color, lw=0.9, ms=3.5)
@@ -334,18 +326,18 @@ def _draw_objectives(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_ranges(ax: Axes, shown: _Designs) -> None:
-    data, way, small = shown.data, ~shown.final, {"s": 9, "linewidths": 0.5, "alpha": 0.6}
+    data, small = shown.data, {"s": 9, "linewidths": 0.5, "alpha": 0.6}
     low, high = data["low"].values, data["high"].values
     shares = (data["value"].values - low) / np.where(high > low, high - low, 1.0)
     styles = (
-        (way & shown.feasible, {"edgecolors": MET, **_COARSE, **small}),
-        (way & ~shown.feasible, {**_OUT, **small}),
+        (shown.met, {**_COARSE, **small}),
+        (shown.missed, {**_OUT, **small}),
         (shown.front, _FINAL),
     )
     for k in range(len(low)):
         ax.hlines(k, 0.0, 1.0, color="0.85", lw=0.8, zorder=0)
-        for rows, style in styles:
-            ax.scatter(shares[rows, k], np.full(rows.sum(), k), **style)
+        for rows, look in styles:
+            ax.scatter(shares[rows, k], np.full(rows.sum(), k), **look)
         for place, end, across in ((-0.01, low[k], "right"), (1.01, high[k], "left")):
             if choices := str(data["choices"].values[k]):
                 text = choices.split(", ")[round(float(end))]
@@ -356,5 +348,5 @@ def _draw_ranges(ax: Axes, shown: _Designs) -> None:
     ax.tick_params(axis="y", length=0, pad=42)
     ax.set(xlim=(-0.02, 1.1), ylim=(len(low) - 0.4, -0.6), xticks=[])
     word = "the best" if shown.front.sum() < 2 else "the front"
-    remark(ax, f"free parameters in their ranges, {word} ◆")
+    style.remark(ax, f"free parameters in their ranges, {word} ◆")
     ax.spines[:].set_visible(False)

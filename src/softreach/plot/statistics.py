@@ -11,43 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.picture.projection import View, project
+from softreach.plot import coloring, style
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.clouds import drawn_tips, plot_cloud, plot_slab
-from softreach.plot.coloring import (
-    ScalarKey,
-    bundle_activations,
-    color_map,
-    color_samples,
-    draw_key,
-    scale_colors,
-)
-from softreach.plot.lengths import Unit, common_unit, unit_of
-from softreach.plot.style import (
-    LENGTH,
-    PAGE,
-    figure_style,
-    new_figure,
-    place_panels,
-    styled_axes,
-    write_note,
-)
+from softreach.plot.reach import drawn_tips, plot_cloud, plot_slab
 from softreach.schema import a_cloud
-from softreach.support.arguments import (
-    POSITIVE,
-    as_dataset,
-    as_flag,
-    as_mapping,
-    as_number,
-    as_one_of,
-)
-from softreach.support.arrays import Array
+from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number, as_one_of
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
@@ -69,7 +43,7 @@ def plot_distance(
     high: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Draw the evaluated tips, their color D̄; isolated ones are light gray and behind.
 
@@ -90,18 +64,18 @@ def plot_distance(
         MissingExtra: matplotlib is not installed.
     """
     cloud, distance = a_cloud("cloud", cloud), _a_distance("distance", distance)
-    high = largest_distance([distance]) if high is None else as_number("high", high, POSITIVE)
+    high = largest_distance([distance]) if high is None else as_number("high", high, style.POSITIVE)
     key, values = as_flag("key", key), distance.values
-    counted = unit_of(cloud["tip"], unit)
+    counted = style.unit_of(cloud["tip"], unit)
     tips = drawn_tips(cloud, counted)[distance["sample"].values]
     with Panel.opened(tips, counted, ax, view, box) as panel:
         buffer = panel.buffer(oversample=2)
         seen = project(tips, view)
         seen[np.isnan(values), 2] -= 10.0 * np.ptp(panel.box)  # behind all others
         pixels = max(3.0, buffer.shape[1] / np.sqrt(1.2 * max(len(tips), 1)))
-        buffer.draw_points(seen, scale_colors(values, 0.0, high, _ISOLATED), pixels)
+        buffer.draw_points(seen, coloring.scale_colors(values, 0.0, high, _ISOLATED), pixels)
         panel.show(buffer)
-        draw_key(panel.ax, ScalarKey(_LABEL, 0.0, high) if key else None)
+        coloring.draw_key(panel.ax, coloring.ScalarKey(_LABEL, 0.0, high) if key else None)
     return panel.ax
 
 
@@ -121,13 +95,21 @@ def plot_distance_histograms(distances: Mapping[str, xr.DataArray]) -> Figure:
     distances = as_mapping("distances", distances, _a_distance)
     if not distances:
         raise InvalidInput("distances", "none", "at least one")
-    with figure_style():
-        figure = new_figure(figsize=(PAGE, 0.37 * PAGE), layout="constrained")
+    with style.figure_style():
+        figure = style.new_figure(figsize=(style.PAGE, 0.37 * style.PAGE), layout="constrained")
         grid = figure.subplots(1, len(distances), sharex=True, squeeze=False)
         edges = np.linspace(0.0, largest_distance(distances.values()), _BINS + 1)
+        colors = coloring.scale_colors(edges[:-1], 0.0, edges[-1]) / 255
         for ax, (title, distance) in zip(grid[0], distances.items(), strict=True):
-            _draw_histogram(ax, distance.values, edges)
-            ax.set_title(title)
+            finite = distance.values[np.isfinite(distance.values)]
+            share = 100.0 * np.histogram(finite, edges)[0] / max(distance.size, 1)
+            ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
+            ax.set(title=title, xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
+            ax.spines[["top", "right"]].set_visible(False)
+            if len(finite):
+                median, isolated = float(np.median(finite)), 1 - len(finite) / distance.size
+                ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
+                style.write_note(ax, f"median {median:.3f}\nisolated {isolated:.2%}", 0.98, 0.98)
         grid[0, 0].set_ylabel("share of points per bin / %")
     return figure
 
@@ -143,7 +125,7 @@ def plot_redundancy(
     distances: Mapping[str, xr.DataArray],
     *,
     thickness: float | None = None,
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Figure:
     """Draw clouds, their slabs through the base and D̄ of several designs (figures 4b-d).
 
@@ -158,58 +140,44 @@ def plot_redundancy(
         bundle, the slabs from the front and the side, and D̄ from the front, all at one scale.
 
     Raises:
-        InvalidInput: Other titles, no tip in a slab, or clouds of which only
-            some know L.
+        InvalidInput: Other titles, no tip in a slab, or clouds of which only some know L.
         MissingExtra: matplotlib is not installed.
     """
     clouds = as_mapping("clouds", clouds, a_cloud)
     distances = as_mapping("distances", distances, _a_distance)
-    thickness = None if thickness is None else as_number("thickness", thickness, LENGTH)
+    thickness = None if thickness is None else as_number("thickness", thickness, style.LENGTH)
     if not clouds or set(clouds) != set(distances):
         raise InvalidInput("distances", sorted(distances), f"of the clouds {sorted(clouds)}")
-    units = {title: unit_of(cloud["tip"], unit) for title, cloud in clouds.items()}
-    common_unit([*units.values()])
+    units = {title: style.unit_of(cloud["tip"], unit) for title, cloud in clouds.items()}
+    style.common_unit([*units.values()])
     from matplotlib.ticker import MaxNLocator
 
     box = bounding_box(*(drawn_tips(cloud, units[title]) for title, cloud in clouds.items()))
     high = largest_distance(distances.values())
-    with figure_style():
+    with style.figure_style():
         x, y, z = np.ptp(box, axis=0)
+        heights = [z] * len(clouds)
         names = {title: fill(title, _LETTERS) for title in clouds}
         left = _LEFT + _LINE * max(name.count("\n") for name in names.values())
         around = (left, *_AROUND)
-        figure, rows = place_panels(PAGE, (x, x, y, x), [z] * len(clouds), around, _GAPS)
+        figure, rows = style.place_panels(style.PAGE, (x, x, y, x), heights, around, _GAPS)
         for (title, cloud), row in zip(clouds.items(), rows, strict=True):
-            coloring = color_samples(cloud, bundle_activations(cloud).shape[1] - 1)
-            rgb, counted = coloring.rgb / 255, units[title]
+            colored = coloring.color_samples(cloud, coloring.bundle_activations(cloud).shape[1] - 1)
+            rgb, counted = colored.rgb / 255, units[title]
             shared = {"box": box * counted.size, "key": False, "unit": counted}
             plot_cloud(cloud, ax=row[0], color=rgb, **shared)
             for ax, view in zip(row[1:3], ("front", "side"), strict=True):
                 plot_slab(cloud, ax=ax, view=view, thickness=thickness, color=rgb, **shared)
             plot_distance(cloud, distances[title], ax=row[3], high=high, **shared)
-            for ax, key in ((row[0], coloring.key), (row[3], ScalarKey("D̄", 0.0, high))):
-                if isinstance(key, ScalarKey):
+            for ax, key in ((row[0], colored.key), (row[3], coloring.ScalarKey("D̄", 0.0, high))):
+                if isinstance(key, coloring.ScalarKey):
                     bar = ax.inset_axes((0.05, 1.05, 0.9, 0.035))
                     options = {"location": "top", "label": key.label, "ticks": MaxNLocator(4)}
-                    figure.colorbar(color_map(key), cax=bar, **options)
+                    figure.colorbar(coloring.color_map(key), cax=bar, **options)
             for ax in row[1:]:
                 ax.set(ylabel="", yticklabels=[])
             row[0].set_ylabel(f"{names[title]}\n{row[0].get_ylabel()}")
     return figure
-
-
-def _draw_histogram(ax: Any, values: Array, edges: Array) -> None:
-    finite = values[np.isfinite(values)]
-    share = 100.0 * np.histogram(finite, edges)[0] / max(len(values), 1)
-    colors = scale_colors(edges[:-1], 0.0, edges[-1]) / 255
-    ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
-    ax.set(xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
-    ax.spines[["top", "right"]].set_visible(False)
-    if len(finite):
-        median = float(np.median(finite))
-        ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
-        text = f"median {median:.3f}\nisolated {1 - len(finite) / len(values):.2%}"
-        write_note(ax, text, 0.98, 0.98)
 
 
 def plot_curvature(
@@ -217,7 +185,7 @@ def plot_curvature(
     *,
     ax: Axes | None = None,
     quantity: str = "bending",
-    unit: Unit = None,
+    unit: style.Unit = None,
 ) -> Axes:
     """Distributions at the stations of one or two designs (figure 3c); dots are medians.
 
@@ -225,8 +193,7 @@ def plot_curvature(
     statistics do not know L, unless there is a unit.
 
     Args:
-        statistics: Label -> what `curvature_statistics` returned; the first is drawn to the left
-            of each station and the second to the right.
+        statistics: Label -> what `curvature_statistics` returned, left and right of each station.
         ax: Axes to draw in; None for a new figure.
         quantity: "bending", "torsion" or "extension".
         unit: Of lengths: "m", "cm", "mm" or "L"; None for L if the statistics know it, else m.
@@ -240,8 +207,8 @@ def plot_curvature(
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
     as_one_of("quantity", quantity, _SYMBOLS)
-    units = {label: unit_of(data, unit) for label, data in statistics.items()}
-    counted = common_unit([*units.values()])
+    units = {label: style.unit_of(data, unit) for label, data in statistics.items()}
+    counted = style.common_unit([*units.values()])
     places, *others = (units[label].of(data["Z"].values) for label, data in statistics.items())
     for other in others:
         if other.shape != places.shape or not np.allclose(other, places):
@@ -249,7 +216,7 @@ def plot_curvature(
     symbol, per_length = _SYMBOLS[quantity], quantity != "extension"
     if per_length:
         symbol += "L" if counted.relative else f" [1/{counted.name}]"
-    with styled_axes(ax) as ax:
+    with style.styled_axes(ax) as ax:
         sides = (-1, 1) if len(statistics) == 2 else (0,)
         for (label, data), side, color in zip(statistics.items(), sides, SIDES, strict=False):
             scale = units[label].size if per_length else 1.0
@@ -265,20 +232,17 @@ def _draw_side(
     ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str, scale: float
 ) -> None:
     medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
-    style: dict[str, Any] = {"color": color, "alpha": 0.75, "lw": 0.3, "ec": "w"}
+    look: dict[str, Any] = {"color": color, "alpha": 0.75, "lw": 0.3, "ec": "w"}
     for k in range(len(medians)):
-        values, density = _coarse(data.isel(station=k), quantity)
+        station = data.isel(station=k)
+        count, edges = station[f"{quantity}_count"].values, station[f"{quantity}_edge"].values
+        used = np.flatnonzero(count)
+        first, last = used[0], used[-1] + 1
+        # fewer bins, between the smallest and the largest value
+        ends = np.unique(np.linspace(first, last, _COARSE + 1).astype(int))
+        density = np.add.reduceat(count[:last], ends[:-1]) / np.diff(edges[ends])
+        values = (edges[ends[:-1]] + edges[ends[1:]]) / 2
         reach = 0.46 * density / density.max()
         low, high = (k - reach if side <= 0 else k), (k + reach if side >= 0 else k)
-        ax.fill_betweenx(values * scale, low, high, label=None if k else label, **style)
+        ax.fill_betweenx(values * scale, low, high, label=None if k else label, **look)
     ax.plot(np.arange(len(medians)) + 0.1 * side, medians, ".", color="k", ms=3, zorder=3)
-
-
-def _coarse(data: xr.Dataset, quantity: str) -> tuple[Array, Array]:
-    """Centers of fewer bins, between the smallest and largest value, and counts per width."""
-    count, edges = data[f"{quantity}_count"].values, data[f"{quantity}_edge"].values
-    used = np.flatnonzero(count)
-    first, last = used[0], used[-1] + 1
-    ends = np.unique(np.linspace(first, last, _COARSE + 1).astype(int))
-    sums = np.add.reduceat(count[:last], ends[:-1])
-    return (edges[ends[:-1]] + edges[ends[1:]]) / 2, sums / np.diff(edges[ends])

@@ -21,15 +21,15 @@ from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
+from softreach.support.units import LengthUnit, as_unit, in_lengths
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-DPI = 250
-"""Pixels per inch of images inside figures, and of saved PNG files."""
-
+Unit = str | LengthUnit | None  # one asked for, "m", "cm", "mm" or "L"; None for L if known, else m
+DPI = 250  # pixels per inch of images inside figures, and of saved PNG files
 _RC: dict[str, Any] = {
     "figure.facecolor": "white",
     "axes.facecolor": "white",
@@ -57,17 +57,11 @@ LENGTH = POSITIVE._replace(unit="m")
 PLACE = Range(unit="m")
 SIZE = Range(0.0, 1e3, "pixels", open_low=True)
 WIDTH = Range(1.0, 100.0, "inches")
-PAGE = 6.9
-"""Width of figures of several panels, a page's [inch]."""
+PAGE = 6.9  # width of figures of several panels, a page's [inch]
 
 
 def pyplot() -> Any:
-    """matplotlib.pyplot, loaded at first use.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-        InvalidInput: The environment names a backend that it does not have.
-    """
+    """matplotlib.pyplot, loaded at first use."""
     try:
         from matplotlib import pyplot as plt
 
@@ -75,9 +69,8 @@ def pyplot() -> Any:
     except ModuleNotFoundError as error:
         raise MissingExtra("matplotlib") from error
     except ValueError as error:  # of a backend that does not exist
-        backend = os.environ.get("MPLBACKEND", "")
-        allowed = "a backend of matplotlib"
-        raise InvalidInput("MPLBACKEND", backend, allowed, "unset it or use agg") from error
+        known = ("a backend of matplotlib", "unset it or use agg")
+        raise InvalidInput("MPLBACKEND", os.environ.get("MPLBACKEND", ""), *known) from error
     return plt
 
 
@@ -122,32 +115,21 @@ def place_panels(
     around: tuple[float, float, float, float],
     gaps: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Figure, NDArray[np.object_]]:
-    """A figure of panels at one scale, shape (rows, columns).
+    """A figure of a width [inch], and its panels at one scale, shape (rows, columns).
 
-    Args:
-        width: Of the figure [inch].
-        columns: What each shows in width, from left to right, in one unit with the rows.
-        rows: What each shows in height, from top to bottom.
-        around: Left, right, bottom and top of all panels [inch].
-        gaps: Between columns, and between rows [inch].
+    Columns and rows are what each shows in width and in height, in one unit; `around` is the room
+    at the left, right, bottom and top, and `gaps` that between columns and between rows [inch].
     """
     (left, right, bottom, top), (beside, between) = around, gaps
     scale = (width - left - right - beside * (len(columns) - 1)) / sum(columns)
     wide, high = scale * sum(columns), scale * sum(rows)
     height = bottom + high + between * (len(rows) - 1) + top
+    place = {"left": left / width, "right": 1 - right / width}
+    place |= {"bottom": bottom / height, "top": 1 - top / height}
+    place |= {"wspace": beside * len(columns) / wide, "hspace": between * len(rows) / high}
     figure = new_figure(figsize=(width, height))
-    grid = figure.add_gridspec(
-        len(rows),
-        len(columns),
-        height_ratios=rows,
-        width_ratios=columns,
-        left=left / width,
-        right=1 - right / width,
-        bottom=bottom / height,
-        top=1 - top / height,
-        wspace=beside * len(columns) / wide,
-        hspace=between * len(rows) / high,
-    )
+    ratios = {"height_ratios": rows, "width_ratios": columns}
+    grid = figure.add_gridspec(len(rows), len(columns), **ratios, **place)
     return figure, grid.subplots(squeeze=False)
 
 
@@ -241,3 +223,22 @@ def as_box(name: str, value: Any) -> Array:
     if rising and np.isfinite(corners).all():
         return corners
     raise InvalidInput(name, corners.tolist(), allowed)
+
+
+def unit_of(data: xr.Dataset | xr.DataArray, unit: Unit = None) -> LengthUnit:
+    """The unit of lengths on paper for data, whose attributes may say how long the arm is [m]."""
+    length = data.attrs.get("length")
+    return unit_for(None if length is None else float(length), unit)
+
+
+def unit_for(length: float | None, unit: Unit = None) -> LengthUnit:
+    """The unit asked for, else L of an arm of that length [m], else the meter."""
+    return in_lengths(length) if unit is None else as_unit(unit, length)
+
+
+def common_unit(units: list[LengthUnit]) -> LengthUnit:
+    """Any of them, if all are L or all are of one size, so that they may share axes."""
+    if len({unit.name for unit in units}) != 1:
+        what = "some with and some without attrs['length']" if units else "none"
+        raise InvalidInput("data", what, "one or more, all with attrs['length'] or all without")
+    return units[0]

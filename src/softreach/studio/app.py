@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from contextlib import suppress
-from typing import TYPE_CHECKING, Self
+from contextlib import AbstractContextManager, suppress
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from softreach.studio.scene.camera import UPRIGHT, VIEWS
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.tabs import JOBS, furnish
-from softreach.studio.work import CompilationWatch, Latest, StaleCheck
+from softreach.studio.work import CompilationWatch, Latest
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _GOES_ON = "This goes on where the last work on it ended; Reset leads back to th
 _PATIENCE = 3.0  # [s] for tabs that are closed
 
 
-class Studio:
+class Studio(AbstractContextManager["Studio"]):
     """A local page on a design; every tab has its own state."""
 
     def __init__(
@@ -55,8 +55,10 @@ class Studio:
         self.start, self._token, self.work = start, token, work
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
-        self._notice = Latest(lambda _: None)  # a tab that hears of it may be gone
-        self._compilation = CompilationWatch(self._compiling)
+        notice = Latest(lambda _: None)  # a tab that hears of it may be gone
+        show = lambda _: [session.show() for session in [*self.sessions.values()]]
+        # on another thread: the one that calls holds the compiler's lock
+        self._compilation = CompilationWatch(lambda: notice.submit(show))
         self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
         self.server = serve.start_server(host, port, token)
@@ -90,30 +92,15 @@ class Studio:
             time.sleep(0.02)
         serve.stop_server(self.server)
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.stop()
 
-    def _compiling(self) -> None:
-        """Notify every tab, on another thread: this one holds the compiler's lock."""
-
-        def show(_: StaleCheck) -> None:
-            for session in [*self.sessions.values()]:
-                session.show()
-
-        self._notice.submit(show)
-
     def _connected(self, client: ClientHandle) -> None:
-        watch = self._compilation
-        session = Session(client, self.start, JOBS, work=self.work, compilation=watch)
         self._libraries.join()
-        left = None if self.work is None else self.work.latest
+        watch, left = self._compilation, self.work and self.work.latest
+        session = Session(client, self.start, JOBS, work=self.work, left=left, compilation=watch)
         with self._lock:
             self.sessions[client.client_id] = session
-        if left is not None:
-            session.take_up(left)
         furnish(session)
         client.camera.on_update(lambda _: session.follow("camera"))
         session.begin()

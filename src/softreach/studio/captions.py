@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
+from softreach.studio.found import Found
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.reach import shown_samples
+from softreach.studio.reach import Reach, Size, shown_samples
 from softreach.studio.scene.colors import FAINT
 from softreach.studio.scene.scene import shows_cloud
+from softreach.studio.state import Appearance, StudioState
 from softreach.support.units import LengthUnit, as_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from softreach.arm.manipulator import Manipulator
-    from softreach.studio.found import Found
-    from softreach.studio.reach import Reach, Size
-    from softreach.studio.state import Appearance
 
 UNREACHABILITY = (
     "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
@@ -94,10 +89,7 @@ def reach_text(reach: Reach, share: str = "") -> list[Part]:
 
 
 def legend_text(reach: Reach, *, free: bool) -> list[Part]:
-    """Legend of the marks: how many samples of a loaded arm have each, or are left out.
-
-    The reach without loads may be shown, too.
-    """
+    """Legend of the marks: how many samples of a loaded arm have each, or are left out."""
     if reach.arm.loads is None:
         return []
     parts: list[Part] = []
@@ -141,15 +133,16 @@ def loaded_share(found: Found, design: Manipulator) -> str:
     return f" under loads, {share} of {whole} without"
 
 
-def tip_text(found: Found, design: Manipulator) -> list[Part]:
+def tip_text(state: StudioState, found: Found) -> list[Part]:
     """Place and direction of the tip, and whether a loaded arm rests there."""
-    parts: list[Part] = []
+    texts = []
     if found.tip is not None:
+        place = place_text(found.tip, state.design, 6)
         pointing = ", ".join(f"{x + 0.0:.3f}" for x in np.round(found.pointing, 3))
-        parts.append(f"tip at {place_text(found.tip, design, 6)}, pointing along ({pointing})")
+        texts.append(f"tip at {place}, pointing along ({pointing})")
     if found.posture is not None:
-        parts.append(f"{' · ' if parts else ''}{_POSTURES[found.posture]}")
-    return parts
+        texts.append(_POSTURES[found.posture])
+    return [" · ".join(texts)] if texts else []
 
 
 def _percent(share: float) -> str:

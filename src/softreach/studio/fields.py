@@ -1,8 +1,7 @@
 """Fields of a tab: a panel declares once what it shows of the state and of what is known.
 
-What is declared names what it follows, as jobs do: "design" or "appearance.slice" of the state,
-"found.tip" of what is known, "tab.busy" of the session. It is shown again where that is another
-object. Fields are bound both ways: they follow the state, and write what a person changes into it.
+What is declared names what it follows: "design" or "appearance.slice" of the state, "found.tip" of
+what is known, "tab.busy" of the session. Fields also write what a person changes into the state.
 """
 
 from __future__ import annotations
@@ -11,28 +10,27 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from operator import attrgetter, is_
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part
+from softreach.studio.session import Session
 from softreach.studio.state import LARGEST, StudioState
-from softreach.studio.widgets import Line, Slider, TextKind, TypedField, number_kind, unit_in
+from softreach.studio.widgets import Ends, Line, Slider, TextKind, TypedField, number_kind, unit_in
 from softreach.support.errors import SoftreachError
 from softreach.support.files.text import text_of
 
-if TYPE_CHECKING:
-    from softreach.studio.session import Session
-
 Action = Callable[[], object]
 Change = Callable[[StudioState], StudioState]
-Options = Callable[[StudioState], Mapping[Any, str]]
+Names = Mapping[Any, str]
+Options = Callable[[StudioState], Names]
 Kind = Callable[[str, Callable[[], float]], TextKind]
 """What is typed, by its unit and by L [m], which may be typed as one."""
-Shown = Callable[[StudioState, Found], Any]
-"""Something of the state and of what is known."""
-
-GRAY: Any = {"color": "gray"}
-"""Looks of a button that is not the first of its group."""
+Build = Callable[["Fields", Any], object]  # declares fields for a key
+Shown = Callable[[StudioState, Found], Any]  # something of the state and of what is known
+Where = Shown | str
+"""True where something is shown, or the path of what is true there; "" for everywhere."""
+GRAY: Any = {"color": "gray"}  # looks of a button that is not the first of its group
 
 
 class Attribute(NamedTuple):
@@ -45,32 +43,29 @@ class Attribute(NamedTuple):
 
 def attribute(path: str) -> Attribute:
     """The value at a path in the state, such as "appearance.slice.center"."""
-    names = path.split(".")
-    return Attribute(attrgetter(path), lambda state, value: _with(state, names, value))
+    name, _, rest = path.partition(".")
+    part = attribute(rest) if rest else None
 
+    def write(owner: Any, value: Any) -> Any:
+        return replace(owner, **{name: part.write(getattr(owner, name), value) if part else value})
 
-def _with(owner: Any, names: list[str], value: Any) -> Any:
-    first, *rest = names
-    return replace(owner, **{first: _with(getattr(owner, first), rest, value) if rest else value})
+    return Attribute(attrgetter(path), write)
 
 
 def of_design(read: Callable[[Any], Any], write: Callable[[Any, Any], Any]) -> Attribute:
     """A value of the design, and the design with another one."""
-    return Attribute(
-        lambda state: read(state.design),
-        lambda state, value: state.replace(design=write(state.design, value)),
-    )
+    made = lambda state, value: state.replace(design=write(state.design, value))
+    return Attribute(lambda state: read(state.design), made)
 
 
 class Fields:
     """Widgets of a panel. A refused value stays in its field, and the reason stands below it."""
 
-    def __init__(self, session: Session, words: Callable[[SoftreachError], str] = str) -> None:
-        """Begin without a widget; `words` says a refusal in words."""
+    def __init__(self, session: Session) -> None:
         self.session, self.gui = session, session.client.gui
         self.message: Line | None = None
         """Where refusals of widgets stand that have no line of their own; else above all tabs."""
-        self.words = words
+        self.words: Callable[[SoftreachError], str] = str  # says a refusal in words
         self._followers: list[list[Any]] = []
         """Each reads what it follows, what that was when it was shown last, and shows it."""
         self._anew: list[Callable[[], Fields]] = []
@@ -117,10 +112,8 @@ class Fields:
         self.follow(*paths, show=lambda state, found: line.show(content(state, found)))
 
     @contextmanager
-    def folder(
-        self, label: str, shown: Shown | str = "", *, expanded: bool = True
-    ) -> Iterator[Any]:
-        """A folder for what is declared inside the block, shown as `button` is."""
+    def folder(self, label: str, shown: Where = "", *, expanded: bool = True) -> Iterator[Any]:
+        """A folder for what is declared inside the block."""
         folder = self._seen_where(self.gui.add_folder(label, expand_by_default=expanded), shown)
         self._depth += 1
         with folder:
@@ -128,18 +121,9 @@ class Fields:
         self._depth -= 1
 
     def anew(
-        self,
-        label: str,
-        *paths: str,
-        key: Shown = lambda *_: object(),
-        build: Callable[[Fields, Any], object],
-        words: Callable[[SoftreachError], str] = str,
-        **looks: Any,
+        self, label: str, *paths: str, key: Shown = lambda *_: object(), build: Build, **looks: Any
     ) -> None:
-        """A folder whose fields are made anew where their key differs.
-
-        By default that is whenever what stands at one of the paths is another object.
-        """
+        """A folder whose fields are made anew where their key differs, by default always."""
         fields, known = Fields(self.session), object()
         with self.folder(label, **looks) as folder:
             pass
@@ -148,7 +132,7 @@ class Fields:
             nonlocal fields, known
             if (now := key(state, found)) != known:
                 fields.remove()
-                fields, known = Fields(self.session, words), now
+                fields, known = Fields(self.session), now
                 with folder:
                     build(fields, now)
 
@@ -159,63 +143,47 @@ class Fields:
         """Add a check box."""
         return self.bind(self.gui.add_checkbox(label, self._read(at), hint=hint), at)
 
-    def dropdown(
-        self, label: str, options: Mapping[Any, str] | Options, at: Attribute, hint: str
-    ) -> Any:
+    def dropdown(self, label: str, options: Names | Options, at: Attribute, hint: str) -> Any:
         """Add a menu; options say what each value is called, if need be in each state."""
         offered = options if callable(options) else lambda _: options
         names = offered(self.session.state)
-        widget = self.gui.add_dropdown(
-            label, tuple(names.values()), initial_value=names[self._read(at)], hint=hint
-        )
+        labels, shown = tuple(names.values()), names[self._read(at)]
+        widget = self.gui.add_dropdown(label, labels, initial_value=shown, hint=hint)
         return self.bind(widget, at, offered)
 
-    def slider(
-        self, label: str, ends: tuple[float, float], step: float, at: Attribute, hint: str
-    ) -> Slider:
+    def slider(self, label: str, ends: Ends, step: float, at: Attribute, hint: str) -> Slider:
         """Add a slider beside a field for the same number."""
-        kind = number_kind(unit_in(label), self._length)
+        kind = self._kind(number_kind, label)
         return self.bind(Slider(self.gui, label, ends, step, self._read(at), hint, kind), at)
 
     def typed(self, label: str, at: Attribute, hint: str, kind: Kind = number_kind) -> TypedField:
         """Add a field for a number, or for what else is typed."""
-        of_unit = kind(unit_in(label), self._length)
+        of_unit = self._kind(kind, label)
         return self.bind(TypedField(self.gui, label, self._read(at), hint, of_unit), at)
 
     def steps(
-        self,
-        label: str,
-        *paths: str,
-        at: Callable[[StudioState, Found], tuple[int, int]],
-        move: Callable[[int], object],
-        hint: str,
+        self, label: str, *paths: str, at: Shown, move: Callable[[int], object], hint: str
     ) -> None:
         """Add a slider over whole numbers, whose value and last number follow."""
         slider, session = self.kept(self.gui.add_slider(label, 0, 1, 1, 0, hint=hint)), self.session
 
         def show(state: StudioState, found: Found) -> None:
             value, last = at(state, found)
-            slider.max = max(last, 1)
-            if slider.value != value:
-                slider.value = value
+            slider.max, slider.value = max(last, 1), value
 
         last = lambda: at(session.state, session.found)[1]
         slider.on_update(self._by_hand(lambda: move(min(int(slider.value), last()))))
         self.follow(*paths, show=show)
 
-    def button(
-        self, label: str, action: Action, hint: str, shown: Shown | str = "", **looks: Any
-    ) -> Any:
-        """Add a button that acts; it is there where `shown`, or what is at that path, is true."""
+    def button(self, label: str, act: Action, hint: str, shown: Where = "", **looks: Any) -> Any:
+        """Add a button that acts."""
         button = self._seen_where(self.gui.add_button(label, hint=hint, **looks), shown)
-        button.on_click(lambda _: attempt(self.session, action))
+        button.on_click(lambda _: attempt(self.session, act))
         return button
 
-    def change(
-        self, label: str, change: Change, hint: str, shown: Shown | str = "", **looks: Any
-    ) -> Any:
+    def change(self, label: str, to: Change, hint: str, shown: Where = "", **looks: Any) -> None:
         """Add a button that changes the state."""
-        return self.button(label, lambda: self.apply(change), hint, shown, **looks)
+        self.button(label, lambda: self.apply(to), hint, shown, **looks)
 
     def choices(self, label: str, actions: Mapping[str, Action], hint: str) -> None:
         """Add a row of buttons."""
@@ -228,11 +196,9 @@ class Fields:
         button.on_upload(lambda _: attempt(self.session, lambda: read(button.value)))
 
     def bind(self, widget: Any, at: Attribute, options: Options | None = None) -> Any:
-        """Bind a widget, and return it.
-
-        Events run at once and in any order: each reads what the widget holds by then, so that the
-        last one has it right. Widgets that we set ourselves also send events, without a client.
-        """
+        """Bind a widget, and return it."""
+        # Events run at once and in any order: each reads what the widget holds by then, so that the
+        # last one has it right. Widgets that we set ourselves also send events, without a client.
         binding = _Binding(self.session, widget, at, options)
         act = self.session.learn if at.of == "found" else lambda change: self.apply(change, widget)
         widget.on_update(self._by_hand(lambda: act(binding.write)))
@@ -240,14 +206,9 @@ class Fields:
         self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
         return self.kept(widget)
 
-    def _by_hand(self, action: Action) -> Callable[[Any], None]:
+    def _by_hand(self, action: Action) -> Callable[[Any], object]:
         """What acts where a person moved a widget, and not where the program did."""
-
-        def moved(event: Any) -> None:
-            if event.client_id is not None:
-                attempt(self.session, action)
-
-        return moved
+        return lambda event: event.client_id is not None and attempt(self.session, action)
 
     def apply(self, change: Change, widget: Any = None) -> None:
         """Change the state, or say below the widget why that cannot be."""
@@ -268,12 +229,11 @@ class Fields:
                 for binding in self._bindings:  # what was refused is given up
                     binding.follow(anyway=True)
 
+    def _kind(self, kind: Kind, label: str) -> TextKind:
+        return kind(unit_in(label), lambda: self.session.state.design.length)
+
     def _read(self, at: Attribute) -> Any:
         return at.read(getattr(self.session, at.of))
-
-    def _length(self) -> float:
-        """L [m], which may be typed as a unit."""
-        return self.session.state.design.length
 
     def kept(self, widget: Any) -> Any:
         """Take this widget away with the others; return it."""
@@ -281,15 +241,13 @@ class Fields:
             self._widgets.append(widget)
         return widget
 
-    def _seen_where(self, widget: Any, shown: Shown | str) -> Any:
+    def _seen_where(self, widget: Any, shown: Where) -> Any:
         def follow(state: StudioState, found: Found) -> None:
-            if widget.visible != (wanted := bool(at(state, found))):
-                widget.visible = wanted
+            widget.visible = bool(at(state, found))
 
         if shown:
-            at = (
-                shown if callable(shown) else lambda *_: attrgetter(in_session(shown))(self.session)
-            )
+            value = lambda path: attrgetter(in_session(path))(self.session)
+            at = shown if callable(shown) else lambda *_: value(shown)
             self.follow("state", "found", show=follow)
         return self.kept(widget)
 
@@ -338,9 +296,5 @@ def attempt(session: Session, action: Action) -> None:
 
 
 def file_text(name: str, content: bytes) -> str:
-    """The text in a file that a person opens; `name` is what errors call it.
-
-    Raises:
-        InvalidInput: It is too large, or no text.
-    """
+    """The text in a file that a person opens; `name` is what errors call it."""
     return text_of("file", name, content, LARGEST)

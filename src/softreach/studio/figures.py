@@ -14,13 +14,14 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, plane_of
-from softreach.plot.sets import plot_slice
+from softreach.plot.reach import plot_slice
 from softreach.studio import markup
 from softreach.studio.reach import Quality, Reach, exact_set
 from softreach.studio.shown_parameters import ShownParameter, known_parameters, slider_parameters
 from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.widgets import unit_in
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
 from softreach.support.parallel import undivided
 from softreach.support.quantity import quantity
@@ -30,14 +31,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
-
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
 _LINE, _HERE = "#2f6db5", "#d9731a"
 _INK = "#7d848b"  # legible on white and on black
 _WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
 _VALUES = 9  # of the parameter, beside that of the design
 _SECONDS = 10.0  # [s] for each volume
+PART = 0.01  # part of the range of a slider over which the change of the volume is told
+NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)  # room for a bar
+Swept = Iterator[tuple[float, float | None]]
+_FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
 class Picture(NamedTuple):
@@ -70,15 +73,8 @@ def _pixels(ax: Axes) -> NDArray[np.uint8]:
     return np.array(canvas.buffer_rgba())
 
 
-# The section of the reachable set by the plane of the slice.
-
-
 def section_curves(reach: Reach, cut: Slice) -> list[Array]:
-    """The boundary of the reachable set in the middle plane of a slice [L], curves (n, 3).
-
-    Raises:
-        InvalidInput: There is no exact set with a surface.
-    """
+    """The boundary of a reachable set in the middle plane of a slice [L], curves (n, 3)."""
     if reach.exact is None or reach.exact.dimension < 2:
         raise InvalidInput("section", reach.refusal or "no volume", "a set with a surface to cut")
     plane, length = _plane(cut, reach.arm), reach.arm.length
@@ -88,13 +84,7 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
 
 
 def section_picture(reach: Reach, cut: Slice) -> Picture:
-    """The section and how many activations reach each place, in the unit of the arm.
-
-    It is by the middle plane of the slice; without one by that across y at the base.
-
-    Raises:
-        InvalidInput: As `section_curves`.
-    """
+    """Section and multiplicity by the plane of a slice; without one across y at the base."""
     from matplotlib.path import Path
 
     arm, plane = reach.arm, _plane(cut, reach.arm)
@@ -143,10 +133,7 @@ def _described(curves: list[Array], plane: Slice, arm: Manipulator) -> str:
 
 
 def enclosed_area(curves: list[Array], axis: int) -> float:
-    """Area within closed curves in a plane across an axis, holes left out.
-
-    A curve bounds a hole if an odd number of the others surround it.
-    """
+    """Area within closed curves in a plane across an axis, holes left out."""
     from matplotlib.path import Path
 
     flat = [np.delete(curve, axis, axis=1) for curve in curves]
@@ -158,50 +145,40 @@ def enclosed_area(curves: list[Array], axis: int) -> float:
     return total
 
 
-# The volume over the range of one slider.
-
-
 def swept_parameter(state: StudioState) -> ShownParameter | None:
     """The parameter that is chosen, the first for an unknown one; None if there is none."""
     sliders = {slider.name: slider for slider in slider_parameters(state.design)}
     return sliders.get(state.appearance.swept) or next(iter(sliders.values()), None)
 
 
-def sweep_pictures(
-    arm: Manipulator, parameter: ShownParameter, quality: Quality
-) -> Iterator[Picture]:
+def sweep_pictures(arm: Manipulator, slider: ShownParameter, quality: Quality) -> Iterator[Picture]:
     """Volumes over the range of a slider, from the design's own value outwards, ever more."""
     unit, known = arm.length_unit, dict[float, float | None]()
-    for value, volume in swept_volumes(arm, parameter, quality):
+    for value, volume in swept_volumes(arm, slider, quality):
         known[value] = volume
         volumes = {each: known[each] for each in sorted(known) if known[each] is not None}
         ax = _axes(3.0)
         ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
-        ax.axvline(parameter.shown, color=_HERE, lw=1.2, ls="--")
-        ax.set(xlabel=parameter.label, ylabel=unit.label("V", 3), xlim=parameter.limits)
-        here, missing = volumes.get(parameter.shown), len(known) - len(volumes)
-        text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {parameter.shown:g}"
+        ax.axvline(slider.shown, color=_HERE, lw=1.2, ls="--")
+        ax.set(xlabel=slider.label, ylabel=unit.label("V", 3), xlim=slider.limits)
+        here, missing = volumes.get(slider.shown), len(known) - len(volumes)
+        text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {slider.shown:g}"
         if missing:
             text += f" · {missing} values make no design or take too long"
         yield Picture(arm, _pixels(ax), text)
 
 
-def swept_volumes(
-    arm: Manipulator, parameter: ShownParameter, quality: Quality
-) -> Iterator[tuple[float, float | None]]:
-    """Values of a slider over its range, what is nearest to the present one first, and volumes.
-
-    The volume [m³] is None where there is no design, or one that takes too long.
-    """
-    low, high = parameter.limits
+def swept_volumes(arm: Manipulator, slider: ShownParameter, quality: Quality) -> Swept:
+    """Values of a slider, nearest to its own first, and volumes [m³]; None where none is known."""
+    low, high = slider.limits
     even = np.linspace(low, high, _VALUES)
-    steps = np.clip(low + np.round((even - low) / parameter.step) * parameter.step, low, high)
-    values = {round(float(value), 9) for value in steps} | {parameter.shown}
-    for value in sorted(values, key=lambda value: abs(value - parameter.shown)):
+    steps = np.clip(low + np.round((even - low) / slider.step) * slider.step, low, high)
+    values = {round(float(value), 9) for value in steps} | {slider.shown}
+    for value in sorted(values, key=lambda value: abs(value - slider.shown)):
         check_wanted()
         volume = None
         with suppress(SoftreachError, OverBudget, MemoryError):
-            design = changed(arm, {parameter.name: value * parameter.scale})
+            design = changed(arm, {slider.name: value * slider.scale})
             volume = _volume(design, quality.coarse_accuracy, quality.tol)
         yield value, volume
 
@@ -211,16 +188,6 @@ def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
     with all_cores:
         solvable_rod(design)
         return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
-
-
-# Bars under the sliders: change of the reachable volume by each, on one scale for all of them.
-
-
-PART = 0.01
-"""Part of the range of a slider over which the change of the volume is told."""
-NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)
-"""Room for a bar."""
-_FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
 class Slope(NamedTuple):
@@ -235,15 +202,11 @@ class VolumeSlopes(NamedTuple):
 
     arm: Manipulator
     volume: float  # [m³]
-    slopes: Mapping[str, Slope]
-    """By names of parameters; none where there is no volume, or loads tear the set."""
+    slopes: Mapping[str, Slope]  # by names of parameters; none without a volume that is whole
 
 
 def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSlopes:
-    """Slopes of a design whose set is known, for as many sliders as can be moved continuously.
-
-    The check is called often, and raises to stop.
-    """
+    """Slopes of a design whose set is known, for all sliders that move continuously."""
     arm, solid, known = reach.arm, reach.exact, known_parameters(reach.arm)
     slopes = dict[str, Slope]()
     if solid is None or solid.dimension < 3 or not solid.volume > 0:
@@ -272,10 +235,7 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
 def slope_bars(
     found: VolumeSlopes, sliders: Mapping[str, tuple[ShownParameter, float]], *, old: bool
 ) -> dict[str, str]:
-    """A bar for each slider as HTML: by how much V changes over `PART` of its range.
-
-    Sliders are by names of parameters, with their ranges; old bars are of the design before.
-    """
+    """A bar for each slider as HTML: by how much V changes over `PART` of its range."""
     part = {name: PART * ends for name, (_, ends) in sliders.items() if name in found.slopes}
     percent = {name: 100 * step / found.volume for name, step in part.items()}  # per ∂V/∂p
     changes = {name: per * found.slopes[name].value for name, per in percent.items()}

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.calibration.calibration import Calibration
+from softreach.calibration.measurements import Measurements
+from softreach.inverse import Solution
+from softreach.inverse.drag import Drag, Dragged
+from softreach.plot.coloring import BundleKey, ScalarKey
+from softreach.requirements import Check
 from softreach.rod.tip_map import TipStatus
+from softreach.studio.figures import Picture, VolumeSlopes
+from softreach.studio.reach import Reach
 from softreach.studio.state import StudioState
+from softreach.support.arrays import Array
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from softreach.calibration.calibration import Calibration
-    from softreach.calibration.measurements import Measurements
-    from softreach.inverse import Solution
-    from softreach.inverse.drag import Drag, Dragged
-    from softreach.plot.coloring import BundleKey, ScalarKey
-    from softreach.requirements import Check
-    from softreach.studio.figures import Picture, VolumeSlopes
-    from softreach.studio.reach import Reach
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -34,22 +32,17 @@ class Found:
 
     reach: Reach | None = None  # of the design
     refusal: str = ""  # reason why nothing can be computed of the design
-    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Ends of the sliders of a design, by the names of their parameters."""
+    ends: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of its sliders, by name
     slopes: VolumeSlopes | None = None  # change of its volume by each slider
     free: Reach | None = None  # reach of a loaded design without its loads
     reference: Reach | None = None  # reach of the design that is kept
     key: BundleKey | ScalarKey | None = None  # to the colors of cloud or surface
-    tip: Array | None = None
-    """Place of the tip [L]; None before it is known, and without equilibrium."""
+    tip: Array | None = None  # its place [L]; None before it is known, and without an equilibrium
     pointing: Array = field(default_factory=lambda: np.full(3, np.nan))  # direction d3 of the tip
-    posture: TipStatus | None = None
-    """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
+    posture: TipStatus | None = None  # of a loaded arm in its activation; None without loads
     answer: Solution | None = None  # every activation that reaches the target
-    takes_nearest: bool = False
-    """True if the arm moves to the nearest of them, as after a click or a typed target."""
-    pull: Pull | None = None
-    """The latest order of a person who drags the tip; None once it is followed to its end."""
+    takes_nearest: bool = False  # true if the arm moves to the nearest of them, as after a click
+    pull: Pull | None = None  # latest order of who drags the tip; None once it is followed
     drag: Drag | None = None  # what follows a dragged tip of the design
     lag: Lag | None = None  # how far the arm lags behind the pointer; None when nobody drags
     held: tuple[Manipulator, Dragged] | None = None  # an arm, and how the last drag left it
@@ -80,6 +73,7 @@ class Known(NamedTuple):
     found: Found
 
 
+@cache
 def in_session(path: str) -> str:
     """Place of "design" of a state, "found.tip" of what is known or "tab.busy" in a session."""
     root, _, rest = path.partition(".")

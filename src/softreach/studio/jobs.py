@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,10 +14,10 @@ import numpy as np
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Found, Known, in_session
-from softreach.studio.reach import Reach, count_activations, shown_samples, stages
-from softreach.studio.scene.camera import is_behind
+from softreach.studio.reach import Quality, Reach, count_activations, shown_samples, stages
+from softreach.studio.scene.camera import TabCamera, is_behind
 from softreach.studio.scene.colors import shown_color
-from softreach.studio.scene.scene import shows_cloud
+from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.serve import theme
 from softreach.studio.shown_parameters import slider_ends
 from softreach.studio.state import StudioState, solvable_rod
@@ -27,9 +27,14 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-    from softreach.studio.reach import Quality
-    from softreach.studio.scene.camera import TabCamera
-    from softreach.studio.scene.scene import Scene
+_SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
+_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
+_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
+_LEVEL = 16  # of the cloud of another design
+DESIGN = "design design.display_unit"  # equal designs may be shown in other units
+News = Mapping[str, Any] | Callable[[Found], Found]
+"""Fields of `Found` and their new values, or the next `Found` from the one before."""
+Results = Iterator["Learned"]
 
 
 class Given(NamedTuple):
@@ -48,14 +53,9 @@ class Given(NamedTuple):
 class Learned(NamedTuple):
     """One result of a job."""
 
-    found: Mapping[str, Any] | Callable[[Found], Found] | None = None
-    """Fields of `Found` and their new values, or the next `Found` from the one before."""
-    change: Callable[[StudioState], StudioState] | None = None
-    """Change of the state that comes of it, such as that of an arm that follows its tip."""
+    found: News | None = None
+    change: Callable[[StudioState], StudioState] | None = None  # of the state that comes of it
     ends_step: bool = False  # true if the next change is another step for who undoes it
-
-
-Results = Iterator[Learned]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,33 +71,25 @@ class Job:
     draw: Callable[[Given], Mapping[str, Any] | None] = lambda _: None
     """Draws what is known after each result, and takes away what is not; returns what follows only
     from drawing, as fields of `Found`."""
-    wanted: str = ""
-    """Attribute that is false where it is of no use; it is done once more when that begins."""
-    makes: str = ""
-    """Fields of `Found`, beside that of its name, that are forgotten where the work fails."""
-    draws: str = ""
-    """Nodes of the scene, beside that of its name, that are taken away then."""
+    wanted: str = ""  # attribute that is false where it is of no use; it is done once more then
+    makes: str = ""  # fields of `Found`, beside that of its name, that are forgotten where it fails
+    draws: str = ""  # nodes of the scene, beside that of its name, that are taken away then
     at_once: bool = True
     """True if the page gets all of a drawing together; it would hear of nothing else meanwhile, so
     that what computes while it draws is sent piece by piece."""
-    doing: str = ""
-    """What the reader is shown meanwhile."""
+    doing: str = ""  # what the reader is shown meanwhile
 
-    @cached_property
-    def _deciding(self) -> Callable[[Known], tuple[Any, ...]]:
-        return attrgetter("__class__", *map(in_session, self.depends_on.split()))
-
-    @cached_property
-    def is_wanted(self) -> Callable[[Known], bool]:
+    def is_wanted(self, known: Known) -> bool:
         """True if its result is of use."""
-        return attrgetter(in_session(self.wanted)) if self.wanted else lambda _: True
+        return not self.wanted or bool(attrgetter(in_session(self.wanted))(known))
 
     def is_stale(self, old: Known, new: Known) -> bool:
         """True if a change decides another result: of what is known, any other object."""
-        was, wanted = bool(self.is_wanted(old)), bool(self.is_wanted(new))
+        was, wanted = self.is_wanted(old), self.is_wanted(new)
         if not (was and wanted):
             return was != wanted
-        pairs = zip(self._deciding(old), self._deciding(new), strict=True)
+        read = attrgetter("__class__", *map(in_session, self.depends_on.split()))
+        pairs = zip(read(old), read(new), strict=True)
         return any(a is not b and (isinstance(b, np.ndarray) or bool(a != b)) for a, b in pairs)
 
 
@@ -105,9 +97,6 @@ def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job
     """The jobs whose results a change makes stale; if all is new, those that are of use."""
     is_due = lambda job: job.is_wanted(new) if old is None else job.is_stale(old, new)
     return [job for job in jobs if job.depends_on and is_due(job)]
-
-
-# The reach of the design
 
 
 def _compute_reach(given: Given) -> Results:
@@ -120,7 +109,8 @@ def _compute_reach(given: Given) -> Results:
             return
     try:
         for reach in stages(state.design, level, given.quality, given.check, given.report):
-            _count_cloud(given, reach)
+            if shows_cloud(reach, state.appearance):
+                _count(given, reach)
             yield Learned({"reach": reach, "refusal": ""})
         return
     except InvalidInput as error:
@@ -133,21 +123,17 @@ def _compute_reach(given: Given) -> Results:
 
 
 def _color_cloud(given: Given) -> Results:
-    _count_cloud(given, given.found.reach)
+    reach = given.found.reach
+    if reach is not None and shows_cloud(reach, given.state.appearance):
+        _count(given, reach)
     yield Learned()
 
 
-def _count_cloud(given: Given, reach: Reach | None) -> None:
-    if reach is not None and shows_cloud(reach, given.state.appearance):
-        _count(reach, given)
-
-
-def _count(reach: Reach, given: Given) -> None:
+def _count(given: Given, reach: Reach) -> None:
     """Count the activations of what is shown, where its colors say them."""
     look = given.state.appearance
     if reach.fine and shown_color(reach.arm, look.color) == "multiplicity":
-        rows = shown_samples(reach, look.level)
-        count_activations(reach, rows, given.check, given.report)
+        count_activations(reach, shown_samples(reach, look.level), given.check, given.report)
 
 
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
@@ -160,9 +146,6 @@ def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
     return {"key": key} if shows_cloud(reach, look) or not look.surface else None
 
 
-_SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
-
-
 def _color_surface(given: Given) -> Results:
     reach, look = given.found.reach, given.state.appearance
     if reach is not None and look.surface and reach.has_surface:
@@ -171,46 +154,32 @@ def _color_surface(given: Given) -> Results:
         if look.cloud:
             reach.sheets  # noqa: B018  slow the first time
         else:
-            _count(reach.boundary, given)
+            _count(given, reach.boundary)
     yield Learned()
 
 
 def _draw_surface(given: Given) -> Mapping[str, Any] | None:
-    if given.found.reach is None:
-        given.scene.remove("/surface")
-        return None
     key = given.scene.draw_surface(given.found.reach, given.state.appearance)
     return None if key is None else {"key": key}
 
 
 def _differentiate(given: Given) -> Results:
     design, check = given.state.design, given.check
-    reach = given.found.complete_reach(design)
-    if reach is not None:
+    if (reach := given.found.complete_reach(design)) is not None:
         yield Learned({"ends": slider_ends(design, given.found.ends, check)})
         yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
 def _cut(given: Given) -> Results:
-    reach = given.found.complete_reach(given.state.design)
-    if reach is not None:
+    if (reach := given.found.complete_reach(given.state.design)) is not None:
         given.report("cutting the reachable set")
         yield Learned({"section": section_picture(reach, given.state.appearance.slice)})
 
 
 def _sweep(given: Given) -> Results:
-    parameter = swept_parameter(given.state)
-    if parameter is not None:
+    if (parameter := swept_parameter(given.state)) is not None:
         for picture in sweep_pictures(given.state.design, parameter, given.quality):
             yield Learned({"sweep": picture})
-
-
-# The arm
-
-
-_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
-_LEVEL = 16  # of the cloud of another design
 
 
 def _draw_arm(given: Given) -> Mapping[str, Any]:
@@ -255,11 +224,8 @@ def _look(given: Given) -> None:
     scene.see_through_arm(found.sample is not None or hides)
 
 
-# The reach of another design: the one that is kept, or the present one without its loads
-
-
 def _compute_beside(given: Given, name: str) -> Results:
-    """Its reach, unless that is known; where the designs agree it is that of the present one."""
+    """The reach of the design that is kept, or of the present one without its loads."""
     design, known = getattr(given.state, name), getattr(given.found, name)
     is_known = known is not None and known.fine and known.arm == design
     present = known if is_known else given.found.complete_reach(design)
@@ -290,7 +256,7 @@ SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
     Job(
         "reach",
-        "design design.display_unit appearance.level",
+        f"{DESIGN} appearance.level",
         _compute_reach,
         _draw_cloud,
         makes="key slopes",
@@ -323,7 +289,7 @@ SCENE_JOBS = (
         _cut,
         wanted="appearance.section",
     ),
-    Job("sweep", "design design.display_unit appearance.swept", _sweep, wanted="appearance.sweep"),
+    Job("sweep", f"{DESIGN} appearance.swept", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
     Job(

@@ -14,17 +14,13 @@ from typing import Self
 class Strong(str):
     """Text in bold."""
 
-    __slots__ = ()
-
 
 class Term(str):
     """Text in bold that explains itself when pointed at."""
 
-    __slots__ = ("meaning",)
     meaning: str
 
     def __new__(cls, text: str, meaning: str) -> Self:
-        """Text, and its meaning."""
         term = super().__new__(cls, text)
         term.meaning = meaning
         return term
@@ -33,10 +29,7 @@ class Term(str):
 class Swatch(str):
     """A little square of a color, as CSS has it or RGB from 0 to 255."""
 
-    __slots__ = ()
-
     def __new__(cls, color: str | tuple[int, int, int]) -> Self:
-        """The color, as CSS has it."""
         text = color if isinstance(color, str) else "rgb({},{},{})".format(*color)
         return super().__new__(cls, text)
 
@@ -65,11 +58,7 @@ def alert(text: str) -> str:
 
 
 def bar(share: float, text: str, meaning: str, *, faded: bool = False) -> str:
-    """A bar from the middle of its track under a slider, behind a text, as HTML.
-
-    The share is its length over that of half of the track, to the right for positive ones; the
-    meaning is shown when it is pointed at.
-    """
+    """A bar as HTML, as long as its share of half of the track, to the right if positive."""
     side, meaning = ("left" if share > 0 else "right"), html.escape(meaning)
     return (
         f'<div role="img" class="sr-bar" title="{meaning}" aria-label="{inline(text)}: {meaning}" '

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
-from softreach.picture.shading import vertex_normals
+from softreach.picture.zbuffer import vertex_normals
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.sampling import cube_blocks
 from softreach.studio.state import TOL, solvable_rod
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput, no_warnings
 from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.sheets import Sheets
@@ -27,12 +28,13 @@ from softreach.workspace.sheets import Sheets
 if TYPE_CHECKING:
     import xarray as xr
 
-Report = Callable[[str], object]
-"""Shows the reader what is being done."""
+Report = Callable[[str], object]  # shows the reader what is being done
 _quiet: Report = lambda doing: None
-
 _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
 _LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
+_PILOT = 512  # samples, by which the cost of one is measured
+_LOWEST = 10  # level below which a cloud shows no shape
+_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
 _BLOCK = 1 << 13  # targets solved at a time: a tenth of a second, after which others have a turn
 
 
@@ -42,16 +44,12 @@ class Quality:
 
     coarse_level: int = 16
     fine_level: int = 19
-    coarse_accuracy: float = 0.02
-    """Relative error allowed in the volume."""
+    coarse_accuracy: float = 0.02  # relative error allowed in the volume
     fine_accuracy: float = 0.003
-    tol: float = TOL
-    """Largest tip error, in L."""
-    coarse_seconds: float = 0.25
-    """Time for the first cloud of a loaded arm; it has fewer points if they cost more."""
+    tol: float = TOL  # largest tip error, in L
+    coarse_seconds: float = 0.25  # time for the first cloud of a loaded arm, which bounds its size
     fine_seconds: float = 5.0
-    most_seconds: float = 30.0
-    """Time for an exact set, before the studio does without it."""
+    most_seconds: float = 30.0  # time for an exact set, before the studio does without it
 
 
 class Size(NamedTuple):
@@ -74,8 +72,7 @@ class Reach:
     refusal: str = ""  # reason why there is no exact set
     notes: tuple[str, ...] = ()  # parts that are left out or coarser than wanted, and why
     wanted: int = 0  # number of samples; there are fewer where each costs much
-    order: NDArray[np.int64] | None = field(default=None, repr=False)
-    """An order whose prefixes are even subsamples, where the cloud's own is not."""
+    order: Index | None = None  # one whose prefixes are even subsamples, if the cloud's is not
 
     @property
     def samples(self) -> int:
@@ -115,7 +112,7 @@ class Reach:
         return np.where(lost, TipStatus.UNDECIDED, status).astype(np.int8)
 
     @cached_property
-    def counts(self) -> NDArray[np.float64]:
+    def counts(self) -> Array:
         """Number of activations at the place of each sample; NaN before `count_activations`."""
         return np.full(self.samples, np.nan)
 
@@ -132,14 +129,11 @@ class Reach:
 
     @cached_property
     def boundary(self) -> Reach:
-        """The same with the vertices of `sheets`, a little inside, in place of the samples.
-
-        Where activations are not known they are the mean of those of the nearest samples.
-        """
+        """The same with the vertices of `sheets`, a little inside, in place of the samples."""
         sheets, given = self.sheets, self.cloud.activation
         inward = -_INSIDE * self.arm.length * vertex_normals(sheets.vertices, sheets.faces)
         activation = sheets.activation
-        if activation is None:
+        if activation is None:  # the mean of those of the nearest samples
             shown = given.values[shown_samples(self, _LEVEL)]
             activation = shown[nearest_samples(self, sheets.vertices)].mean(axis=1)
         plain = self.cloud[["tip", "activation"]].drop_vars("status", errors="ignore")
@@ -155,7 +149,7 @@ class Reach:
         return float((self.status == status).mean())
 
 
-def shown_samples(reach: Reach, level: int) -> NDArray[np.int64]:
+def shown_samples(reach: Reach, level: int) -> Index:
     """Numbers of the samples that a picture of 2^level points shows: those that have a tip."""
     rows = np.arange(min(1 << level, reach.samples))
     if reach.order is not None:
@@ -163,7 +157,7 @@ def shown_samples(reach: Reach, level: int) -> NDArray[np.int64]:
     return rows[has_tip(reach.status[rows])]
 
 
-def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int64]:
+def nearest_samples(reach: Reach, points: Array) -> Index:
     """Places of the nearest to points [m] among `shown_samples(reach, 15)`, shape (n, k)."""
     from scipy.spatial import KDTree
 
@@ -172,12 +166,9 @@ def nearest_samples(reach: Reach, points: NDArray[np.float64]) -> NDArray[np.int
     return KDTree(tips).query(points, count)[1].reshape(len(points), count)
 
 
-def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
+def cloud_points(reach: Reach, level: int) -> Array:
     """Tips that a picture of 2^level points shows [L], shape (n, 3)."""
     return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
-
-
-# Stages: coarse first and then fine, within a budget of time and memory.
 
 
 def stages(
@@ -186,11 +177,7 @@ def stages(
     """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
 
     Where samples cost much, under loads and with more than three bundles, the first cloud comes
-    alone, and clouds are as large as there is time for. The fine one has at least 2^level points,
-    where there is time and memory for them. The check is called all the time, and raises to stop.
-
-    Raises:
-        InvalidInput: Loads that cannot be computed.
+    alone, and clouds are as large as there is time for; else the fine one has 2^level points.
     """
     rod, work = solvable_rod(arm), _Work(arm, level, quality, check, report)
     is_slow = arm.loads is not None or rod.box.dimension > 3
@@ -241,14 +228,12 @@ class _Work:
             return reach
         budget = self._budget(f"computing the exact set to {100 * accuracy:g} %")
         try:
-            exact = exact_set(reach.arm, accuracy, self.quality.tol, budget)
+            return replace(reach, exact=exact_set(reach.arm, accuracy, self.quality.tol, budget))
         except (InvalidInput, OverBudget, MemoryError) as error:
             if isinstance(error, InvalidInput) and error.name != "memory":
                 return replace(reach, exact=None, refusal=str(error))  # never at rest
             # or of so many bundles that no search fits
             reason = error if isinstance(error, OverBudget) else "more memory than is free"
-        else:
-            return replace(reach, exact=exact)
         needed = f"to {100 * accuracy:g} % it needs {reason}"
         if reach.exact is None:
             return replace(reach, refusal=needed)
@@ -273,30 +258,14 @@ def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
 
 
 def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
-    """The exact set alone, to a relative error of its volume and a largest tip error in L.
-
-    Raises:
-        InvalidInput: Some activation never comes to rest.
-        OverBudget: It takes more time or memory.
-    """
+    """The exact set, to a relative error of its volume and a largest tip error in L."""
     memory = budget.memory if solvable_rod(arm).box.dimension > 3 else None
     with no_warnings():  # the error is shown beside the volume
         return reachable_set(arm, accuracy=accuracy, tol=tol, memory=memory, progress=budget)
 
 
-# Effort: the samples of an arm that there is time and memory for.
-
-
-_PILOT = 512
-_LOWEST = 10  # level below which a cloud shows no shape
-_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
-
-
 def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
-    """The level of the largest cloud of at most 2^wanted samples that is computed in time [s].
-
-    It is that of one core, for an arm whose samples cost much: loaded, or of many bundles.
-    """
+    """The level of the largest cloud, at most wanted, that one core computes in time [s]."""
     return _level(max(seconds, 1e-9) / _seconds_each(rod), wanted)
 
 
@@ -323,27 +292,16 @@ def _seconds_each(rod: TipMap) -> float:
     return max(min(seconds), 1e-6) / _PILOT
 
 
-# Multiplicity: the number of activations that reach a place, as the inverse finds them. The grid of
-# the exact set counts too, but not near folds, where half of the samples of a folded set are.
-
-
-def uncounted(reach: Reach, rows: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Those of the samples whose number of activations is not known yet."""
-    if reach.exact is not None and reach.exact.route == "flux":
-        reach.counts[:] = 1.0  # proved one to one
-    return rows[np.isnan(reach.counts[rows])]
-
-
 def count_activations(
-    reach: Reach, rows: NDArray[np.int64], check: StaleCheck = lambda: None, report: Report = _quiet
-) -> NDArray[np.float64]:
-    """Number of stable activations that put the tip where that of each sample is, shape (n,).
-
-    The arm has three free bundles. Counts are kept with the reach, also if `check` raises.
-    """
+    reach: Reach, rows: Index, check: StaleCheck = lambda: None, report: Report = _quiet
+) -> Array:
+    """Number of stable activations that reach each sample, shape (n,), kept with the reach."""
+    # by the inverse: the grid of the exact set is wrong near folds, where half of the samples are
     from softreach.inverse import solve_inverse
 
-    missing = uncounted(reach, rows)
+    if reach.exact is not None and reach.exact.route == "flux":
+        reach.counts[:] = 1.0  # proved one to one
+    missing = rows[np.isnan(reach.counts[rows])]
     for block in parallel.blocks(len(missing), _BLOCK):
         check()
         with all_cores:

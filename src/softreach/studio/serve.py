@@ -1,9 +1,8 @@
 """Server of the page: this machine only, a free port, and every request checked.
 
 viser offers no public way to see a request, to refuse it, or to send headers with its page, so this
-file uses names that viser keeps to itself. Where requests cannot be checked, the server does not
-start. A second server in front of viser's would leave viser's own port open to every page and
-program of this machine.
+file uses names that viser keeps to itself. A second server in front of viser's would leave viser's
+own port open to every page and program of this machine.
 """
 
 from __future__ import annotations
@@ -31,13 +30,13 @@ if TYPE_CHECKING:
 
 LOOPBACK, LOCAL = "127.0.0.1", ("localhost", "127.0.0.1", "::1")
 ANYWHERE = ("0.0.0.0", "::")
-
 _LAST_PORT = 65535
 _COOKIE = "softreach_token"
 _NO_TOKEN = "The address lacks the token that softreach printed with it.\n"
 _FOREIGN = "This page is for its own server alone.\n"
 _ELSEWHERE = "This address names another server, to which the page may not connect.\n"
 _PLAIN_HOST = re.compile(r"[A-Za-z0-9.\-]+(:\d+)?|\[[0-9A-Fa-f:.]+\](:\d+)?")
+_CLOSED = "media-src", "frame-src", "object-src", "base-uri", "form-action", "frame-ancestors"
 _POLICY = {
     "default-src": "'self'",
     "script-src": "'self' 'unsafe-inline' 'unsafe-eval' blob:",
@@ -46,26 +45,12 @@ _POLICY = {
     "img-src": "'self' data: blob:",
     "font-src": "'self' data:",
     "worker-src": "'self' blob: data:",
-    **dict.fromkeys(
-        ("media-src", "frame-src", "object-src", "base-uri", "form-action", "frame-ancestors"),
-        "'none'",
-    ),
+    **dict.fromkeys(_CLOSED, "'none'"),
 }
 
 
 def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
-    """Start serving the page.
-
-    Args:
-        host: Address to listen on; everyone who can reach it may use the studio.
-        port: None for a free one.
-        token: What every page has to know; "" for nothing.
-
-    Raises:
-        InvalidInput: The port is none or taken, the host is none or not this machine's, or viser
-            is a version whose requests cannot be checked.
-        MissingExtra: viser is not installed.
-    """
+    """Start serving the page; no port is for a free one, no token for pages that know none."""
     check_installed("viser")
     import viser
 
@@ -111,10 +96,10 @@ def new_token() -> str:
 
 
 def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:
-    """Reason why a request is refused; "" for one that is welcome.
+    """Reason why a server that listens on a host refuses a request; "" for one that is welcome.
 
-    It shows the token in its path, or in the cookie that it got for that; "" is for none. The host
-    is what the server listens on.
+    Browsers let any web page open a socket to this machine; they say where it came from. On
+    loopback the name must be local too, as foreign names can be made to point here.
     """
     query, cookies = parse_qs(urlsplit(path).query), SimpleCookie()
     with suppress(CookieError):
@@ -122,9 +107,11 @@ def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str
     shown = [*query.get("token", []), *(c.value for name, c in cookies.items() if name == _COOKIE)]
     if token and not any(hmac.compare_digest(each.encode(), token.encode()) for each in shown):
         return _NO_TOKEN
-    if not same_origin(headers, host):
+    own, origin = headers.get("Host", ""), headers.get("Origin")
+    page = urlsplit(f"//{own}")
+    is_rebound = host in LOCAL and page.hostname not in LOCAL
+    if is_rebound or (origin is not None and urlsplit(origin).netloc != page.netloc):
         return _FOREIGN
-    own = headers.get("Host", "")
     return "" if all(_place(each) == own for each in query.get("websocket", [])) else _ELSEWHERE
 
 
@@ -136,25 +123,9 @@ def _place(address: str) -> str:
         return ""
 
 
-def same_origin(headers: Mapping[str, str], host: str) -> bool:
-    """True if a connection comes from our own page, or from no page at all.
-
-    Browsers let any web page open a socket to this machine; they tell where it came from. On
-    loopback the name must be local too, as foreign names can be made to point here.
-    """
-    page = urlsplit(f"//{headers.get('Host', '')}")
-    if host in LOCAL and page.hostname not in LOCAL:
-        return False
-    origin = headers.get("Origin")
-    return origin is None or urlsplit(origin).netloc == page.netloc
-
-
 def page_headers(host: str) -> dict[str, str]:
-    """Headers that keep a page to its own server, by name and port as its request has them.
-
-    viser's page is one file of inline scripts and styles; it would open a socket to any server that
-    `?websocket=` names, and read a scene from any address.
-    """
+    """Headers that keep a page to its own server, by name and port as its request has them."""
+    # viser's page is one file of inline scripts, and would open any socket that its address names
     plain = _PLAIN_HOST.fullmatch(host) is not None
     sockets = f" ws://{host} wss://{host}" if plain else ""  # older browsers: not part of 'self'
     rules = _POLICY | {"connect-src": f"'self' data: blob:{sockets}"}
@@ -168,17 +139,12 @@ def page_headers(host: str) -> dict[str, str]:
 
 @contextmanager
 def guarding(host: str, token: str) -> Iterator[list[Any]]:
-    """A server that starts inside the block checks every request, page and socket alike.
-
-    Yields:
-        Those that have taken the checks over; a server that is not among them has none.
-    """
+    """Servers that start in the block check each request; yields those that do."""
     import websockets.asyncio.server as sockets
 
     plain, guarded = sockets.serve, list[Any]()
 
     def add(connection: Any, request: Any, response: Any) -> None:
-        del connection
         for name, value in page_headers(request.headers.get("Host", "")).items():
             response.headers[name] = value
         if token and "token" in parse_qs(urlsplit(request.path).query):
@@ -257,13 +223,11 @@ def page_address(host: str, port: int, token: str = "") -> str:
 
 
 def reachable_hosts(host: str) -> list[str]:
-    """Addresses by which others reach a server that listens on a host; none if it is local.
-
-    For every address of this machine: the one that it would call others from.
-    """
+    """Addresses by which others reach a server that listens on a host; none if it is local."""
     if host not in ANYWHERE:
         return [] if is_local(host) else [host]
     with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        # the one that this machine would call others from
         line.connect(("192.0.2.1", 9))  # reserved for examples; nothing is sent
         return [str(line.getsockname()[0])]
     return []

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Mapping
+import time
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Known
-from softreach.studio.jobs import Given, Job, what_follows
+from softreach.studio.jobs import Given, Job, News, what_follows
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, picked_point
-from softreach.studio.scene.scene import Scene, shows_cloud
-from softreach.studio.scene.surfaces import in_slice
+from softreach.studio.scene.scene import Scene, in_slice, shows_cloud
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import Dropped, Latest, StaleCheck, rest, return_memory_soon
+from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
     from softreach.studio.work import CompilationWatch
 
 Change = Callable[[StudioState], StudioState]
-
-_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 _REST = 0.5  # [s] without changes, after which the state is kept
 
@@ -45,20 +44,20 @@ class Session:
         jobs: Iterable[Job] = (),
         *,
         work: KeptWork | None = None,
+        left: StudioState | None = None,
         compilation: CompilationWatch | None = None,
     ) -> None:
-        """Begin a session of a tab, whose state is kept in `work`; then it is furnished."""
+        """Begin where a tab left off, or at the start; the state is kept in `work`."""
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
-        self.lock = threading.RLock()
-        """Held while the state changes, and while that is shown."""
+        self.lock = threading.RLock()  # held while the state changes, and while that is shown
         self.history = History()
-        self.is_touched = False  # true once there is anything to keep
-        self.state: StudioState = start.state
-        self.found = Found(reach=start.reach)
-        self.panels: list[Callable[[], None]] = []
-        """Each shows again what has changed."""
+        self.is_touched = left is not None  # true once there is anything to keep
+        self.state = left or start.state
+        same = self.state.design == start.state.design
+        self.found = Found(reach=start.reach) if same else Found()
+        self.panels: list[Callable[[], None]] = []  # each shows again what has changed
         self.revision = 0  # number of changes that widgets have to follow, whatever they hold
         self.note, self.doing = "", ""  # for the reader, the second on the work that is being done
         self.canceled = False  # true if the reader stopped what was being computed of this state
@@ -76,34 +75,24 @@ class Session:
         self._follow_change(None)
         self.show()
 
-    # The state, and what is known of it
-
     def update(self, change: Change, *, by_widget: bool = False, goes_on: bool = False) -> None:
-        """Replace the state, and start what follows from that.
+        """Replace the state, unless the next is not valid, and start what follows from that.
 
-        Args:
-            change: From the present state to the next.
-            by_widget: Whether a widget shows the change already. Others that hold something else
-                are left alone then: one that is dragged would jump back to where it was.
-            goes_on: Whether the change may be part of the step before, for who undoes it.
-
-        Raises:
-            SoftreachError: The change makes no valid state; nothing happens then.
+        `goes_on` lets the change be part of the step before. Where a widget shows it already,
+        others that hold something else are left alone: one that is dragged would jump back.
         """
         with self.lock:
             new = change(self.state)
             if by_widget and new == self.state:  # a page reports what was only drawn anew
                 return
-            history = self.history.after(self.state, new, goes_on=goes_on)
+            history = self.history.after(self.state, new, goes_on=goes_on, now=time.monotonic())
             self.is_touched = self.is_touched or new != self.state
-            self._become(new, history, by_widget=by_widget)
+            self.revision += not by_widget
+            self._become(new, history)
 
-    def _become(
-        self, state: StudioState, history: History, note: str = "", *, by_widget: bool = False
-    ) -> None:
+    def _become(self, state: StudioState, history: History, note: str = "") -> None:
         old = Known(self.state, self.found)
         self.state, self.history, self.note = state, history, note
-        self.revision += not by_widget
         self.canceled = False
         self._follow_change(old)
         self.show()
@@ -113,6 +102,7 @@ class Session:
         with self.lock:
             history, state = self.history.step(self.state, back=back)
             nothing = f"There is nothing to {'undo' if back else 'redo'}."
+            self.revision += 1
             self._become(state, history, nothing if state is self.state else "")
 
     def reset(self) -> None:
@@ -126,19 +116,12 @@ class Session:
         if state.camera is not None:
             self.look_as(state.camera)
 
-    def take_up(self, state: StudioState) -> None:
-        """Go on where a tab left off, before anything is shown."""
-        self.state, self.is_touched = state, True
-        if state.design != self.start.state.design:
-            self.found = Found()
-
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""
         if self.work is not None and self.is_touched:
             self.work.keep(self.state_now())
 
     def _keep_soon(self, given: Given) -> tuple[()]:
-        """Once the state rests for a moment."""
         rest(given.check, _REST if self.is_touched else 0.0)
         self.keep()
         return ()
@@ -152,9 +135,7 @@ class Session:
         """The state with the camera, as it is saved."""
         return self.state.replace(camera=self.camera.actual())
 
-    def learn(
-        self, found: Mapping[str, Any] | Callable[[Found], Found] | None, *, quiet: bool = False
-    ) -> None:
+    def learn(self, found: News | None, *, quiet: bool = False) -> None:
         """Replace some fields of `Found`, or all, and start what follows; panels may hear later."""
         if not found:
             return
@@ -164,8 +145,6 @@ class Session:
             self._follow_change(old)
         if not quiet:
             self.show()
-
-    # What the reader is shown
 
     @property
     def compiling(self) -> str:
@@ -216,23 +195,19 @@ class Session:
         size = f"{len(data) / 1e6:.1f} MB" if len(data) >= 1e5 else f"{len(data) / 1e3:.1f} kB"
         self.say(f"{name} is written: {size}.")
 
-    # The scene
-
-    def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> NDArray[np.float64] | None:
-        """Place of the tip [m], shape (3,), in the sample that a ray from the camera [L] meets.
-
-        None beside all. It is computed anew: a point is rounded, at the rim perhaps out of reach.
-        """
+    def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
+        """Place of the tip [m] in the sample that a ray from the camera [L] meets, if any."""
         reach, look = self.found.reach, self.state.appearance
         if reach is None or not (look.cloud or look.surface) or reach.arm != self.state.design:
             return None
         points = cloud_points(reach, look.level)
         hidden = self.scene.hidden(points) & shows_cloud(reach, look)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~hidden)
-        hit = picked_point(points[seen], origin, direction, _CLICK)
+        hit = picked_point(points[seen], origin, direction)
         if hit is None:
             return None
         sample = int(shown_samples(reach, look.level)[seen[hit]])
+        # computed anew, as a point is rounded, at the rim perhaps out of reach
         return tip_positions(reach.arm, [reach.cloud.activation.values[sample]])[0]
 
     def look_from(self, view: str) -> None:
@@ -247,16 +222,10 @@ class Session:
         self.camera.look_from(camera)
 
     def aim(self, target: ArrayLike) -> None:
-        """Find every activation that reaches a target [m], and take the nearest to the present.
-
-        Raises:
-            SoftreachError: The target is no point.
-        """
+        """Find every activation that reaches a target [m], and take the nearest to the present."""
         self.learn({"takes_nearest": True})
         self.update(lambda state: state.replace(target=vector(np.asarray(target))))
         self.follow("inverse")  # also where the target is the one before
-
-    # Jobs
 
     @property
     def busy(self) -> bool:
@@ -337,8 +306,7 @@ class Session:
         return_memory_soon()
 
     def _rested(self) -> None:
-        """Once all jobs have nothing left to do, nothing is said to be done."""
-        if not self.busy:
+        if not self.busy:  # nothing is said to be done
             self.doing = ""
             self.show()
             return_memory_soon()

@@ -14,62 +14,12 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
-from softreach.studio.widgets import unit_in
+from softreach.studio.widgets import Ends, unit_in
+from softreach.studio.work import StaleCheck
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.units import METER, LengthUnit
 
-Ends = tuple[float, float]
-
-
-class ShownParameter(NamedTuple):
-    """A parameter of a design in the unit that a person reads."""
-
-    name: str  # of the parameter
-    label: str  # with the unit
-    hint: str  # symbol, unit and meaning
-    scale: float  # units of the parameter per shown unit
-    shown: float  # the value in the shown unit; NaN where the design leaves it out
-    low: float = math.nan
-    """End of a slider in the shown unit, like all that follow; NaN without a slider."""
-    high: float = math.nan
-    step: float = math.nan
-    whole: bool = False  # it counts something
-
-    @property
-    def limits(self) -> Ends:
-        """Ends of the slider: wide enough for a design from a file."""
-        return min(self.low, self.shown), max(self.high, self.shown)
-
-    def read(self, arm: Manipulator) -> float:
-        """The value of a design, in the shown unit; 0 where it leaves the number out."""
-        value = shown_value(known_parameters(arm)[self.name], arm, self.scale)
-        return 0.0 if math.isnan(value) else value
-
-    def write(self, arm: Manipulator, shown: float) -> Manipulator:
-        """The design with another value.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
-        return with_values(arm, {known_parameters(arm)[self.name]: shown * self.scale})
-
-
-@lru_cache(maxsize=16)
-def known_parameters(arm: Manipulator) -> dict[str, Parameter]:
-    """As `parameters`, kept for the next call."""
-    return parameters(arm)
-
-
-def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
-    """The value over a scale, to twelve digits."""
-    return float(f"{parameter.value(arm) / scale:.12g}")
-
-
-# Sliders
-
-
-_Slider = tuple[str, float, float, float]
-"""Label, ends and step."""
+_Slider = tuple[str, float, float, float]  # label, ends and step
 _OF_ARM: dict[str, _Slider] = {
     "revolution": ("revolution Ω [deg]", 1, 360, 1),
     "taper": ("taper φ [deg]", -2, 5, 0.05),
@@ -103,14 +53,51 @@ _MORE = {
 _NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
 """Words of symbols on sliders."""
 _HALVINGS = 14
-_DEGREES = "deg", math.radians(1)
+
+
+class ShownParameter(NamedTuple):
+    """A parameter of a design in the unit that a person reads."""
+
+    name: str  # of the parameter
+    label: str  # with the unit
+    hint: str  # symbol, unit and meaning
+    scale: float  # units of the parameter per shown unit
+    shown: float  # the value in the shown unit; NaN where the design leaves it out
+    low: float = math.nan  # ends of a slider in the shown unit, and its step; NaN without one
+    high: float = math.nan
+    step: float = math.nan
+    whole: bool = False  # it counts something
+
+    @property
+    def limits(self) -> Ends:
+        """Ends of the slider: wide enough for a design from a file."""
+        return min(self.low, self.shown), max(self.high, self.shown)
+
+    def read(self, arm: Manipulator) -> float:
+        """The value of a design, in the shown unit; 0 where it leaves the number out."""
+        value = shown_value(known_parameters(arm)[self.name], arm, self.scale)
+        return 0.0 if math.isnan(value) else value
+
+    def write(self, arm: Manipulator, shown: float) -> Manipulator:
+        """The design with another value; InvalidDesign if no such arm can exist."""
+        return with_values(arm, {known_parameters(arm)[self.name]: shown * self.scale})
+
+
+@lru_cache(maxsize=16)
+def known_parameters(arm: Manipulator) -> dict[str, Parameter]:
+    """As `parameters`, kept for the next call."""
+    return parameters(arm)
+
+
+def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
+    """The value over a scale, to twelve digits."""
+    return float(f"{parameter.value(arm) / scale:.12g}")
 
 
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
     """The parameters of a design that have sliders, those of the whole arm first.
 
-    What the design leaves open, such as a modulus that cancels, has none; all that actuators and
-    profiles outside softreach declare has one, but for a zero of unknown size.
+    What it leaves open has none; what parts outside softreach declare has one, but for zeros.
     """
     return _slider_parameters(arm, arm.length_unit)
 
@@ -156,20 +143,17 @@ def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
         return None
     if parameter.unit != "m":
         return fixed
-    scale = float(f"{arm.length / arm.length_unit.size:.12g}")
+    scale = float(f"{arm.length / arm.length_unit.size:.3g}")
     low, high, step = (scale * end for end in fixed[1:])
     return arm.length_unit.label(fixed[0]), low, high, step
 
 
 def _around_value(arm: Manipulator, parameter: Parameter) -> _Slider | None:
-    """From zero to twice the value, or all angles, within the range; None for a zero of no size.
-
-    Where the range itself does not end at zero, the slider stays off it by a hundredth.
-    """
+    """From zero to twice the value, or all angles, within the range; None for a zero of no size."""
     unit, scale = _unit(parameter, arm.length_unit)
     value, allowed = parameter.value(arm) / scale, parameter.range
     low, high = allowed.low / scale, allowed.high / scale
-    size = 2 * abs(value) or high - low
+    size = float(f"{2 * abs(value):.3g}") or high - low
     ends = (-size if value <= 0 else 0.0, size if value >= 0 else 0.0)
     if parameter.unit == "rad":
         size, ends = 200.0, (-360.0, 360.0)
@@ -189,10 +173,7 @@ def owner_label(path: str) -> str:
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Parameter) -> bool:
-    """True if a parameter changes this arm, and no other slider does the same.
-
-    Only what is helical has a revolution to change; only what is not, its number of bundles.
-    """
+    """True if a parameter changes this arm, and no other slider does the same."""
     if parameter.owner and parameter.field in _ONE_FOR_ALL:
         of_all = known.get(parameter.field)
         if of_all is not None and not math.isnan(of_all.value(arm)):
@@ -203,18 +184,12 @@ def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Par
     return parameter.field != "bundles" or turn is None or turn.value(arm) == 0
 
 
-def slider_ends(
-    arm: Manipulator,
-    before: Mapping[str, Ends] | None = None,
-    check: Callable[[], object] = lambda: None,
-) -> dict[str, Ends]:
+def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck) -> dict[str, Ends]:
     """Ends of the sliders of a design: as far as each alone can go, to three digits.
 
-    Making an arm to see whether it exists costs a millisecond. So an end is looked for near that of
-    a design before, and a slider that ended at its own limit does so again. The check is called
-    often, and may raise.
+    An end is looked for near that of a design before: each trial makes an arm, in a millisecond.
     """
-    known, before = known_parameters(arm), before or {}
+    known = known_parameters(arm)
 
     def end(slider: ShownParameter, which: int) -> float:
         def exists(shown: float) -> bool:
@@ -255,9 +230,6 @@ def _decimals(value: float) -> int:
     return max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
 
 
-# Parts
-
-
 class Part(NamedTuple):
     """One thing that an arm consists of."""
 
@@ -293,12 +265,9 @@ _BODY_LABELS = {
 def body_numbers(arm: Manipulator) -> list[ShownParameter]:
     """The parameters of the body that have no slider, in the words of those that have one."""
     slid = {slider.name for slider in slider_parameters(arm)}
-    rest = (number for number in part_parameters(arm, _BODY) if number.name not in slid)
-    return [
-        each._replace(label=_titled(_BODY_LABELS.get(each.name) or symbol, unit_in(each.label)))
-        for each in rest
-        for symbol in (known_parameters(arm)[each.name].symbol,)
-    ]
+    rest = [number for number in part_parameters(arm, _BODY) if number.name not in slid]
+    titled = lambda one: one._replace(label=_titled(_BODY_LABELS[one.name], unit_in(one.label)))
+    return [titled(each) if each.name in _BODY_LABELS else each for each in rest]
 
 
 def parts(arm: Manipulator) -> dict[str, Part]:
@@ -316,15 +285,8 @@ def parts(arm: Manipulator) -> dict[str, Part]:
 
 
 def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
-    """The parameters of a part in the units in which they are typed.
-
-    Of those of the whole arm, what its parts differ in is typed with each of them.
-    """
-    return _part_parameters(arm, part, typed_unit(arm))
-
-
-@lru_cache(maxsize=16)
-def _part_parameters(arm: Manipulator, part: Part, unit: LengthUnit) -> tuple[ShownParameter, ...]:
+    """The parameters of a part in the units in which they are typed."""
+    unit = typed_unit(arm)
     return tuple(
         _shown(arm, each, each.symbol, f"{each.meaning}: {each.name}", unit)
         for each in known_parameters(arm).values()
@@ -352,16 +314,13 @@ def _shown(
 
 def _unit(parameter: Parameter, lengths: LengthUnit | None) -> tuple[str, float]:
     """Unit of a number, and its size: where none of lengths is given, SI but for angles."""
-    units = {"rad": _DEGREES, "1": ("", 1.0)}
+    units = {"rad": ("deg", math.radians(1)), "1": ("", 1.0)}
     units |= {"m": (lengths.name, lengths.size), "Pa": ("kPa", 1e3)} if lengths else {}
     return units.get(parameter.unit, (parameter.unit, 1.0))
 
 
 def _titled(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit else name
-
-
-# Refusals
 
 
 def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipulator) -> str:

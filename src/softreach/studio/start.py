@@ -17,6 +17,8 @@ from softreach.support.errors import SoftreachError
 from softreach.support.files.text import read_text, write_text
 
 USUAL = Quality()
+_STATE = {"win32": "~/AppData/Local", "darwin": "~/Library/Application Support"}
+"""Folder of a user for what programs keep, by system."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,17 +58,6 @@ def start_on_cloud(path: str | PathLike[str], quality: Quality = USUAL) -> Start
     return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
 
 
-def user_folder() -> Path:
-    """The folder for the state of softreach; `XDG_STATE_HOME` moves it on every system."""
-    if chosen := os.environ.get("XDG_STATE_HOME"):
-        return Path(chosen) / "softreach"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData/Local") / "softreach"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support" / "softreach"
-    return Path.home() / ".local" / "state" / "softreach"
-
-
 class KeptWork:
     """The latest state of a tab in a file, which stays when its tab is reloaded or the server ends.
 
@@ -99,6 +90,10 @@ class KeptWork:
 
 
 def work_on(design: Manipulator, *, goes_on: bool = True) -> KeptWork:
-    """Work that is kept of a design, in a folder of its own."""
+    """Work that is kept of a design, in a folder of its own; `XDG_STATE_HOME` moves all of them."""
     digest = hashlib.sha256(design.to_toml().encode()).hexdigest()[:16]
-    return KeptWork(user_folder() / "studio" / digest, goes_on=goes_on)
+    chosen = os.environ.get("XDG_STATE_HOME")
+    if not chosen and sys.platform == "win32":
+        chosen = os.environ.get("LOCALAPPDATA")
+    home = Path(chosen or _STATE.get(sys.platform, "~/.local/state")).expanduser()
+    return KeptWork(home / "softreach" / "studio" / digest, goes_on=goes_on)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property, lru_cache
@@ -19,28 +18,22 @@ from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_instance, as_integer, as_number, as_one_of
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidDesign, InvalidInput, Range
+from softreach.support.errors import InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.units import UNITS
 
 TOL = 1e-5  # [L], the largest tip error: far below a pixel
 LARGEST = 2_000_000  # bytes of a file that a person opens
+_MOST_PLACES = 300  # to reach, which are judged while a slider moves
+_one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
 
 
 def rod_of(arm: Manipulator) -> TipMap:
-    """The tip map of a design, kept for the next call.
-
-    Raises:
-        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
-    """
+    """The tip map of a design, kept; InvalidDesign if some activation shortens it to nothing."""
     return as_tip_map(arm, TOL, warn=False)  # the page says whether samples are stable
 
 
 def design_of_text(text: str, source: str) -> Manipulator:
-    """A design that has a rod, from the text of a file; `source` is what errors call it.
-
-    Raises:
-        InvalidDesign: The arm cannot exist, or would be shortened to nothing.
-    """
+    """A design that has a rod, from the text of a file; `source` is what errors call it."""
     arm = Manipulator.from_toml(text, source)
     try:
         rod_of(arm)
@@ -49,21 +42,13 @@ def design_of_text(text: str, source: str) -> Manipulator:
     return arm
 
 
-_one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
-
-
 def solvable_rod(arm: Manipulator) -> TipMap:
-    """The tip map of a design whose loads can be computed; slow the first time for a loaded arm.
-
-    Raises:
-        InvalidInput: The arm is loaded so heavily that no number of steps suffices.
-    """
+    """The tip map of a design whose loads can be computed; slow the first time if loaded."""
     if arm.loads is not None:
         with _one_at_a_time:
-            solvable = _is_solvable(arm)
-        if not solvable:
-            allowed = f"such that tips can be computed to {TOL:g} L"
-            raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
+            if not _is_solvable(arm):
+                allowed = f"such that tips can be computed to {TOL:g} L"
+                raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
     return rod_of(arm)
 
 
@@ -75,28 +60,15 @@ def _is_solvable(arm: Manipulator) -> bool:
         return False
 
 
-_MOST_PLACES = 300  # to reach, which are judged while a slider moves
-
-
 @lru_cache(maxsize=32)
 def requirements_of(text: str) -> Requirements:
-    """The requirements in the state of a tab; none for an empty text.
-
-    Raises:
-        InvalidDesign: The text is none of requirements, or names other files.
-        InvalidInput: It lists more places than can be shown.
-    """
+    """The requirements in the state of a tab; none for an empty text."""
     return needs_of_text(text) if text else Requirements()
 
 
 def needs_of_text(text: str, *, length: float | None = None, source: str = "") -> Requirements:
-    """Requirements from the text of a file that comes from a page, as `Requirements.from_toml`.
-
-    Raises:
-        InvalidDesign: The text is none of requirements, or names other files: those that lie beside
-            it are not sent with it, and files of this machine are not for users of the page.
-        InvalidInput: It lists more places than can be shown.
-    """
+    """Requirements from the text of a file that comes from a page, as `Requirements.from_toml`."""
+    # what lies beside the file is not sent with it, and this machine's files are not for the page
     needs = Requirements.from_toml(text, folder=None, length=length, source=source)
     if (count := len(needs.places)) > _MOST_PLACES:
         allowed = f"at most {_MOST_PLACES} in the studio"
@@ -106,7 +78,6 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
 
 VERSION = 4
 LEVELS = range(12, 22)  # 2^level points: every such prefix of a Sobol sequence is even
-
 MOUSE = {
     "tip": "drags the tip",
     "target": "sets the target",
@@ -115,14 +86,15 @@ MOUSE = {
     "none": "turns the view alone",
 }
 """Uses of the mouse in the scene: name -> what the menu says."""
-
 MOST_POINTS = 2000  # of a path: each is followed, drawn and kept in the state
-
-Vector = tuple[float, float, float]
-
 AXES = ("none", "x", "y", "z")
+_LONGEST = 200  # steps back
+_PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
+_SETTINGS = ("design", "reference", "needs")
+_POSE = ("activation", "target")
 _FAR = 1e3  # [L], beyond which there is nothing to see
 _PLACES, _SIZES = Range(-_FAR, _FAR), Range(0.0, _FAR)
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,8 +160,7 @@ class TipPath:
     """A path of the tip, and how far along it the arm is."""
 
     points: tuple[Vector, ...]  # [m], in order
-    start: tuple[float, ...] | None = None
-    """Activation to begin with; None for the best-conditioned solution at the first point."""
+    start: tuple[float, ...] | None = None  # activation; None for the best at the first point
     at: int = 0  # the point where the arm is
 
     def __post_init__(self) -> None:
@@ -201,11 +172,7 @@ class TipPath:
 
     @classmethod
     def through(cls, points: Any, start: Sequence[float] | None = None, at: int = 0) -> Self:
-        """A path through points [m], shape (k, 3).
-
-        Raises:
-            InvalidInput: Points of another shape, too few or too many, or not finite.
-        """
+        """A path through points [m], shape (k, 3)."""
         values = as_floats("path", points)
         if values.ndim != 2 or values.shape[1] != 3:
             raise InvalidInput("path.shape", values.shape, "of shape (k, 3)")
@@ -279,20 +246,18 @@ class StudioState:
         allowed = f"a state that the studio saved, version {VERSION}"
         try:
             values = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise InvalidInput("state file", str(error), allowed) from None
-        version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
-        if version != VERSION:
-            raise InvalidInput("state file", f"version {version}", allowed)
-        try:
+            version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
+            if version != VERSION:
+                raise InvalidInput("state file", f"version {version}", allowed)
             read: dict[str, Any] = {k: v if v is None else _READ[k](v) for k, v in values.items()}
             return cls(**read)
-        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-            if type(error).__module__.startswith("softreach"):
+        except _WRONG as error:
+            if isinstance(error, SoftreachError):
                 raise
             raise InvalidInput("state file", str(error), allowed) from None
 
 
+_WRONG = ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError
 _READ: dict[str, Callable[[Any], Any]] = {
     "design": lambda text: design_of_text(text, "state file"),
     "activation": lambda values: tuple(map(float, values)),
@@ -312,47 +277,26 @@ def vector(values: Iterable[float]) -> Vector:
     return x, y, z
 
 
-# History: states before and states undone, as values, so that going back is exact. Looks are no
-# part of it: whoever goes back to an earlier design keeps the view.
-
-_LONGEST = 200  # steps back
-_PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
-_SETTINGS = ("design", "reference", "needs")
-_POSE = ("activation", "target")
-
-
 @dataclass(frozen=True, kw_only=True)
 class History:
-    """States to go back and forth to; a change makes a new history."""
+    """States to go back and forth to; a change makes a new history. Looks are no part of it."""
 
     past: tuple[StudioState, ...] = ()  # the latest last
     future: tuple[StudioState, ...] = ()  # the next last
     kind: str = ""  # of the latest change; "" after a step back or forth
     at: float = field(default=0.0, compare=False)  # time of that change [s]
 
-    def after(
-        self,
-        old: StudioState,
-        new: StudioState,
-        *,
-        goes_on: bool,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> History:
-        """The history after a change.
+    def after(self, old: StudioState, new: StudioState, *, goes_on: bool, now: float) -> History:
+        """The history after a change at a time [s]; it stays the same if only the view differs.
 
-        Args:
-            old: Before the change.
-            new: After it. If only the view differs, the history stays.
-            goes_on: Whether it may be part of the step before, as while a slider is dragged: it is
-                if that was of the same kind, and a moment ago.
-            clock: The time [s].
+        A change that goes on, as of a dragged slider, is part of the step before if that was of the
+        same kind, and a moment ago.
         """
         differ = [name for name in (*_SETTINGS, *_POSE) if getattr(old, name) != getattr(new, name)]
         settings = [name for name in differ if name in _SETTINGS]
         kind = " ".join(settings) or ("pose" if differ else "")  # bounds may have moved activations
         if not kind:
             return self
-        now = clock()
         same = goes_on and kind == self.kind and now - self.at < _PAUSE
         past = self.past if same else (*self.past, old)[-_LONGEST:]
         return History(past=past, kind=kind, at=now)

@@ -38,7 +38,7 @@ from softreach.support.errors import (
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.progress import Progress, silent
 from softreach.support.quantity import quantity
-from softreach.support.units import LengthUnit, as_unit, handy_unit, readable_unit
+from softreach.support.units import LengthUnit, as_unit, readable_unit
 from softreach.workspace import reachable_set
 
 Entry = dict[str, Any]
@@ -74,19 +74,8 @@ def write_static(
 ) -> StaticPage:
     """Write a page with sliders that shows the reachable set of each design of a grid.
 
-    Args:
-        space: A grid of at most 1,000 designs.
-        folder: Where `index.html` and a folder of designs go.
-        unit: Of lengths: "m", "cm", "mm" or "L"; that of the design file if left out.
-        title: Of the page.
-        overwrite: Whether a page that is there, and files of its designs, may be replaced.
-        progress: Called with the number of designs done.
-
-    Raises:
-        InvalidInput: No grid, too many designs, no design that reaches anything, or other files
-            in the way.
-        NotWritten: Nothing can be written there.
-        MissingExtra: matplotlib or scikit-image is not installed.
+    The folder gets `index.html` and a folder of designs. Lengths are in a unit, by default that of
+    the design file; `progress` is called with the number of designs done.
     """
     check_installed("matplotlib", "skimage")
     place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)
@@ -94,8 +83,7 @@ def write_static(
         raise InvalidInput("designs", f"{space.size:,}", f"a grid of {_MOST:,} at most")
     index, base = place / "index.html", space.base
     check_place(index, overwrite=overwrite, name="static")
-    shown = base.display_unit if unit is None else unit
-    name = as_unit(handy_unit(base.length) if shown is None else shown, base.length).name
+    name = base.length_unit.name if unit is None else as_unit(unit, base.length).name
     paths = [place / _FOLDER / f"{number}.js" for number in range(space.size)]
     tasks = (partial(_design, space, k, name, path, overwrite) for k, path in enumerate(paths))
     entries = list[Entry]()

@@ -1,8 +1,7 @@
-"""Widgets that viser lacks: lines of text, pictures that change, and fields for typed numbers.
+"""Widgets that viser lacks: lines of text, and fields for typed numbers, which are texts in forms.
 
-Numbers are typed into texts: viser's own number fields drop the sign of "-0.5" and the exponent of
-"1e-5" while one types, and round to the step of a slider. Texts are sent as they are, and a form
-tells when Enter is pressed.
+viser's own number fields drop the sign of "-0.5" and the exponent of "1e-5" while one types, and
+round to the step of a slider.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from softreach.support.quantity import sizes_in
 if TYPE_CHECKING:
     from viser import GuiApi
 
+Ends = tuple[float, float]
 _PRECISION = 12  # digits after the point that viser leaves of what a slider holds
 _UNAPPLIED = "Enter applies it."
 _UNIT_IN = re.compile(r"\[([^\]]+)\]$| / (L)$")
@@ -40,10 +40,8 @@ class Line:
 
     def show(self, content: str) -> None:
         """Show what `markup` made."""
-        if self._widget.content != content:
-            self._widget.content = content
-        if self._widget.visible != bool(content):
-            self._widget.visible = bool(content)
+        if (self._widget.content, self._widget.visible) != (content, bool(content)):
+            self._widget.content, self._widget.visible = content, bool(content)
 
     def remove(self) -> None:
         """Take the line away."""
@@ -98,11 +96,7 @@ def _parts(text: str) -> list[str]:
 
 
 def read_number(text: str, unit: str, length: float) -> float | None:
-    """The number that a text is in a unit, or with another one behind it; None for anything else.
-
-    What has no unit is in the one that is given, as is what is returned; "" is for plain numbers.
-    The length L [m] of the arm is a unit of lengths.
-    """
+    """The number that a text is in a unit, "" for none, or with another behind it; else None."""
     text, units = text.strip(), _units(unit, length)
     name = next((name for name in sorted(units, key=len)[::-1] if text.endswith(name)), "")
     number = number_of(text.removesuffix(name))
@@ -130,7 +124,7 @@ class TypedField:
         self._kind, self._value = kind, value
         self._is_refused = False
         self._lock = threading.RLock()
-        self._callbacks: list[Callable[[Any], object]] = []
+        self._applied: Callable[[Any], object] = lambda _: None
         self._form = gui.add_form(None)
         with self._form:
             self._text = gui.add_text(label, kind.text(value), hint=hint)
@@ -155,7 +149,7 @@ class TypedField:
 
     def on_update(self, callback: Callable[[Any], object]) -> None:
         """Call back with the event when a person has applied a value."""
-        self._callbacks.append(callback)
+        self._applied = callback
 
     def warn(self, text: str) -> None:
         """Say under the field why its value is refused; "" for nothing."""
@@ -182,13 +176,13 @@ class TypedField:
             self._value = value
             self.warn("")
         self._apply(event)
-        if not self._is_refused and None in map(number_of, _parts(text)):  # it has units
-            self._text.value = self._kind.text(self._value)
+        has_units, plain = None in map(number_of, _parts(text)), self._kind.text(self._value)
+        if has_units and not self._is_refused and text != plain:
+            self._text.value = plain
 
     def _apply(self, event: Any) -> None:
         self._follow()
-        for callback in self._callbacks:
-            callback(event)
+        self._applied(event)
 
     def _follow(self) -> None:
         """Bring what else shows the value in line with it."""
@@ -201,7 +195,7 @@ class Slider(TypedField):
         self,
         gui: GuiApi,
         label: str,
-        ends: tuple[float, float],
+        ends: Ends,
         step: float,
         value: float,
         hint: str,
@@ -215,12 +209,12 @@ class Slider(TypedField):
         self._slider.on_update(self._dragged)
 
     @property
-    def ends(self) -> tuple[float, float]:
+    def ends(self) -> Ends:
         """Ends of the slider; beyond them a value is typed."""
         return self._ends
 
     @ends.setter
-    def ends(self, ends: tuple[float, float]) -> None:
+    def ends(self, ends: Ends) -> None:
         with self._lock:
             self._ends = ends
             self._slider.min, self._slider.max = ends

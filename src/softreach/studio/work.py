@@ -14,10 +14,13 @@ from numba.core import event
 from softreach.inverse.prepared import forget_prepared
 from softreach.support.memory import free_memory, return_memory
 
-StaleCheck = Callable[[], None]
-"""Raises `Dropped` if what is being done is no longer wanted."""
+StaleCheck = Callable[[], None]  # raises `Dropped` if what is being done is no longer wanted
 
 _PATIENCE = 0.1  # [s], after which work that waits checks whether it is still wanted
+_SHARE = 0.2  # of the free memory that one computation may plan with: others hold their results
+_LEFT = 0.4  # of the memory that was free in the beginning: with less a computation ends
+_GLANCE = 0.2  # [s] between looks at the memory
+_KIND = "numba:compile"
 _REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
 
 
@@ -128,29 +131,20 @@ def rest(check: StaleCheck, seconds: float) -> None:
     check()
 
 
-def _return_memory(check: StaleCheck) -> None:
-    """Return what work has freed; after a minute's rest also what is only kept to be quick."""
-    rest(check, _REST)
-    return_memory()
-    rest(check, LONG_REST)
-    forget_prepared()
-    return_memory()
-
-
 _returned = Latest(lambda _: None)
 
 
 def return_memory_soon() -> None:
-    """Return what has been freed in a moment, if no more work ends until then."""
-    _returned.submit(_return_memory)
+    """Return what work has freed in a moment; after a minute also what is only kept to be quick."""
 
+    def work(check: StaleCheck) -> None:
+        rest(check, _REST)
+        return_memory()
+        rest(check, LONG_REST)
+        forget_prepared()
+        return_memory()
 
-# Budget of one computation: a share of the free memory, and some seconds.
-
-
-_SHARE = 0.2  # of the free memory that one computation may plan with: others hold their results
-_LEFT = 0.4  # of the memory that was free in the beginning: with less a computation ends
-_PAUSE = 0.2  # [s] between looks at the memory
+    _returned.submit(work)
 
 
 class OverBudget(Exception):
@@ -163,10 +157,7 @@ class Budget:
     def __init__(
         self, check: StaleCheck, seconds: float, report: Callable[[int], None] = lambda _: None
     ) -> None:
-        """Begin now; it may take some seconds [s].
-
-        At most some times a second, `report` is called with the number of items done in all.
-        """
+        """Begin now, for some seconds [s]; `report` is called at times with the number of items."""
         self._check, self._report, free = check, report, free_memory()
         self.memory, self._least = _SHARE * free, _LEFT * free
         """Memory that it may plan with, and that it leaves [bytes]."""
@@ -174,26 +165,17 @@ class Budget:
         self._next, self._done = 0.0, 0
 
     def __call__(self, done: int = 0) -> None:
-        """Go on with so many items done if that is wanted, and there is time and memory.
-
-        Raises:
-            OverBudget: There is not.
-        """
+        """Go on with so many items done if that is wanted, and there is time and memory."""
         self._check()
         self._done += done
         now = time.monotonic()
         if now > self._end:
             raise OverBudget(f"more than {self._seconds:g} s")
         if now >= self._next:
-            self._next = now + _PAUSE
+            self._next = now + _GLANCE
             if free_memory() < self._least:
                 raise OverBudget("more memory than is free")
             self._report(self._done)
-
-
-# Compilation of kernels, for which only the first use on a machine has to wait.
-
-_KIND = "numba:compile"
 
 
 class CompilationWatch(event.Listener):
@@ -210,11 +192,9 @@ class CompilationWatch(event.Listener):
         event.unregister(_KIND, self)
 
     def on_start(self, event: Any) -> None:
-        del event
         self._count(1)
 
     def on_end(self, event: Any) -> None:
-        del event
         self._count(-1)
 
     def _count(self, change: int) -> None:

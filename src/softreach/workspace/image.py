@@ -14,7 +14,7 @@ from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
 from softreach.geometry.surface import Surface, compact_surface, enclosed_volume, level_set
 from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
 from softreach.kernels.image import contour, raster
-from softreach.picture.shading import vertex_normals
+from softreach.picture.zbuffer import vertex_normals
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows
 from softreach.support.lazy import lazy

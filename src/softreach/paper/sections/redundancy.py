@@ -1,4 +1,4 @@
-"""Section 5: the minimal and the redundant design (figures 4a to 4d)."""
+"""Sections 5 and 6: redundancy (figures 4a to 4d), and places reached with several activations."""
 
 from __future__ import annotations
 
@@ -9,19 +9,26 @@ import numpy as np
 import xarray as xr
 from scipy.ndimage import binary_erosion
 
-from softreach.arm import designs
+from softreach import plot
+from softreach.arm.designs import minimal_trunk, redundant_trunk
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.dexterity import solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
+from softreach.inverse import solve_inverse
 from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, Verdict, judged
-from softreach.plot import DesignPanel, plot_designs, plot_distance_histograms, plot_redundancy
+from softreach.paper.sections.sweep import swept_atlas
+from softreach.rod.kinematics import configuration
+from softreach.support.arrays import Array
+from softreach.workspace import ReachableSet, reachable_set
 
 _RADIUS = 1 / 60  # L, figure 4d
+_TARGETS = 2_000
+_LABEL = "reached more than once / %"
 
 
-def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
+def redundancy(settings: Settings, notes: Notebook) -> dict[str, Any]:
     """Clouds, activation distances, density, and how many activations reach each place."""
-    arms = {"minimal": designs.minimal_trunk(), "redundant": designs.redundant_trunk()}
+    arms = {"minimal": minimal_trunk(), "redundant": redundant_trunk()}
     clouds: dict[str, xr.Dataset] = {}
     distances: dict[str, xr.DataArray] = {}
     numbers: dict[str, Any] = {}
@@ -32,16 +39,16 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
         distances[name] = activation_distance(clouds[name], _RADIUS, queries=settings.queries)
         numbers[name] = _found(clouds[name], distances[name])
     words = "The minimal and the redundant design, above their cross-sections at the base."
-    panels = [DesignPanel(name, arm) for name, arm in arms.items()]
-    notes.draw("4a", "figure_4a_designs", words, plot_designs(panels))
+    panels = [plot.DesignPanel(name, arm) for name, arm in arms.items()]
+    notes.draw("4a", "figure_4a_designs", words, plot.plot_designs(panels))
     words = (
         "Clouds colored by |γ| of the last longitudinal bundle (b), slices through the origin in "
         "the frontal and the right-facing plane (c), and the mean activation-space distance (d); "
         "isolated points are light gray."
     )
-    notes.draw("4b-d", "figure_4bcd_redundancy", words, plot_redundancy(clouds, distances))
+    notes.draw("4b-d", "figure_4bcd_redundancy", words, plot.plot_redundancy(clouds, distances))
     words = "Distribution of the mean activation-space distance in both clouds."
-    notes.draw("", "distances", words, plot_distance_histograms(distances))
+    notes.draw("", "distances", words, plot.plot_distance_histograms(distances))
     outline = arms["redundant"].outline(0.0)
     return numbers | {
         "samples": settings.redundant_samples,
@@ -127,3 +134,75 @@ def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
         "solution_low": np.quantile(inner, 0.05),
         "solution_largest": inner.max(initial=0.0),
     }
+
+
+def uniqueness(settings: Settings, notes: Notebook) -> dict[str, Any]:
+    """The share of the volume that several activations reach, and the clearest example."""
+    atlas = swept_atlas(notes.folder)
+    share = atlas["multiple_volume"] / atlas["exact_volume"]
+    worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
+    turn, taper = float(worst["revolution"]), float(worst["taper"])
+    arms = minimal_trunk(), minimal_trunk(turn, taper)
+    paper, clearest = (reachable_set(arm, accuracy=settings.accuracy) for arm in arms)
+    tip, activations = _clearest_pair(clearest)
+    mapped = atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")})
+    words = (
+        "Share of the reachable volume that more than one activation reaches, over revolution and "
+        "taper: where it is 0, three fibers are single-valued."
+    )
+    notes.draw("", "uniqueness", words, plot.plot_metric_map(mapped, _LABEL))
+    if len(activations):
+        words = f"{len(activations)} activations of one three-fiber arm with the same tip."
+        shapes = configuration(arms[1], activations)
+        ax = plot.plot_arm(arms[1], shapes, view="oblique", rest=False)
+        notes.draw("", "same_tip", words, ax)
+    # two fibers, and one: areas and lengths for L = 1 m
+    fewer = [arms[0].replace(actuators=arms[0].actuators[:count]) for count in (2, 1)]
+    surface, curve = (reachable_set(arm) for arm in fewer)
+    return {
+        "share": share.transpose("revolution", "taper").values.tolist(),
+        "worst": float(worst),
+        "revolution_deg": np.degrees(turn),
+        "taper_deg": np.degrees(taper),
+        "paper_share": 1 - paper.multiplicity[1] / paper.volume,
+        "tip": tip.tolist(),
+        "activations": activations.tolist(),
+        "area": surface.area,
+        "curve": curve.curve_length,
+    }
+
+
+def unique(n: Numbers) -> Finding:
+    example = "No place with two activations was found"
+    if len(n.activations) > 1:
+        rows = [", ".join(f"{g:.3f}" for g in row) for row in n.activations]
+        tip = ", ".join(f"{x:.3f}" for x in n.tip)
+        example = f"In the latter design γ = ({'); ('.join(rows)}) all reach ({tip}) m"
+    words = (
+        f"{n.paper_share:.2%} of the volume is reached by more than one activation at Ω = 108°, "
+        f"φ = 2°, up to {n.worst:.1%} at Ω = {n.revolution_deg:.4g}°, "
+        f"φ = {n.taper_deg:.3g}°; less than 0.1 % in {int((n.share < 1e-3).sum())} of "
+        f"{n.share.size} designs. {example}"
+    )
+    return judged(words, len(n.activations) < 2, n.worst < 0.1)
+
+
+def dimension(n: Numbers) -> Finding:
+    words = (
+        f"two fibers sweep a surface of {n.area:.3f} L², one fiber a curve of "
+        f"{n.curve:.3f} L (of the minimal design, in the order of its fibers)"
+    )
+    return judged(words, min(n.area, n.curve) > 1e-6)
+
+
+def _clearest_pair(reached: ReachableSet) -> tuple[Array, Array]:
+    """Tip and activations, of places that several activations reach, where these differ most."""
+    places = np.argwhere(reached.grid["count"].values > 1)
+    places = places[:: max(1, len(places) // _TARGETS)]
+    axes = [reached.grid[axis].values for axis in "xyz"]
+    tips = np.stack([axes[k][places[:, k]] for k in range(3)], axis=1)
+    solutions = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
+    if not solutions:
+        return np.zeros(3), np.empty((0, 3))
+    best = max(solutions, key=lambda s: np.linalg.norm(s.activations[0] - s.activations[-1]))
+    return best.target, best.activations

@@ -1,4 +1,4 @@
-"""Sections 3 and 4: the atlas of designs, its volumes and its curvatures (figures 2a to 3c)."""
+"""Sections 3 and 4: the atlas of designs, its volumes and curvatures (figures 2a to 3c), and α."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ import xarray as xr
 
 from softreach.arm.designs import minimal_trunk
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.volume import volume_curve
 from softreach.geometry.surface import volume_beyond
-from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, judged
-from softreach.plot import atlas_figures
+from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, Verdict, judged
+from softreach.plot import atlas_figures, plot_volume_curve
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSet, reachable_set
@@ -36,9 +38,11 @@ _CAPTIONS = {
     "map_exact_unreachability": ("3b", "Exact unreachability, for comparison."),
     "curvature": ("3c", "Curvature at six stations of the distal half, without and with taper."),
 }
+_RADII = (0.02, 0.03, 0.04, 0.05, 0.07, 0.1)
+_CURVE = np.geomspace(0.008, 1.0, 120)
 
 
-def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
+def sweep(settings: Settings, notes: Notebook) -> dict[str, Any]:
     """Volumes, unreachability, widths and curvatures of every design of the atlas of section 3."""
     turns = np.radians(np.linspace(0, 108, settings.designs))
     tapers = np.radians(np.linspace(0, 3, settings.designs))
@@ -67,11 +71,7 @@ def computed(settings: Settings, notes: Notebook) -> dict[str, Any]:
 
 
 def swept_atlas(figures: Path) -> xr.Dataset:
-    """The atlas that the sweep left beside the folder of figures.
-
-    Raises:
-        InvalidInput: It was removed.
-    """
+    """The atlas that the sweep left beside the folder of figures."""
     try:
         return open_atlas(figures.parent / _STORE)
     except InvalidInput as error:
@@ -130,8 +130,7 @@ def growth(n: Numbers) -> Finding:
         f"the volume of the α-shapes grows in {_rises(n, 'volume', 0)} steps of Ω, the exact "
         f"one in {_rises(n, 'exact_volume', 0)}"
     )
-    rises = np.greater(n.volume[-1], n.volume[0]).all()
-    return judged(words, _share(n, "volume", 0) > 0.95, rises)
+    return judged(words, _share(n, "volume", 0) > 0.95, np.greater(n.volume[-1], n.volume[0]).all())
 
 
 def maximum(n: Numbers) -> Finding:
@@ -294,3 +293,35 @@ def _beyond(reached: ReachableSet) -> list[float]:
     surface, length = reached.surface(), reached.arm.length
     aside = (volume_beyond(surface, 0, side * _ASIDE * length, side) for side in (-1, 1))
     return [sum(aside) / length**3, volume_beyond(surface, 1, 0.0) / length**3]
+
+
+def volume(settings: Settings, notes: Notebook) -> dict[str, Any]:
+    """V(α) of the paper's design for two sizes of clouds, and the exact volume."""
+    arm = minimal_trunk()
+    reached = reachable_set(arm, accuracy=settings.accuracy)
+    sizes = (settings.samples // 16, settings.samples)
+    clouds = {n: compute_cloud(arm, n, seed=settings.seed).tip for n in sizes}
+    curves = {f"{n:,} tips": volume_curve(tips, _CURVE) for n, tips in clouds.items()}
+    known: dict[str, Any] = {"exact": reached.volume, "convex": reached.convex_volume}
+    words = (
+        "Volume of the α-shape of the paper's design against its radius, which the paper does not "
+        "state, beside the exact volume of the reachable set and of its convex hull."
+    )
+    ax = plot_volume_curve(curves, _CURVE, length=arm.length, **known)
+    notes.draw("", "alpha_dependence", words, ax)
+    return {
+        **known,
+        "exact_error": reached.volume_error,
+        "radii": _RADII,
+        "volumes": {str(n): volume_curve(t, np.array(_RADII)).tolist() for n, t in clouds.items()},
+    }
+
+
+def dependence(n: Numbers) -> Finding:
+    size, volumes = list(n.volumes.items())[-1]
+    values = ", ".join(f"{v:.3f} at {r:g} L" for r, v in zip(n.radii, volumes, strict=True))
+    words = (
+        f"{int(size):,} points give {values}; the exact volume is {n.exact:.4f} ± "
+        f"{n.exact_error:.0e} L³"
+    )
+    return Finding(words, Verdict.OPEN)

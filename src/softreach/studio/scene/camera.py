@@ -9,21 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.picture.axes_box import axes_box, round_box, seen_from
 from softreach.studio.state import Camera, vector
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.units import in_lengths
 
 if TYPE_CHECKING:
     from viser import ClientHandle, SceneApi
 
-    from softreach.arm.manipulator import Manipulator
-
-Array = NDArray[np.float64]
-
 FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
-FINER = 2
-"""Pixels of a saved picture for each of the page, along each side."""
+FINER = 2  # pixels of a saved picture for each of the page, along each side
 VIEWS: dict[str, Array] = {
     "oblique": np.array([2.1, -3.85, 1.17]),
     "front": np.array([0.0, -1.0, 0.0]),
@@ -31,24 +28,20 @@ VIEWS: dict[str, Array] = {
     "top": np.array([0.0, -1e-3, 1.0]),  # not quite: z is the way up
 }
 """Directions from the middle to the camera."""
-
 UPRIGHT = 0.6  # aspect below which a window is that of a phone
-
 _PATIENCE = 30.0  # [s] for a picture
 LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
+_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
 _POINTER = 0.012  # radius of what is clicked [L]
 _ROOM, _ROOM_UPRIGHT = 1.12, 1.22  # times what would just fill the picture, with its numbers
 _GRAY = 170, 170, 175  # of the axes
 
 
 def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
-    """Camera that sees all of a box between two corners [L], from a direction seen from its middle.
-
-    The aspect is the width of the picture over its height.
-    """
+    """Camera that sees all of a box [L] from a direction; the aspect is width over height."""
     room = _ROOM_UPRIGHT if aspect < UPRIGHT else _ROOM
     middle, radius = (low + high) / 2, room * float(np.linalg.norm(high - low)) / 2
     distance = radius / _half_sine(aspect)
@@ -96,11 +89,9 @@ class TabCamera:
             shown.position, shown.look_at = camera.position, camera.look_at
 
     def keep_width(self) -> bool:
-        """Step back as the picture gets narrower, and forth again: what was in sight stays so.
+        """Step back as the picture gets narrower, and forth again; True while the window changes.
 
-        Returns:
-            True if the window is changing, so that one has to look again: a layout passes through
-            widths that are gone before the page has heard of a step, that of a new page for long.
+        A layout passes through widths that are gone before the page has heard of a step.
         """
         now = self.aspect
         if now < _NARROWEST:
@@ -119,12 +110,7 @@ class TabCamera:
         return False
 
     def picture(self) -> NDArray[np.uint8]:
-        """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
-
-        Raises:
-            InvalidInput: The tab does not answer: browsers stop drawing tabs in the background. Or
-                they would draw fewer pixels than that, and blow them up.
-        """
+        """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4)."""
         camera, client = self._client.camera, self._client
         size = {"height": FINER * camera.image_height, "width": FINER * camera.image_width}
         if max(size.values()) > LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
@@ -138,11 +124,8 @@ class TabCamera:
             raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
 
 
-# A box with numbers around everything; the camera decides which edges have them.
-
-
 class NumberedBox:
-    """One box, drawn into one scene."""
+    """A box with numbers around a scene; the camera decides which edges have them."""
 
     def __init__(self, api: SceneApi) -> None:
         self._api, self._lock = api, threading.RLock()
@@ -172,7 +155,6 @@ class NumberedBox:
                 self._draw()
 
     def _draw(self) -> None:
-        """Draw what is not there yet."""
         (camera, focal), scale, label = self._camera, self._scale, self._unit.label
         side = seen_from(scale * camera, *self._box, focal)
         before, self._drawn = self._drawn, (self._unit, scale, np.array(self._box).tolist(), side)
@@ -193,24 +175,15 @@ def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
     api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
 
 
-# What stands between the camera and a place.
-
-
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
-    """True if a ball stands between the camera and a point [L], other than those that touch it.
-
-    Balls have centers of shape (n, 3) and radii of shape (n,) [L].
-    """
+    """True if one of the balls, (n, 3) and (n,) [L], hides a point that it does not touch."""
     distance = float(np.linalg.norm(point - camera))
     ahead, aside = _beside(centers, camera, (point - camera) / distance)
     return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
 
 
 def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
-    """Way along a ray to the first ball that it meets [L]; infinite where it meets none.
-
-    Balls, as in `is_behind`, are met as if they were no thinner than a pointer.
-    """
+    """Way along a ray to the first ball, no thinner than a pointer [L]; infinite without one."""
     ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
     met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
     return float(ahead[met].min(initial=np.inf))
@@ -223,22 +196,14 @@ def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
     return ahead, np.linalg.norm(offset - ahead[:, None] * way, axis=1)
 
 
-# Which point of a cloud a click means.
-
-
-def picked_point(
-    points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float
-) -> int | None:
-    """Number of the point that a ray from the camera hits; None if it passes all of them by.
-
-    Of the points, shape (n, 3), within an angle [rad] of the ray it is the nearest to the camera.
-    """
+def picked_point(points: Array, origin: ArrayLike, direction: ArrayLike) -> int | None:
+    """Number of the first of the points (n, 3) that a ray from the camera hits, if any."""
     direction = np.asarray(direction, float) / np.linalg.norm(direction)
     depth, aside = _beside(points, np.asarray(origin, float), direction)
     with np.errstate(divide="ignore", invalid="ignore"):
         angle = np.where(depth > 0, aside / depth, np.inf)
-    near = np.flatnonzero(angle <= tolerance)
+    near = np.flatnonzero(angle <= _CLICK)
     if not len(near):
         return None
     # A little deeper but under the cursor is better than in front and beside it.
-    return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / tolerance))])
+    return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / _CLICK))])

@@ -19,15 +19,13 @@ from softreach.studio import markup
 from softreach.studio.reach import Reach, count_activations, nearest_samples, shown_samples
 from softreach.studio.state import LEVELS, rod_of
 from softreach.studio.work import all_cores
+from softreach.support.arrays import Array, Index
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
-FAINT = (196, 198, 206)
-"""Gray, of the cloud without loads."""
-
+FAINT = (196, 198, 206)  # gray, of the cloud without loads
 _MOST_COUNTS = 8  # numbers of activations that the key tells apart
 _PERCENTILES = (1.0, 99.0)  # beyond which values look like the next ones
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
@@ -42,11 +40,8 @@ def color_names(arm: Manipulator) -> dict[str, str]:
         names["strongest"] = "strongest bundle"
     labels = zip(input_symbols(arm), box.names, strict=True)
     names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
-    names["manipulability"] = "manipulability"
-    names["activation distance"] = "activation distance D̄"
-    if box.dimension == 3:
-        names["multiplicity"] = "multiplicity"
-    return names
+    names |= {"manipulability": "manipulability", "activation distance": "activation distance D̄"}
+    return names | ({"multiplicity": "multiplicity"} if box.dimension == 3 else {})
 
 
 def shown_color(arm: Manipulator, color: str) -> str:
@@ -76,10 +71,7 @@ def sample_values(reach: Reach, level: int, color: str) -> str | int | xr.DataAr
 
 
 def sample_colors(reach: Reach, level: int, color: str, *, shares: bool = True) -> Coloring:
-    """Colors of the first 2^level samples; an unknown name colors by all activations.
-
-    A key of numbers of activations may have their shares of the samples.
-    """
+    """Colors of the first 2^level samples; the key to numbers of activations may have shares."""
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
     values = sample_values(reach, level, color)
     coloring = color_samples(cloud, values)
@@ -128,14 +120,14 @@ def key_html(key: BundleKey | ScalarKey | None) -> str:
     )
 
 
-def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
+def _manipulability(reach: Reach, rows: Index) -> Array:
     """√det(J Jᵀ) with J = ∂r/∂γ [L per input]; of fewer than three bundles an area or a length."""
     with all_cores:
         volume = dexterity(reach.cloud.isel(sample=rows)).manipulability.values
     return volume / reach.arm.length ** min(reach.arm.inputs, 3)
 
 
-def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
+def _activation_distance(reach: Reach, rows: Index) -> Array:
     """D̄ of the samples that are shown, among all that have a tip; NaN where isolated."""
     settled = np.flatnonzero(has_tip(reach.status))
     cloud = reach.cloud if len(settled) == reach.samples else reach.cloud.isel(sample=settled)
@@ -145,24 +137,19 @@ def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
     return distance.values[np.argsort(np.argsort(shown))]
 
 
-def _multiplicity(reach: Reach, rows: NDArray[np.int64]) -> Array:
-    """Number of activations; none is found where a set is thinner than a boundary looks inside."""
-    return np.maximum(count_activations(reach, rows), 1.0)
-
-
 _SCALES = {
     "manipulability": ("manipulability [{unit}]", _manipulability),
     "activation distance": ("activation distance D̄ [-]", _activation_distance),
-    "multiplicity": ("multiplicity", _multiplicity),
+    # none is found where a set is thinner than a boundary looks inside
+    "multiplicity": ("multiplicity", lambda *shown: np.maximum(count_activations(*shown), 1.0)),
 }
 """Colors that are numbers: label of the key, and values of samples."""
 
 _LIGHT = np.array([0.35, -0.55, 0.76])  # from the front, the right and above
-_DARKEST, _BRIGHTEST = 0.62, 1.0
+_SHADE = 0.38  # of what looks away from it
 
 
 def shaded(colors: NDArray[Any], outward: Array) -> NDArray[np.uint8]:
     """Colors of a surface, shape (n, 3), as a lamp lights what looks outward, shape (n, 3)."""
     facing = np.clip(outward @ _LIGHT, -1.0, 1.0)
-    shade = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * 0.5 * (1.0 - facing)
-    return np.rint(colors * shade[:, None]).astype(np.uint8)
+    return np.rint(colors * (1.0 - _SHADE * 0.5 * (1.0 - facing))[:, None]).astype(np.uint8)

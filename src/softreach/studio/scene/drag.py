@@ -6,16 +6,15 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.studio.scene.camera import add_label
+from softreach.support.arrays import Array
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
-Array = NDArray[np.float64]
 OnDrag = Callable[[str, Array], None]
-"""(phase "start", "update" or "end"; where the ball should be [L])."""
+"""(phase "start", "update" or "end"; where the ball should be [L]), on the event loop: quick."""
 
 _HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
 _CLEAR = 0.4  # opacity of a ball that is seen through
@@ -31,21 +30,12 @@ class DragBall:
     """Nodes that move instead of being drawn anew: a node that is replaced is let go."""
 
     def __init__(self, api: SceneApi, on_drag: OnDrag, eye: Callable[[], Array]) -> None:
-        """Draw into a scene once there is a tip; `eye` tells where the camera is [L].
-
-        `on_drag` is called on the event loop, so that it must not take long.
-        """
+        """Draw into a scene once there is a tip; `eye` tells where the camera is [L]."""
         self._api, self._on_drag, self._eye = api, on_drag, eye
         self._nodes: tuple[Any, Any] | None = None
-        self._dark = False
 
-    def move(
-        self, tip: Array | None, radius: float = 0.0, *, dark: bool = False, clear: bool = False
-    ) -> None:
-        """Put the ball on the tip [L], around an arm of this radius [L]; None hides it.
-
-        It is light on a dark page; what is inside a clear one is seen, such as where a path begins.
-        """
+    def move(self, tip: Array | None, radius: float, *, dark: bool, clear: bool) -> None:
+        """Put the ball on the tip of an arm of this radius [L], clear or not, or hide it."""
         if self._nodes is None and tip is not None:
             self._nodes = self._drawn(tip)
         if self._nodes is None:
@@ -56,11 +46,8 @@ class DragBall:
             return
         halo.position = tip
         ball.radius, halo.radius = max(1.2 * radius, _SMALLEST), max(1.6 * radius, _HALO)
-        if dark != self._dark:
-            self._dark = dark
-            halo.color = ball.color = _LIGHT if dark else _COLOR
-        if (opacity := _CLEAR if clear else None) != ball.opacity:
-            ball.opacity = opacity
+        halo.color = ball.color = _LIGHT if dark else _COLOR
+        ball.opacity = _CLEAR if clear else None
 
     def show_lag(self, ends: tuple[Array, Array] | None, gap: str) -> None:
         """A line between where the tip should be and is [L], and how long it is; "" for none."""
@@ -75,50 +62,38 @@ class DragBall:
         self._api.add_label("/lag/label", f"{gap} short", anchor="bottom-center")
 
     def _drawn(self, tip: Array) -> tuple[Any, Any]:
-        look: Any = {"cast_shadow": False}
-        halo = self._api.add_icosphere("/grip", _HALO, _COLOR, opacity=0.25, position=tip, **look)
-        ball = self._api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, **look)
-        offset = np.zeros(3)
-
-        @halo.on_drag("left")
-        async def _(event: Any) -> None:  # on the event loop, which keeps phases in order
-            nonlocal offset
-            if event.phase == "start":
-                offset = np.array(halo.position) - event.start_position
-            self._on_drag(event.phase, np.array(event.end_position) + offset)
-
-        for axis, name in enumerate(_AXES):
-            self._draw_axis(halo, axis, name)
-        return halo, ball
-
-    def _draw_axis(self, halo: Any, axis: int, name: str) -> None:
         from trimesh.creation import revolve
 
-        direction, mesh = np.eye(3)[axis], revolve(_ARROW, sections=12)
-        vertices = np.roll(mesh.vertices, axis + 1, axis=1).astype(np.float32)
-        arrow = self._api.add_mesh_simple(
-            f"/grip/{name}", vertices, mesh.faces, color=_AXES[name], cast_shadow=False
-        )
-        add_label(self._api, f"/grip/{name}/letter", name, _LETTER * direction)
-        begin, pressed = np.zeros(3), 0.0
+        api, mesh = self._api, revolve(_ARROW, sections=12)
+        look: Any = {"cast_shadow": False}
+        halo: Any = api.add_icosphere("/grip", _HALO, _COLOR, opacity=0.25, position=tip, **look)
+        ball = api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, **look)
+        self._grip(halo, halo, lambda _, seen: seen)
+        for axis, (name, color) in enumerate(_AXES.items()):
+            path, direction = f"/grip/{name}", np.eye(3)[axis]
+            vertices = np.roll(mesh.vertices, axis + 1, axis=1).astype(np.float32)
+            arrow = api.add_mesh_simple(path, vertices, mesh.faces, color=color, **look)
+            add_label(api, f"{path}/letter", name, _LETTER * direction)
+            way = lambda begin, seen, d=direction: along_axis(begin, d, self._eye(), seen) * d
+            self._grip(arrow, halo, way)
+        return halo, ball
 
-        @arrow.on_drag("left")
-        async def _(event: Any) -> None:
+    def _grip(self, node: Any, halo: Any, place: Callable[[Array, Array], Array]) -> None:
+        """Let a node be dragged: the ball moves as the place of its begin and what is seen."""
+        begin, pressed = np.zeros(3), np.zeros(3)
+
+        @node.on_drag("left")
+        async def _(event: Any) -> None:  # on the event loop, which keeps phases in order
             nonlocal begin, pressed
-            eye = self._eye()
             if event.phase == "start":
                 begin = np.array(halo.position)
-                pressed = along_axis(begin, direction, eye, np.array(event.start_position))
-            reached = along_axis(begin, direction, eye, np.array(event.end_position))
-            self._on_drag(event.phase, begin + (reached - pressed) * direction)
+                pressed = place(begin, np.array(event.start_position))
+            reached = place(begin, np.array(event.end_position))
+            self._on_drag(event.phase, begin + reached - pressed)
 
 
 def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:
-    """Place on an axis that is nearest to a line of sight, as the distance from its origin.
-
-    The direction of the axis has length 1, the line of sight leads from the eye to a place that is
-    seen. The distance is 0 where the axis is seen end on.
-    """
+    """Way along an axis of length 1 to where a line of sight is nearest; 0 if seen end on."""
     sight = (seen - eye) / np.linalg.norm(seen - eye)
     across = axis - (axis @ sight) * sight
     steepness = float(across @ across)

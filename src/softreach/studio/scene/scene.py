@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,28 +13,26 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
-from softreach.picture.shading import vertex_normals
-from softreach.plot.coloring import UNSTABLE
+from softreach.picture.zbuffer import vertex_normals
+from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
 from softreach.rod.kinematics import configuration, rest_configuration
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import NumberedBox, way_to
 from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
-from softreach.studio.scene.surfaces import Skin, glb, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
+from softreach.support.arrays import Array, Mask
 from softreach.support.palette import bundle_color, eight_bit
+from softreach.workspace.sheets import clipped
 
 if TYPE_CHECKING:
     from viser import SceneApi
 
-    from softreach.plot.coloring import BundleKey, ScalarKey
-    from softreach.rod.tip_map import TipMap
-
-Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
-MOST_BUNDLES = 100
-"""With more the body alone is drawn: skins of hundreds take a minute."""
+_UNLIT = "KHR_materials_unlit"
+_LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
+MOST_BUNDLES = 100  # with more the body alone is drawn: skins of hundreds take a minute
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
@@ -41,6 +40,7 @@ _BODY: Color = (158, 153, 148)  # stands out through the surface from a light an
 _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST = 0.35
+_SHADOWLESS: Any = {"cast_shadow": False, "receive_shadow": False}
 _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which the arm is seen
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
 _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
@@ -69,10 +69,9 @@ class Scene:
 
     def __init__(self, api: SceneApi) -> None:
         self.api, self.axes = api, NumberedBox(api)
-        self.pointing: Array = np.full(3, np.nan)
-        """Direction d3 of the tip of the arm, as it is drawn."""
+        self.pointing: Array = np.full(3, np.nan)  # direction d3 of the tip of the arm as drawn
         self._arms: dict[str, _Arm] = {}
-        self._clouds: dict[str, tuple[NDArray[np.bool_], Any]] = {}
+        self._clouds: dict[str, tuple[Mask, Any]] = {}
         self._lock = threading.RLock()
         self._ahead: Array | None = None
         self._base = np.zeros(3)
@@ -112,21 +111,10 @@ class Scene:
         """A ball at a place, with a radius [L]."""
         self.api.add_icosphere(path, radius, color, position=place)
 
-    def _mesh(
-        self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
-    ) -> Any:
-        look: Any = {"opacity": opacity, "side": "double"}
-        look |= {"cast_shadow": False, "receive_shadow": False}
-        corners, faces = vertices.astype(np.float32), faces.astype(np.uint32)
-        return self.api.add_mesh_simple(path, corners, faces, color=color, **look)
-
-    # Clouds, of which the half in front of the arm is cut away.
-
     def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
-        Nothing is sent of a cloud that keeps its points. Of each the first `most` are drawn, which
-        stay the same until another number is wanted; None is for all, as for no cut.
+        Of each cloud the first `most` points are drawn; one whose points stay is not sent again.
         """
         is_thin = most is not None and most == self._most
         self._ahead, self._base, self._most = ahead, base, most
@@ -137,13 +125,13 @@ class Scene:
                 if not np.array_equal(kept, self._kept(dots[0])):
                     self._cut_dots(path, *dots)
 
-    def hidden(self, points: Array) -> NDArray[np.bool_]:
+    def hidden(self, points: Array) -> Mask:
         """Mask of the points [L], shape (n, 3), that are cut away."""
         if self._ahead is None:
             return np.zeros(len(points), bool)
         return (points - self._base) @ self._ahead < 0.0
 
-    def _kept(self, points: Array) -> NDArray[np.bool_]:
+    def _kept(self, points: Array) -> Mask:
         return ~self.hidden(points) & (np.arange(len(points)) < (self._most or len(points)))
 
     def _cut_dots(self, path: str, points: Array, colors: NDArray[np.uint8], *look: Any) -> None:
@@ -167,11 +155,9 @@ class Scene:
         self._cut_dots("/unstable", marks, color, _UNSTABLE_SIZE * size, "diamond")
         return coloring.key
 
-    # Surfaces.
-
-    def draw_surface(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
+    def draw_surface(self, reach: Reach | None, look: Appearance) -> BundleKey | ScalarKey | None:
         """The exact boundary, if it is shown, slow the first time; the key to its own colors."""
-        if not (look.surface and reach.has_surface):
+        if reach is None or not (look.surface and reach.has_surface):
             self.remove("/surface")
             return None
         if shows_cloud(reach, look):  # whose colors it would hide
@@ -196,13 +182,10 @@ class Scene:
         drawn = in_slice(lines.reshape(-1, 3), cut).reshape(-1, 2).all(axis=1) & (ink is not None)
         opened = cut.axis != "none" or reach.exact is None or reach.exact.dimension < 3
         data = glb(skin, opacity, lines[drawn], ink or DARK, both_sides=opened)
-        self.api.add_glb(path, data, cast_shadow=False, receive_shadow=False)
+        self.api.add_glb(path, data, **_SHADOWLESS)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
-        """Another reach, pale: at "/free" that without loads, at "/reference" of the kept design.
-
-        Points stand in for a surface that there is not; None takes it away.
-        """
+        """Another reach, pale, at "/free" or "/reference": its surface, else points, or nothing."""
         color, opacity = _BESIDE[path]
         self.remove(path)
         if reach is None:
@@ -216,12 +199,9 @@ class Scene:
 
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
-        clouds = [reach] if free is None else [reach, free]
-        around = (cloud_points(source, 14) for source in clouds)
+        around = [cloud_points(each, 14) for each in (reach, free) if each is not None]
         straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
         self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm)
-
-    # Arms.
 
     @property
     def spine(self) -> tuple[Array, Array]:
@@ -230,10 +210,7 @@ class Scene:
         return (np.empty((0, 3)), np.empty(0)) if drawn is None else (drawn.centers, drawn.radii)
 
     def ghost_under(self, origin: Array, direction: Array) -> int | None:
-        """Number of the ghost that a ray meets before any other and before the arm.
-
-        Near their tips, where all shapes meet, ghosts are not met.
-        """
+        """Number of the ghost that a ray meets before others and the arm, away from their tips."""
         met = []
         for path, ghost in list(self._arms.items()):
             if path.startswith("/ghosts"):
@@ -251,10 +228,9 @@ class Scene:
         length: float | None = None,
         rod: TipMap | None = None,
     ) -> Array:
-        """The body, its fibers and markers, moved if they are there; returns the tip, shape (3,).
+        """The body, its fibers and markers, over a length [m]; returns the tip, shape (3,).
 
-        Nothing is drawn of an arm without equilibrium, and the tip is NaN. Lengths are over
-        `length` [m], by default that of the arm; `rod` is its tip map in another posture.
+        Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
         shape = configuration(rod or solvable_rod(arm), np.asarray(activation), _STATIONS)
         return self._draw_shape(arm, shape, path, length or arm.length)
@@ -276,18 +252,25 @@ class Scene:
             return np.full(3, np.nan)
         if path == "/arm":
             self.pointing = shape["directors"].values[-1, 2]
-        meshes, known = _arm_meshes(arm, shape), self._arms.get(path)
+        skins = [arm_surface(arm, shape, _SIDES)]
+        if arm.bundles <= MOST_BUNDLES:
+            skins += bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)
+        corners = [(skin.vertices / length).astype(np.float32) for skin in skins]
+        known = self._arms.get(path)
         if known is not None and known.arm is arm:
             handles = known.meshes
-            for handle, (vertices, _, _) in zip(handles, meshes, strict=True):
-                handle.vertices = (vertices / length).astype(np.float32)
+            for handle, vertices in zip(handles, corners, strict=True):
+                handle.vertices = vertices
         else:
             self.remove(path)
-            ghost = path.startswith(("/ghosts", "/sample"))
-            usual = [_GHOST] * len(meshes) if ghost else _opacities(arm, len(meshes))
+            ghost, faces = path.startswith(("/ghosts", "/sample")), [skin.faces for skin in skins]
+            clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
+            colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
+            add = partial(self.api.add_mesh_simple, side="double", **_SHADOWLESS)
+            parts = enumerate(zip(corners, faces, colors, clear, strict=True))
             handles = [
-                self._mesh(f"{path}/{k}", vertices / length, faces, color, usual[k])
-                for k, (vertices, faces, color) in enumerate(meshes)
+                add(f"{path}/{k}", v, f.astype(np.uint32), color=color, opacity=opacity)
+                for k, (v, f, color, opacity) in parts
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
         markers = marker_points(arm.markers, shape) / length
@@ -300,7 +283,7 @@ class Scene:
             usual = _opacities(drawn.arm, len(drawn.meshes))
             for handle, opacity in zip(drawn.meshes, usual, strict=True):
                 if handle.opacity != (target := _HIDING if clear else opacity):
-                    handle.opacity = target
+                    handle.opacity = target  # which fails for one that is taken away meanwhile
 
 
 def pieces(line: Array) -> Array:
@@ -318,15 +301,72 @@ def _point_size(count: int) -> float:
     return float(np.clip(_POINT * (_USUAL / max(count, 1)) ** (1 / 3), *_POINTS))
 
 
-def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:
-    """Vertices [m], faces and color of the body and of every bundle."""
-    skins = [arm_surface(arm, shape, _SIDES)]
-    if arm.bundles <= MOST_BUNDLES:
-        skins += bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)
-    colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
-    return [(s.vertices, s.faces, color) for s, color in zip(skins, colors, strict=True)]
-
-
 def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
     hidden = any(inside(arm)) or arm.markers
     return [_CLEAR if hidden else None, *[None] * (meshes - 1)]
+
+
+class Skin(NamedTuple):
+    """A surface and the color of its vertices."""
+
+    vertices: Array  # [L], shape (v, 3)
+    faces: NDArray[Any]
+    colors: Array  # RGB from 0 to 255, shape (v, 3)
+
+
+def in_slice(points: Array, cut: Slice) -> Mask:
+    """Mask of the points [L], shape (n, 3), that a slice shows."""
+    if cut.axis == "none":
+        return np.ones(len(points), bool)
+    return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
+
+
+def sliced(skin: Skin, cut: Slice) -> Skin:
+    """The part of a surface that a slice shows, cut at its planes."""
+    if cut.axis == "none":
+        return skin
+    vertices, faces, colors = skin
+    for side in (-1.0, 1.0):
+        depth = cut.thickness / 2 - side * (vertices[:, "xyz".index(cut.axis)] - cut.center)
+        share = lambda pairs, depth=depth: depth[pairs[:, 0]] / -np.diff(depth[pairs])[:, 0]
+        faces, pairs, shares = clipped(faces, depth >= 0.0, share)
+        inside, outside, at = *pairs.T, shares[:, None]
+        vertices, colors = (
+            np.concatenate([values, values[inside] * (1 - at) + values[outside] * at])
+            for values in (vertices, colors)
+        )
+    return Skin(vertices, faces, colors)
+
+
+def glb(
+    skin: Skin, opacity: float, lines: Array, ink: tuple[int, int, int], *, both_sides: bool
+) -> bytes:
+    """A surface and lines, ends [L] of shape (n, 2, 3), as binary glTF in their colors as they are.
+
+    viser's own meshes have one color each, its lines are slow, and so is light without a graphics
+    card. A surface that is seen from inside too takes a page twice as long.
+    """
+    from trimesh import Scene, Trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    colors = _linear(np.column_stack([skin.colors, np.full(len(skin.colors), 255.0 * opacity)]))
+    parts = [Trimesh(skin.vertices, skin.faces, vertex_colors=colors, process=False)]
+    if count := len(lines):  # pairs of corners, which trimesh takes for triples
+        pairs = np.resize(np.arange(2 * count), (2 * -(-count // 3), 3))
+        colors = _linear(np.tile([*ink, 255.0], (2 * count, 1)))
+        parts.append(Trimesh(lines.reshape(-1, 3), pairs, vertex_colors=colors, process=False))
+
+    def unlit(tree: dict[str, Any]) -> None:
+        look = {"alphaMode": "BLEND", "doubleSided": both_sides, "extensions": {_UNLIT: {}}}
+        tree |= {"extensionsUsed": [_UNLIT], "materials": [look]}
+        for mesh, mode in zip(tree["meshes"], (_TRIANGLES, _LINES), strict=False):
+            mesh["primitives"][0] |= {"material": 0, "mode": mode}
+
+    return export_glb(Scene(parts), include_normals=False, tree_postprocessor=unlit)
+
+
+def _linear(colors: Array) -> NDArray[np.uint8]:
+    """Colors as glTF has them, shape (n, 4), from 0 to 255."""
+    colors = (colors / 255).clip(0, 1)
+    colors[:, :3] **= 2.2
+    return np.rint(255 * colors).astype(np.uint8)

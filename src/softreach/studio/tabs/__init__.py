@@ -8,32 +8,25 @@ from typing import Any
 from softreach.studio.fields import Fields, attempt
 from softreach.studio.jobs import SCENE_JOBS
 from softreach.studio.session import Session
-from softreach.studio.tabs import goals, move
-from softreach.studio.tabs.compare import compare
-from softreach.studio.tabs.design import arm_parts, design, loads
-from softreach.studio.tabs.export import export
-from softreach.studio.tabs.goals import add_place, measured, needs
-from softreach.studio.tabs.move import activation, drag, extend_path, path, take, target
-from softreach.studio.tabs.view import plots, status, view
+from softreach.studio.tabs import compare, design, export, goals, move, view
 
 TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
-    "Design": (design,),
-    "Parts": (loads, arm_parts),
-    "Move": (drag, activation, target, path),
-    "View": (view,),
-    "Plots": (plots,),
-    "Compare": (compare,),
-    "Goals": (needs, measured),
-    "Export": (export,),
+    "Design": (design.design,),
+    "Parts": (design.loads, design.arm_parts),
+    "Move": (move.drag, move.activation, move.target, move.path),
+    "View": (view.view,),
+    "Plots": (view.plots,),
+    "Compare": (compare.compare,),
+    "Goals": (goals.needs, goals.measured),
+    "Export": (export.export,),
 }
-JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)
-"""Every kind of work that a tab has done for it."""
+JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)  # every kind of work that a tab has done for it
 
 
 def furnish(session: Session) -> None:
     """Add all panels to the page of a session."""
     panels = [Fields(session)]
-    status(panels[0])
+    view.status(panels[0])
     tabs = session.client.gui.add_tab_group()
     for name, declared in TABS.items():
         with tabs.add_tab(name):
@@ -51,8 +44,8 @@ def click(session: Session, origin: Any, direction: Any) -> None:
     """Do what the mouse is for with the place under the cursor, or take the shape there."""
     uses: dict[str, Callable[[Any], object]] = {
         "target": session.aim,
-        "path": lambda place: extend_path(session, place),
-        "place": lambda place: add_place(session, place),
+        "path": lambda place: move.extend_path(session, place),
+        "place": lambda place: goals.add_place(session, place),
     }
     use, answer = uses.get(session.state.appearance.mouse), session.found.answer
     if use is not None:
@@ -62,4 +55,4 @@ def click(session: Session, origin: Any, direction: Any) -> None:
     elif answer is not None:
         ghost = session.scene.ghost_under(origin, direction)
         if ghost is not None and ghost < len(answer):
-            take(session, answer.activations[ghost])
+            move.take(session, answer.activations[ghost])

@@ -83,11 +83,9 @@ def _change_text(row: Row) -> str:
     before, now = row.errors
     if not row.change:
         return "–" if row.change is None else "="
-    if before is None or now is None:
-        return _digits(row.change, None, "+")
-    error = before + now
+    error = None if before is None or now is None else before + now
     text = _digits(row.change, error, "+")
-    if not row.kept:
+    if error is None or not row.kept:
         return text
     return f"{text} ({_digits(100 * row.change / row.kept, 100 * error / row.kept, '+')} %)"
 
@@ -136,19 +134,18 @@ def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) ->
 
 def _explained(kept: Manipulator, now: Manipulator, names: Sequence[str]) -> bool:
     """True if the kept design becomes the present one by these parameters alone."""
+    kinds = lambda arm: (  # all that is no number
+        *(type(arm.profile), arm.loads is None),
+        *((ring.name, ring.material) for ring in arm.section.rings),
+        *((type(each), each.name) for each in arm.actuators),
+    )
     try:
         goal = parameters(now)
         near = changed(kept, {name: goal[name].value(now) for name in names})
     except (KeyError, SoftreachError):
         return False
     alike = not _differing(named_parameters(near), named_parameters(now))
-    return alike and _shape(near) == _shape(now)
-
-
-def _shape(arm: Manipulator) -> object:
-    """Kinds and names of the parts: all that is no number."""
-    rings = [(ring.name, ring.material) for ring in arm.section.rings]
-    return type(arm.profile), rings, [(type(a), a.name) for a in arm.actuators], arm.loads is None
+    return alike and kinds(near) == kinds(now)
 
 
 def _finite(value: float) -> Value:

@@ -15,7 +15,7 @@ from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
 from softreach.studio.captions import tip_text
-from softreach.studio.fields import GRAY, Attribute, Fields, of_design
+from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
 from softreach.studio.figures import NO_BAR, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import (
@@ -34,10 +34,31 @@ from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 from softreach.support.units import LengthUnit
 
-# Sliders, numbers that have none, and named designs to start from
+Numbers = Callable[[Manipulator], Sequence[ShownParameter]]
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
+_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
+_NEW_RING = "ring"
+_ABOUT_MADE_OF = (
+    "Material of all rings: tendons and chambers need its Young's modulus E, "
+    "which some arms leave open"
+)
+_NAME = TextKind("a name", lambda text: text.strip() or None, str)
+_ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
+_WAYS = {name: name for name in POINTS} | {"up": "up (upright)", "down": "down (hanging)"}
+_WAYS[""] = "as the file says"
+_NONE = Loads(gravity=GRAVITIES["none"])
+_MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
+_SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
+_LEVER = "From the tip to the center of the payload's mass, as x, y, z in the tip's directors"
+_LOADS = {
+    "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
+    "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
+    "payload_arm": ("lever arm", "", 0.0, _LEVER),
+    "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
+}
+"""Loads that are typed: field -> label, unit ("" for that of lengths), its size, and meaning."""
 
 
 def design(panel: Fields) -> None:
@@ -45,19 +66,12 @@ def design(panel: Fields) -> None:
     _numbers(panel, "design", slider_parameters, _sliders)
     _numbers(panel, "body", body_numbers, _typed)
     names = {"": "this design"} | {name: name for name in designs.__all__}
-    named = Attribute(
-        lambda state: next((name for name, arm in _designs().items() if arm == state.design), ""),
-        lambda state, name: state.replace(design=_designs()[name]) if name else state,
-    )
-    panel.dropdown("start from", names, named, _ABOUT_START)
+    read = lambda state: next((name for name, arm in _designs().items() if arm == state.design), "")
+    write = lambda state, name: state.replace(design=_designs()[name]) if name else state
+    panel.dropdown("start from", names, Attribute(read, write), _ABOUT_START)
 
 
-def _numbers(
-    panel: Fields,
-    label: str,
-    shown: Callable[[Manipulator], Sequence[ShownParameter]],
-    build: Callable[[Fields, Sequence[ShownParameter]], object],
-) -> None:
+def _numbers(panel: Fields, label: str, shown: Numbers, build: Build) -> None:
     """Fields of parameters, made anew for a design that has others."""
     session = panel.session
     arm = lambda: session.state.design
@@ -67,9 +81,12 @@ def _numbers(
         session.follow("slopes")
         return refusal(error, shown(arm()), arm())
 
+    def remake(fields: Fields, _: object) -> None:
+        fields.words = words
+        build(fields, shown(arm()))
+
     key = lambda state, _: [each[:2] for each in shown(state.design)]
-    remake = lambda fields, _: build(fields, shown(arm()))
-    panel.anew(label, "design", key=key, build=remake, words=words)
+    panel.anew(label, "design", key=key, build=remake)
 
 
 def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
@@ -118,18 +135,6 @@ def _designs() -> dict[str, Manipulator]:
     return {name: getattr(designs, name)() for name in designs.__all__}
 
 
-# Rings and actuators
-
-_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
-_NEW_RING = "ring"
-_ABOUT_MADE_OF = (
-    "Material of all rings: tendons and chambers need its Young's modulus E, "
-    "which some arms leave open"
-)
-_NAME = TextKind("a name", lambda text: text.strip() or None, str)
-_ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
-
-
 def arm_parts(panel: Fields) -> None:
     """A list of parts, the fields of the one that is chosen, and new parts."""
     session = panel.session
@@ -142,12 +147,9 @@ def arm_parts(panel: Fields) -> None:
 
         def add() -> None:
             before, is_ring, matter = session.state.design, kind.value == _NEW_RING, made_of.value
-
-            def grown(arm: Manipulator) -> Manipulator:
-                arm = arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
-                return edits.with_ring(arm) if is_ring else edits.with_actuator(arm, kind.value)
-
-            panel.apply(lambda state: state.replace(design=grown(state.design)))
+            made = lambda arm: arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
+            grown = edits.with_ring if is_ring else lambda arm: edits.with_actuator(arm, kind.value)
+            panel.apply(lambda state: state.replace(design=grown(made(state.design))))
             if session.state.design != before:
                 known = _listed(session.state.design).values()
                 like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
@@ -157,20 +159,19 @@ def arm_parts(panel: Fields) -> None:
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
 
     def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
-        fields.message = message
+        fields.message, fields.words = message, words
         _part(fields, *chosen[:2])
 
     def words(error: SoftreachError) -> str:
         arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
         return refusal(error, part_parameters(arm, known[label]), arm)
 
-    panel.anew("part", "design", "found.part", key=_chosen, build=build, words=words)
+    panel.anew("part", "design", "found.part", key=_chosen, build=build)
     message = panel.kept(Line(panel.gui))
     panel.message, panel.words = message, words
 
 
 def _listed(arm: Manipulator) -> dict[str, Part]:
-    """The parts that are edited here, by their labels."""
     return {label: part for label, part in parts(arm).items() if label != "body"}
 
 
@@ -182,13 +183,9 @@ def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, 
 
 
 def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
-    """The fields of the part that is chosen."""
     session, part, labels = panel.session, known[label], tuple(known)
-    chosen = Attribute(
-        lambda found: min(found.part, len(labels) - 1),
-        lambda found, number: replace(found, part=number),
-        "found",
-    )
+    read = lambda found: min(found.part, len(labels) - 1)
+    chosen = Attribute(read, lambda found, number: replace(found, part=number), "found")
     hint = "The part whose numbers are below"
     panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
     own = part.ring is not None or bool(part.actuator)
@@ -206,21 +203,17 @@ def _add_matter(panel: Fields, part: Part) -> None:
     """What a ring is made of, and the ring that an actuator is in."""
     ring, arm = part.ring, panel.session.state.design
     if ring is not None:
-        of_ring = of_design(
-            lambda arm: arm.section.rings[ring].material.name,
-            lambda arm, name: part.changed(arm, material=name) if name else arm,
-        )
-        _material(panel, "material", _AS_TYPED, of_ring)
+        read = lambda arm: arm.section.rings[ring].material.name
+        write = lambda arm, name: part.changed(arm, material=name) if name else arm
+        _material(panel, "material", _AS_TYPED, of_design(read, write))
     if ring == 0:
         core = lambda arm: arm.section.core.name if arm.section.core else ""
         _material(panel, "core", _AS_INNERMOST, of_design(core, edits.with_core))
     if part.home is not None and len(arm.section.rings) > 1:
         rings = {k: edits.ring_label(arm, k) for k in range(len(arm.section.rings))}
         home = lambda arm: next(p.home for p in parts(arm).values() if p.actuator == part.actuator)
-        at = of_design(
-            lambda arm: arm.section.rings.index(arm.section.ring(home(arm) or 0)),
-            lambda arm, ring: part.changed(arm, ring=ring),
-        )
+        read = lambda arm: arm.section.rings.index(arm.section.ring(home(arm) or 0))
+        at = of_design(read, lambda arm, ring: part.changed(arm, ring=ring))
         panel.dropdown("in ring", rings, at, "The ring that it lies in")
 
 
@@ -228,30 +221,6 @@ def _material(panel: Fields, label: str, none: str, at: Attribute) -> None:
     names = {"": none} | {name: name for name in material_names()}
     known = at._replace(read=lambda state: name if (name := at.read(state)) in names else "")
     panel.dropdown(label, names, known, _ABOUT_MATERIAL)
-
-
-# Base and loads
-
-_WAYS = {name: name for name in POINTS} | {
-    "up": "up (upright)",
-    "down": "down (hanging)",
-    "": "as the file says",
-}
-_NONE = Loads(gravity=GRAVITIES["none"])
-_MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
-_SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
-_LOADS = {
-    "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
-    "payload": ("payload", "g", 1e-3, "m: mass at the tip; it weighs what gravity makes of it"),
-    "payload_arm": (
-        "lever arm",
-        "",
-        0.0,
-        "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
-    ),
-    "tip_force": ("tip force", "N", 1.0, "F: force on the tip as x, y, z in the world"),
-}
-"""Loads that are typed: field -> label, unit ("" for that of lengths), its size, and meaning."""
 
 
 def loads(panel: Fields) -> None:
@@ -262,23 +231,18 @@ def loads(panel: Fields) -> None:
 
 
 def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
-    points = of_design(
-        lambda arm: arm.base.points if isinstance(arm.base.points, str) else "",
-        lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm,
-    )
+    read = lambda arm: arm.base.points if isinstance(arm.base.points, str) else ""
+    write = lambda arm, way: arm.replace(base=arm.base.replace(points=way)) if way else arm
     way = "Which way the straight arm points from its base, in the world"
-    panel.dropdown("base", _WAYS, points, way)
+    panel.dropdown("base", _WAYS, of_design(read, write), way)
     where = "r(0): where the arm is clamped, as x, y, z in the world"
     panel.typed(unit.label("base at"), base_field("position"), where, vector_kind)
     turn = "ψ: turn of the base about the way the arm points"
     panel.typed("turn [deg]", base_field("turn"), turn)
     gravity, names = load_field("gravity"), {name: name for name in GRAVITIES} | {"": "as typed"}
-    fall = Attribute(
-        gravity_name,
-        lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
-    )
+    to = lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state
     falls = "Direction of gravity in the world; the base says which way the arm points"
-    panel.dropdown("gravity", names, fall, falls)
+    panel.dropdown("gravity", names, Attribute(gravity_name, to), falls)
     for name, (label, symbol, _, hint) in _LOADS.items():
         kind = number_kind if name == "payload" else vector_kind
         panel.typed(f"{label} [{symbol or unit.name}]", load_field(name), hint, kind)
@@ -286,7 +250,7 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     off, about = lambda s: s.replace(design=s.free or s.design), "Gravity, payload and all forces"
     panel.change("Take all loads off", off, about, "design.loads", **GRAY)
     follows = "design", "found.tip", "found.pointing", "found.posture"
-    rests = lambda s, found: tip_text(found, s.design) if s.design.loads else ()
+    rests = lambda state, found: tip_text(state, found) if state.design.loads else ()
     panel.text(*follows, content=rests)
     more = lambda s, _: ", ".join(other_loads(s.design))
     act = lambda *known: [f"The design file also has: {more(*known)}."] * bool(more(*known))
@@ -298,8 +262,7 @@ def other_loads(arm: Manipulator) -> list[str]:
     loads = arm.loads or _NONE
     names = ("tip_moment", "follower_force", "follower_moment", "force_per_length")
     others = [name.replace("_", " ") for name in names if any(getattr(loads, name))]
-    count = len(loads.point_loads)
-    return others + ([f"point loads ({count})"] if count else [])
+    return others + [f"point loads ({len(loads.point_loads)})"] * bool(loads.point_loads)
 
 
 def setting_text(state: StudioState) -> str:
@@ -328,19 +291,13 @@ def gravity_name(state: StudioState) -> str:
 def base_field(name: str) -> Attribute:
     """Position in the unit of lengths that are typed, or turn in degrees."""
     scale = lambda arm: math.radians(1.0) if name == "turn" else typed_unit(arm).size
-    return of_design(
-        lambda arm: _over(getattr(arm.base, name), scale(arm)),
-        lambda arm, value: arm.replace(base=arm.base.replace(**{name: _times(value, scale(arm))})),
-    )
+    read = lambda arm: _over(getattr(arm.base, name), scale(arm))
+    moved = lambda arm, value: arm.base.replace(**{name: _times(value, scale(arm))})
+    return of_design(read, lambda arm, value: arm.replace(base=moved(arm, value)))
 
 
 def load_field(name: str) -> Attribute:
-    """A load in the unit that is typed; other loads stay, and without any the arm has no loads.
-
-    Writing raises:
-        InvalidInput: A number that no load can have.
-        InvalidDesign: Matter that lacks what loads need, and where to give it.
-    """
+    """A load as it is typed; other loads stay, and without any the arm has no loads."""
     label, symbol, size, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
     scale = lambda arm: size or typed_unit(arm).size
@@ -365,9 +322,8 @@ def _times(value: Any, scale: float) -> Any:
 
 
 def _over(value: Any, scale: float) -> Any:
-    if isinstance(value, tuple):
-        return vector(_over(each, scale) for each in value)
-    return value if scale == 1.0 else float(f"{value / scale:.10g}")
+    over = lambda number: number if scale == 1.0 else float(f"{number / scale:.10g}")
+    return vector(map(over, value)) if isinstance(value, tuple) else over(value)
 
 
 def _in_words(error: InvalidDesign) -> InvalidDesign:

@@ -21,7 +21,7 @@ from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.colors import sample_values
-from softreach.studio.scene.surfaces import in_slice
+from softreach.studio.scene.scene import in_slice
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState, design_of_text
@@ -40,6 +40,11 @@ _ABOUT = {
     "picture": "The scene as it is seen, with legend and design; three views and an oblique one of "
     "the points that are shown; or one web page with the scene, which turns without the studio",
 }
+_PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
+"""Of a light page and of a dark one."""
+_DPI = 100.0
+_KEY, _LINE, _EDGE = 62, 17, 14  # pixels: height of the key and of a line of text, margin
+_CHARACTER = 6.4  # pixels
 
 
 def export(panel: Fields) -> None:
@@ -65,12 +70,7 @@ def export(panel: Fields) -> None:
 
 
 def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
-    """The state in a file that was saved, or the present one with the design of a TOML file.
-
-    Raises:
-        InvalidInput: Neither of them.
-        InvalidDesign: The design in it cannot exist.
-    """
+    """The state in a file that was saved, or the present one with the design of a TOML file."""
     text = file_text(name, content)
     if name.lower().endswith(".toml"):
         return state.replace(design=design_of_text(text, name))
@@ -92,9 +92,6 @@ def _reach(session: Session) -> Reach:
     return reach
 
 
-# Data, in the unit of the page
-
-
 def _write_design(session: Session, path: Path) -> None:
     path.write_text(session.state.design.file_text, encoding="utf-8")
 
@@ -114,16 +111,15 @@ def _write_surface(session: Session, path: Path) -> None:
 
 def _write_arm(session: Session, path: Path) -> None:
     arm = session.state.design
-    if not np.isfinite((shape := _shape(session.state)).position.values).all():
+    if not np.isfinite(
+        (shape := configuration(session.state.design, session.state.activation)).position.values
+    ).all():
         raise InvalidInput("activation", session.state.activation, "one with an equilibrium")
     export_arm(arm, shape, path, unit=arm.length_unit)
 
 
 def _shape(state: StudioState) -> xr.Dataset:
-    return configuration(state.design, np.asarray(state.activation))
-
-
-# Pictures
+    return configuration(state.design, state.activation)
 
 
 def _write_views(session: Session, path: Path) -> None:
@@ -150,22 +146,13 @@ def _write_page(session: Session, path: Path) -> None:
 
 
 def _shown(session: Session) -> tuple[xr.Dataset, str | int | xr.DataArray]:
-    """The points that are shown, and their colors."""
     reach, look = _reach(session), session.state.appearance
     known = [name for name in ("tip", "activation", "status") if name in reach.cloud]
     cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))
     color = sample_values(reach, look.level, look.color)
     kept = in_slice(cloud_points(reach, look.level), look.slice)
-    return cloud.isel(sample=kept), (
-        color if isinstance(color, str | int) else color.isel(sample=kept)
-    )
-
-
-_PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
-"""Of a light page and of a dark one."""
-_DPI = 100.0
-_KEY, _LINE, _EDGE = 62, 17, 14  # pixels: height of the key and of a line of text, margin
-_CHARACTER = 6.4  # pixels
+    color = color if isinstance(color, str | int) else color.isel(sample=kept)
+    return cloud.isel(sample=kept), color
 
 
 def _write_picture(session: Session, path: Path) -> None:
@@ -175,6 +162,9 @@ def _write_picture(session: Session, path: Path) -> None:
 
     state, reach, key = session.state, _reach(session), session.found.key
     scene = session.camera.picture()
+    seen = np.flatnonzero(scene[..., 3].any(axis=1))  # rows that are not empty
+    if len(seen):
+        scene = scene[max(0, seen[0] - FINER * _EDGE) : seen[-1] + FINER * _EDGE]
     height, width = (size / FINER for size in scene.shape[:2])
     room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
     texts = *_caption(state, reach), picture_text(session.found, reach, state.appearance)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.calibration import Calibration, calibrate
+from softreach.calibration import calibrate
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import read_measurements, read_table
 from softreach.calibration.model import MarkerModel
@@ -20,7 +19,7 @@ from softreach.requirements.checks import checked
 from softreach.studio import markup
 from softreach.studio.fields import GRAY, Attribute, Fields, file_text
 from softreach.studio.found import Bench, Found, Sample
-from softreach.studio.jobs import Given, Job, Learned, Results
+from softreach.studio.jobs import DESIGN, Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.camera import add_label
 from softreach.studio.scene.scene import DARK, MARK, MARKER, Scene, pieces
@@ -28,14 +27,12 @@ from softreach.studio.session import Session
 from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
-from softreach.support import palette
 from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
-from softreach.support.palette import eight_bit
+from softreach.support.palette import MET, MISSED, eight_bit
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     from viser import UploadedFile
-
 
 _EMPTY = {
     "place to reach": "x, y, z in {unit}; empty: where the tip is",
@@ -47,6 +44,16 @@ _EMPTY = {
 }
 """Kind of need -> contents of its field, in words."""
 _ALL = "everything"
+_ACCURACY = 0.03  # of shares that are covered, and of distances between stations
+_PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
+_POSES = ("reach", "cover", "stay_inside", "avoid")  # kinds of findings that other poses may change
+VERDICTS = {"met": eight_bit(MET), "missed": eight_bit(MISSED), "undecided": (200, 130, 0)}
+"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
+_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
+_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
+_MOST_LABELS = 20  # more would hide each other
+_MEASURED = 0.03  # edge of a dot [L]
+_SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
 
 
 def needs(panel: Fields) -> None:
@@ -58,10 +65,9 @@ def needs(panel: Fields) -> None:
         kind = gui.add_dropdown("add", tuple(_EMPTY), hint=about)
         field = gui.add_text("numbers", "", hint="Numbers with commas between them")
         unit = lambda: session.state.design.length_unit
-        expected = panel.text(
-            "design", content=lambda *_: [_EMPTY[kind.value].format(unit=unit().name)]
-        )
-        kind.on_update(lambda _: expected.say(_EMPTY[kind.value].format(unit=unit().name)))
+        expected = lambda *_: [_EMPTY[kind.value].format(unit=unit().name)]
+        line = panel.text("design", content=expected)
+        kind.on_update(lambda _: line.say(*expected()))
 
         def add() -> None:
             add_need(session, kind.value, field.value)
@@ -95,19 +101,14 @@ def verdict(found: Found, state: StudioState) -> str:
     """What is met and what is missed, as HTML."""
     if (check := found.check) is None:
         return ""
-    lines = [_line(check, finding) for finding in check.findings]
+    lines: list[tuple[Part, ...]] = []
+    for finding in check.findings:
+        sign, mark = _SIGNS[finding.verdict], Swatch(VERDICTS[finding.verdict])
+        text = _reach_text(check, finding) if finding.kind == "reach" else finding.text
+        lines.append((mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"))
     if check.arm != state.design:
         lines.append(("of the design before, computing ...",))
     return "".join(markup.paragraph(*parts) for parts in lines)
-
-
-_SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
-
-
-def _line(check: Check, finding: Finding) -> tuple[Part, ...]:
-    mark, sign = Swatch(VERDICTS[finding.verdict]), _SIGNS[finding.verdict]
-    text = _reach_text(check, finding) if finding.kind == "reach" else finding.text
-    return mark, f" {sign} ", Term(finding.name, finding.text), f": {text}"
 
 
 def _reach_text(check: Check, finding: Finding) -> str:
@@ -131,18 +132,18 @@ def verdict_text(check: Check) -> str:
     return f"{text} · {worst.name}{more}{' undecided' * (worst.verdict == 'undecided')}"
 
 
-# Needs that are added and removed
-
-
 def add_need(session: Session, kind: str, text: str) -> None:
-    """Add one of the kinds of needs, as its field is filled.
-
-    Raises:
-        InvalidInput: The text has other numbers than this kind of need.
-    """
+    """Add one of the kinds of needs, as its field is filled; other numbers are refused."""
     state, needs = session.state, requirements_of(session.state.needs)
     (unit, size), length = state.design.length_unit, state.design.length
-    is_empty, numbers = not text.strip(), partial(_numbers, text, length=length)
+    is_empty = not text.strip()
+
+    def numbers(count: int, unit: str) -> tuple[float, ...]:
+        if (read := numbers_in(text, count, unit, length)) is None:
+            words = {1: "a number", 3: "three numbers, such as 0.2, 0, 0.7", 6: "six numbers"}
+            raise InvalidInput("numbers", repr(text), words[count])
+        return read
+
     if kind == "place to reach" and is_empty:
         if (tip := session.found.tip) is None:
             raise InvalidInput("tip", "nowhere", "in equilibrium, or type a place")
@@ -176,12 +177,7 @@ def add_place(session: Session, place: Iterable[float]) -> None:
 
 
 def read_needs(session: Session, name: str, content: bytes) -> None:
-    """Make the requirements in a file the needs.
-
-    Raises:
-        InvalidInput: The file is too large, no text, or lists too many places.
-        InvalidDesign: It has no requirements, or names other files.
-    """
+    """Make the requirements in a file the needs."""
     length = session.state.design.length
     _keep(session, needs_of_text(file_text(name, content), length=length, source=name))
 
@@ -226,15 +222,6 @@ def _unused(kind: str, parts: Sequence[Target | Keep]) -> str:
     return next(name for k in range(1, len(names) + 2) if (name := f"{kind} {k}") not in names)
 
 
-def _numbers(text: str, count: int, unit: str, length: float) -> tuple[float, ...]:
-    """So many numbers that a text lists, in a unit; anything else is refused."""
-    numbers = numbers_in(text, count, unit, length)
-    if numbers is None:
-        words = {1: "a number", 3: "three numbers, such as 0.2, 0, 0.7", 6: "six numbers"}
-        raise InvalidInput("numbers", repr(text), words[count])
-    return numbers
-
-
 # Measured poses
 
 _ABOUT_LOAD = (
@@ -261,19 +248,21 @@ def measured(panel: Fields) -> None:
     with panel.folder("measured poses", expanded=False):
         read = lambda file: _read_poses(session, file)
         panel.upload("Load measured poses (CSV)", read, _ABOUT_LOAD)
-        panel.text("found.bench", content=lambda _, found: _bench_text(found.bench))
+        panel.text("found.bench", content=_bench_text)
         with panel.folder("samples", "found.bench"):
-            at = lambda _, found: (
-                (found.bench.number, len(found.bench.data) - 1) if found.bench else (0, 1)
-            )
-            move = partial(_step_to, session)
+            places = lambda bench: (bench.number, len(bench.data) - 1) if bench else (0, 1)
+            at = lambda _, found: places(found.bench)
+
+            def move(number: int) -> None:
+                if (bench := session.found.bench) is not None:
+                    _pose(session, replace(bench, number=number))
+
             panel.steps("sample", "found.bench", at=at, move=move, hint=_ABOUT_SAMPLE)
-            follows = "design", "found.bench", "found.sample"
-            panel.text(*follows, content=lambda state, found: [_residuals_text(state, found)])
+            panel.text("design", "found.bench", "found.sample", content=_residuals_text)
             for name, label in _FREE.items():
                 panel.checkbox(label, _is_free(name), "Lets the fit change this number")
             panel.button("Fit", lambda: session.follow("fit"), _ABOUT_FIT)
-            panel.html("found.bench", content=lambda _, found: _summary(found.bench))
+            panel.html("found.bench", content=_summary)
             about = "Makes the calibrated arm the design; can be undone"
             fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
             panel.button("Apply", lambda: _apply(session), about, fitted)
@@ -308,11 +297,6 @@ def _pose(session: Session, bench: Bench) -> None:
     session.learn({"bench": bench})
 
 
-def _step_to(session: Session, number: int) -> None:
-    if session.found.bench is not None:
-        _pose(session, replace(session.found.bench, number=number))
-
-
 def _apply(session: Session) -> None:
     bench = session.found.bench
     arm = bench.fitted(session.state.design) if bench is not None else None
@@ -321,8 +305,8 @@ def _apply(session: Session) -> None:
     session.update(lambda state: state.replace(design=arm))
 
 
-def _bench_text(bench: Bench | None) -> list[str]:
-    if bench is None:
+def _bench_text(_: StudioState, found: Found) -> list[str]:
+    if (bench := found.bench) is None:
         return []
     data = bench.data
     inputs = ", ".join(name or "none" for name in data.input_names)
@@ -330,21 +314,20 @@ def _bench_text(bench: Bench | None) -> list[str]:
     return [f"{data.source}: {samples}; inputs {inputs}"]
 
 
-def _residuals_text(state: StudioState, found: Found) -> str:
+def _residuals_text(state: StudioState, found: Found) -> list[str]:
     sample, bench = found.sample, found.bench
     if sample is None or bench is None:
-        return "The arm is not at a measured pose: move the slider."
+        return ["The arm is not at a measured pose: move the slider."]
     known = zip(bench.data.marker_names, 1e3 * sample.distances, strict=True)
     each = [f"{name} {d:.3g} mm" if np.isfinite(d) else f"{name} unknown" for name, d in known]
     inputs, (low, high) = bench.data.inputs[bench.number], state.design.input_bounds.T
     beyond = bool(((inputs < low) | (inputs > high)).any())
     note = ". Its inputs are beyond the bounds, at which the arm is drawn" if beyond else ""
-    return f"predicted − measured: {', '.join(each)}{note}."
+    return [f"predicted − measured: {', '.join(each)}{note}."]
 
 
-def _summary(bench: Bench | None) -> str:
-    result: Calibration | None = None if bench is None else bench.result
-    if result is None:
+def _summary(_: StudioState, found: Found) -> str:
+    if found.bench is None or (result := found.bench.result) is None:
         return ""
     report = result.report()
     printed = [part for part in report.sections if part.rows and part.printed]
@@ -353,25 +336,6 @@ def _summary(bench: Bench | None) -> str:
     if not result.fit.converged:
         lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
     return "".join([*tables, *map(markup.paragraph, lines)])
-
-
-# Jobs
-
-
-_ACCURACY = 0.03  # of shares that are covered, and of distances between stations
-_PAUSE = 0.4  # [s] without a change, before needs that are missed are looked at again
-_POSES = ("reach", "cover", "stay_inside", "avoid")
-"""Kinds of findings that other poses may change."""
-VERDICTS = {
-    "met": eight_bit(palette.MET),
-    "missed": eight_bit(palette.MISSED),
-    "undecided": (200, 130, 0),
-}
-"""Colors of needs; a ball is reached and a cross missed, for who cannot tell them apart."""
-_BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
-_REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
-_MOST_LABELS = 20  # more would hide each other
-_MEASURED = 0.03  # edge of a dot [L]
 
 
 def _check(given: Given) -> Results:
@@ -396,7 +360,6 @@ def _check(given: Given) -> Results:
 
 
 def _draw_needs(given: Given) -> None:
-    """The places and regions of a design that was judged."""
     check, scene = given.found.check, given.scene
     scene.remove("/needs")
     if check is None:
@@ -404,17 +367,15 @@ def _draw_needs(given: Given) -> None:
     if len(check.places):
         _draw_places(check, scene)
     length, needs = check.arm.length, check.requirements
-    around, verdicts = (
-        length * np.array(scene.axes.corners),
-        {(f.kind, f.name): f.verdict for f in check.findings},
-    )
+    around = length * np.array(scene.axes.corners)
+    verdicts = {(each.kind, each.name): each.verdict for each in check.findings}
     named = [(keep.kind, keep.name, keep.region) for keep in needs.keeps]
     named += [("cover", t.name, t.region) for t in needs.targets if t.region is not None]
     for k, (kind, name, region) in enumerate(named):
-        verdict = verdicts.get((kind, name), "met")
         lines = np.concatenate([pieces(line / length) for line in region.wireframe(around)])
-        is_met = verdict == "met"
-        color, width = (_REGION[kind], _FINE) if is_met else (VERDICTS[verdict], _BROAD)
+        color, width = _REGION[kind], _FINE
+        if (verdict := verdicts.get((kind, name), "met")) != "met":
+            color, width = VERDICTS[verdict], _BROAD
         scene.lines(f"/needs/region {k}", lines, color, width)
 
 
@@ -482,14 +443,7 @@ def _fit(given: Given) -> Results:
 
 
 JOBS = (
-    Job(
-        "needs",
-        "design design.display_unit needs",
-        _check,
-        _draw_needs,
-        wanted="needs",
-        makes="check",
-    ),
+    Job("needs", f"{DESIGN} needs", _check, _draw_needs, wanted="needs", makes="check"),
     Job("sample", "design activation found.bench", _predict, _draw_sample, wanted="found.bench"),
     Job("fit", "", _fit, doing="calibrating"),
 )

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.arm.manipulator import Manipulator
 from softreach.export.clouds import path_csv
 from softreach.inverse.drag import Drag
 from softreach.inverse.path import PathStatus, end_text, track_path
@@ -33,27 +32,30 @@ if TYPE_CHECKING:
     import xarray as xr
     from viser import UploadedFile
 
-    from softreach.inverse import Solution
-
-
-# The tip, dragged
-
 _DRAG_HINT = (
     "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
     "solutions."
 )
+_KINDS = {"N": "tension", "Pa": "pressure"}  # kinds of inputs by their units
+_MOST = 40  # sliders: a page with hundreds takes minutes to build
+_HERE = "\N{CHECK MARK} "
+_NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
+_POINTS = 24  # of the straight line to each place that is clicked
+_FAMILY = 6  # shapes offered where infinitely many reach the target
+_DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
+_RESIDUAL = 1e-8  # [L]
+_STEP = 0.05  # [s] between points that are played
+_TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
+_PALE = (240, 175, 205)  # of a path, where the arm does not follow it
 
 
 def drag(panel: Fields) -> None:
     """Use of the mouse in the scene, and the ball on the tip that it may drag."""
     session = panel.session
-
-    def follow(phase: str, wanted: np.ndarray) -> None:
-        """Only the latest order is followed."""
-        session.learn({"pull": Pull(wanted, rests=phase == "end")}, quiet=True)
-
+    pull = lambda phase, wanted: {"pull": Pull(wanted, rests=phase == "end")}
+    order = lambda *given: session.learn(pull(*given), quiet=True)  # only the latest is followed
     eye = lambda: np.array(session.camera.actual().position)
-    ball = DragBall(session.client.scene, follow, eye)
+    ball = DragBall(session.client.scene, order, eye)
     about = "Use of the mouse in the scene, which it turns besides; a click is on a reached place"
     panel.dropdown("mouse", MOUSE, attribute("appearance.mouse"), about)
 
@@ -84,19 +86,11 @@ def _gap(state: StudioState, found: Found) -> str:
     return state.design.length_unit.rounded(short, digits=".3g") if short else ""
 
 
-# Activations
-
-_KINDS = {"N": "tension", "Pa": "pressure"}
-"""Kinds of inputs by their units."""
-_MOST = 40  # sliders: a page with hundreds takes minutes to build
-
-
 def activation(panel: Fields) -> None:
     """Activations of the bundles within their bounds, and the place of the tip."""
     follows = "design", "found.tip", "found.pointing", "found.posture"
-    panel.text(*follows, content=lambda state, found: tip_text(found, state.design))
-    ends = lambda state, _: _slider_ends(state.design)
-    panel.anew("activation", "design", key=ends, build=_sliders)
+    panel.text(*follows, content=tip_text)
+    panel.anew("activation", "design", key=_slider_ends, build=_sliders)
     rest = "Sets every activation to 0, or the nearest to it"
     panel.change("Rest", lambda state: state.replace(activation=()), rest, **GRAY)
 
@@ -118,20 +112,13 @@ def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
         panel.say(f"{hidden} more bundles have no slider here{drawn}.")
 
 
-def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
-    """Label and bounds of every bundle."""
-    ends = []
+def _slider_ends(state: StudioState, _: Found) -> list[tuple[str, float, float]]:
+    arm, ends = state.design, []
     numbers = input_symbols(arm), arm.input_names, arm.input_units, rod_of(arm).box.bounds
     for symbol, name, unit, (low, high) in zip(*numbers, strict=True):
         label = f"{_KINDS[unit]} of {name}" if unit in _KINDS else f"{symbol} {name}"
         ends.append((label + (unit != "1") * f" [{unit}]", low, high))
     return ends
-
-
-# A target, and every activation that reaches it
-
-_HERE = "\N{CHECK MARK} "
-_NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
 
 
 def target(panel: Fields) -> None:
@@ -142,7 +129,7 @@ def target(panel: Fields) -> None:
 
 def _target(panel: Fields, unit: LengthUnit) -> None:
     session, arm = panel.session, panel.session.state.design
-    panel.text("found.answer", content=lambda state, found: [_answer_text(found.answer, state)])
+    panel.text("found.answer", content=_answer_text)
     kind = vector_kind(unit.name, lambda: session.state.design.length)
     straight = tuple(unit.of(arm.base.to_world([0.0, 0.0, arm.length])).tolist())
     field = TypedField(panel.gui, unit.label("target"), straight, "Where the tip should go", kind)
@@ -180,31 +167,25 @@ def _solutions(panel: Fields, _: object) -> None:
 
 def take(session: Session, activation: Any) -> None:
     """Move the arm to a solution."""
-    there = tuple(activation.tolist())
-    session.update(lambda state: state.replace(activation=there))
+    session.update(lambda state: state.replace(activation=tuple(activation.tolist())))
 
 
-def _answer_text(answer: Solution | None, state: StudioState) -> str:
-    if answer is None:
-        return "Every activation that reaches a place: drag the tip there, type it, or click."
+def _answer_text(state: StudioState, found: Found) -> list[str]:
+    if (answer := found.answer) is None:
+        return ["Every activation that reaches a place: drag the tip there, type it, or click."]
     arm, unit = state.design, state.design.length_unit
     place = place_text(answer.target / arm.length, arm)
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
         near = place_text(answer.nearest / arm.length, arm)
         gap = unit.rounded(answer.gap, digits=".3g")
-        return f"{place} is {certain}. Nearest: {near}, {gap} away."
+        return [f"{place} is {certain}. Nearest: {near}, {gap} away."]
     count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
-    return (
+    return [
         f"{count} {place} to {unit.rounded(answer.residuals.max(), digits='.1e')}. Press one "
         f"({', '.join(arm.input_names)}) to move the arm there, or click its shape; the one with a "
         "check mark is where it is."
-    )
-
-
-# A path
-
-_POINTS = 24  # of the straight line to each place that is clicked
+    ]
 
 
 def path(panel: Fields) -> None:
@@ -224,13 +205,24 @@ def path(panel: Fields) -> None:
             at = lambda s, found: (s.path.at if s.path else 0, max(len(_followed(s, found)) - 1, 0))
             hint = "point of the path where the arm is"
             follows = "path", "found.track"
-            panel.steps("point", *follows, at=at, move=partial(_step_to, session), hint=hint)
+
+            def move(point: int) -> None:
+                activations = _followed(session.state, session.found)
+                session.update(lambda state: _at_point(state, activations, point))
+
+            panel.steps("point", *follows, at=at, move=move, hint=hint)
 
             def save() -> None:
                 if (track := _track(session.state, session.found)) is not None:
                     session.send("path.csv", path_csv(track).encode)
 
             panel.button("Save the path (CSV)", save, "with its activations")
+
+
+def _path_text(state: StudioState, found: Found) -> list[str]:
+    track = _track(state, found)
+    text = "following ..." if track is None else end_text(track, state.design.length_unit)
+    return [text] * (state.path is not None)
 
 
 def _track(state: StudioState, found: Found) -> xr.Dataset | None:
@@ -245,13 +237,6 @@ def _followed(state: StudioState, found: Found) -> np.ndarray:
     if (track := _track(state, found)) is None:
         return np.empty((0, len(state.activation)))
     return track.activation.values[track.status.values == PathStatus.FOLLOWED]
-
-
-def _path_text(state: StudioState, found: Found) -> list[str]:
-    if state.path is None:
-        return []
-    track = _track(state, found)
-    return ["following ..." if track is None else end_text(track, state.design.length_unit)]
 
 
 def extend_path(session: Session, point: np.ndarray) -> None:
@@ -272,11 +257,6 @@ def _read_path(session: Session, file: UploadedFile) -> None:
     session.update(lambda state: state.replace(path=read))
 
 
-def _step_to(session: Session, point: int) -> None:
-    activations = _followed(session.state, session.found)
-    session.update(lambda state: _at_point(state, activations, point))
-
-
 def _tip(state: StudioState) -> np.ndarray:
     """Place of the tip [m]; an arm without equilibrium is refused."""
     tip = solvable_rod(state.design).tips(np.array([state.activation]))[0]
@@ -285,33 +265,21 @@ def _tip(state: StudioState) -> np.ndarray:
     return tip
 
 
-# Jobs
-
-
-_FAMILY = 6  # shapes offered where infinitely many reach the target
-_DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
-_RESIDUAL = 1e-8  # [L]
-_STEP = 0.05  # [s] between points that are played
-_TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
-_PALE = (240, 175, 205)  # of a path, where the arm does not follow it
-
-
-def _solve(given: Given) -> Results:
+def _solve(given: Given) -> Sequence[Learned]:
     from softreach.inverse import solve_inverse
 
     state, change = given.state, None
     if state.target is None:
-        yield Learned({"answer": None})
-        return
+        return [Learned({"answer": None})]
     solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
     answers = solve_inverse(state.design, [state.target], near=near, family=_FAMILY, from_rest=True)
     answer = answers[0]
     if given.found.takes_nearest and len(answer):
         distance = np.linalg.norm(answer.activations - state.activation, axis=1)
-        best = tuple(answer.activations[int(np.argmin(distance))].tolist())
+        best = tuple(answer.activations[np.argmin(distance)].tolist())
         change = lambda now: now.replace(activation=best)
-    yield Learned({"answer": answer, "takes_nearest": False}, change)
+    return [Learned({"answer": answer, "takes_nearest": False}, change)]
 
 
 def _draw_answer(given: Given) -> None:

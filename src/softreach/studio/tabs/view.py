@@ -31,6 +31,28 @@ _NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
 _ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
 _WORK = "tab.busy", "tab.doing", "tab.compiling", "tab.canceled"
+_TOGGLES = {
+    "arm": ("arm", "The body and its bundles in the present activation"),
+    "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
+    "cloud": ("cloud", "Tips of sampled activations"),
+    "half": ("half of the cloud", "Cuts away the half in front of the arm"),
+    "dark": ("dark page", "Light on dark"),
+}
+_PLOTS_HINT = (
+    "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
+    "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
+)
+_ABOUT_SWEEP = "Volume of designs that differ from this one in one parameter, computed as you look"
+_PLOTS = {
+    "section": (
+        "section",
+        "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
+        "boundary, and how many activations reach each place",
+    ),
+    "sweep": ("V against parameter", _ABOUT_SWEEP),
+}
+_WIDTH = 380  # pixels
+_NOTHING = np.zeros((1, 1, 4), np.uint8)
 
 
 def status(panel: Fields) -> None:
@@ -43,43 +65,35 @@ def status(panel: Fields) -> None:
 
     def offer(_: StudioState, found: Found) -> None:
         lacking = is_behind(session) and not found.refusal
-        label = _GO_ON if lacking and not session.busy else _CANCEL
-        shown = lacking or session.busy
-        if (cancel.label, cancel.visible) != (label, shown):
-            cancel.label, cancel.visible = label, shown
+        cancel.label = _GO_ON if lacking and not session.busy else _CANCEL
+        cancel.visible = lacking or session.busy
 
     panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
-    toast: Any = None
+    toasts: list[Any] = []
 
-    def note(_: StudioState, __: Found) -> None:
-        nonlocal toast
-        if toast is not None:
-            toast.remove()
-        say = partial(session.client.add_notification, auto_close_seconds=_NOTE_SECONDS)
-        toast = say("", session.note) if session.note else None
+    def note(*_: object) -> None:
+        while toasts:
+            toasts.pop().remove()
+        if session.note:
+            say = session.client.add_notification
+            toasts.append(say("", session.note, auto_close_seconds=_NOTE_SECONDS))
 
     panel.follow("tab.note", show=note)
-    actions = {
-        "Undo": lambda: session.step(back=True),
-        "Redo": lambda: session.step(back=False),
-        "Reset": session.reset,
-    }
+    undo, redo = partial(session.step, back=True), partial(session.step, back=False)
+    actions = {"Undo": undo, "Redo": redo, "Reset": session.reset}
     panel.choices("history", actions, _HISTORY_HINT)
 
 
 def _numbers(session: Session, found: Found) -> str:
-    """What is known, and whether it is about to change."""
     check, reach = found.check, found.reach
     above = [_reach_line(session), [verdict_text(check)] if check is not None else []]
     below: list[list[Part]] = []
     if reach is not None:
-        below.append(legend_text(reach, free=found.free is not None))
-        if reach.refusal:
-            below.append([f"No exact volume: {reach.refusal}"])
-        if reach.fine and reach.notes:
-            below.append([f"{'; '.join(reach.notes)}."])
-    lines = [markup.paragraph(*line) for line in (*above, *below)]
-    return markup.status(*lines[:2], key_html(found.key), *lines[2:])
+        refusal: list[Part] = [f"No exact volume: {reach.refusal}"] * bool(reach.refusal)
+        notes: list[Part] = [f"{'; '.join(reach.notes)}."] * bool(reach.fine and reach.notes)
+        below = [legend_text(reach, free=found.free is not None), refusal, notes]
+    lines = lambda lines: [markup.paragraph(*line) for line in lines]
+    return markup.status(*lines(above), key_html(found.key), *lines(below))
 
 
 def is_behind(session: Session) -> bool:
@@ -97,40 +111,22 @@ def _reach_line(session: Session) -> list[Part]:
 
 
 def _work(session: Session) -> str:
-    if words := session.compiling:
-        return words
-    if session.doing:
-        return f"{session.doing} ..."
-    if not is_behind(session):
-        return ""
+    if session.compiling or session.doing:
+        return session.compiling or f"{session.doing} ..."
     idle = "canceled" if session.canceled else "not computed"
-    return "computing ..." if session.busy else idle
-
-
-# Looks
-
-
-_TOGGLES = {
-    "arm": ("arm", "The body and its bundles in the present activation"),
-    "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
-    "cloud": ("cloud", "Tips of sampled activations"),
-    "half": ("half of the cloud", "Cuts away the half in front of the arm"),
-    "dark": ("dark page", "Light on dark"),
-}
+    missing = "computing ..." if session.busy else idle
+    return missing if is_behind(session) else ""
 
 
 def view(panel: Fields) -> None:
     """Fields of the appearance."""
     offered = lambda state: color_names(state.design)
-    color = Attribute(
-        lambda state: shown_color(state.design, state.appearance.color),
-        lambda state, name: state.showing(color=name),
-    )
+    colored = lambda state, name: state.showing(color=name)
+    color = Attribute(lambda state: shown_color(state.design, state.appearance.color), colored)
     about = "What the color of a point says; the key is above the tabs"
     panel.dropdown("color by", offered, color, about)
-    lengths = Attribute(
-        lambda state: state.design.length_unit.name, lambda state, name: state.showing(unit=name)
-    )
+    named = lambda state, name: state.showing(unit=name)
+    lengths = Attribute(lambda state: state.design.length_unit.name, named)
     about = "Unit of lengths, areas and volumes, here and in saved files"
     panel.dropdown("unit", {name: name for name in UNITS}, lengths, about)
     with panel.folder("show"):
@@ -150,46 +146,21 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     """The middle of the slab, in the unit of the design."""
     (unit, length), center = size, attribute("appearance.slice.center")
     over = length / unit.size
-    at = Attribute(
-        lambda state: float(f"{over * center.read(state):.9g}"),
-        lambda state, value: center.write(state, value / over),
-    )
+    read = lambda state: float(f"{over * center.read(state):.9g}")
+    at = Attribute(read, lambda state, value: center.write(state, value / over))
     ends = -1.5 * over, 1.5 * over
     panel.slider(unit.label("center"), ends, 0.01 * over, at, "Middle of the slab along the axis")
 
 
-# Plots beside the scene
-
-_HINT = (
-    "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
-    "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
-)
-_PLOTS = {
-    "section": (
-        "section",
-        "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
-        "boundary, and how many activations reach each place",
-    ),
-    "sweep": (
-        "V against parameter",
-        "Volume of designs that differ from this one in one parameter, computed as you look",
-    ),
-}
-_WIDTH = 380  # pixels
-_NOTHING = np.zeros((1, 1, 4), np.uint8)
-
-
 def plots(panel: Fields) -> None:
     """Check boxes in the tab; a folder for each plot in the window."""
-    panel.say(_HINT)
+    panel.say(_PLOTS_HINT)
     for name, (label, hint) in _PLOTS.items():
         panel.checkbox(label, attribute(f"appearance.{name}"), hint)
     about = "What changes in the plot of V against a parameter"
     offered = lambda state: {s.name: s.label for s in slider_parameters(state.design)} or {"": ""}
-    swept = Attribute(
-        lambda state: one.name if (one := swept_parameter(state)) is not None else "",
-        lambda state, name: state.showing(sweep=True, swept=name),
-    )
+    read = lambda state: one.name if (one := swept_parameter(state)) is not None else ""
+    swept = Attribute(read, lambda state, name: state.showing(sweep=True, swept=name))
     panel.dropdown("parameter", offered, swept, about)
     window = panel.gui.add_panel(visible=False)
 
@@ -208,7 +179,6 @@ def plots(panel: Fields) -> None:
 
 
 def _figure(panel: Fields, name: str) -> None:
-    """A folder with a picture and a line on it."""
     known: Callable[[Found], Picture | None] = attrgetter(name)
 
     def draw(_: StudioState, found: Found) -> None:
