@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach.arm.base import POINTS
 from softreach.arm.design_file.keys import keys_of
-from softreach.arm.written import Written
+from softreach.arm.parameters import Written
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber

@@ -11,18 +11,19 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
-from softreach.arm.number import Number, alternatives, fields_of
+from softreach.arm.number import Number, alternatives, fields_of, unit_suffix
 from softreach.arm.part import gathered
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
 from softreach.support.arguments import as_instance, as_text, plain
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean
+from softreach.support.quantity import read_quantity, unit_names
 
 __all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "parameters"]
 
@@ -461,3 +462,57 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
         example = next(key for key, parameter in known.items() if parameter.owner)
         allowed += f", or of one part ({listed}), such as {example}"
     return InvalidInput("parameter", name, allowed, hint)
+
+
+# Parameters as files and the command line write them: the unit in the name, angles in degrees.
+
+
+def written_name(name: str, unit: str) -> str:
+    """A name with its unit: `taper_deg`, `left.helical_angle.values_deg[2]`."""
+    return with_suffix(name, unit_suffix(unit))
+
+
+def with_suffix(name: str, suffix: str) -> str:
+    """The name with a suffix, which stands before the place in a series."""
+    return re.sub(r"(\[\d+\])?$", lambda place: suffix + place[0], name, count=1)
+
+
+class Written:
+    """Parameters by every name, with and without units, and values as people write them."""
+
+    def __init__(self, plain: Mapping[str, Parameter]) -> None:
+        self.written = {written_name(name, p.unit): p for name, p in plain.items()}
+        self.by_key = {**self.written, **plain}
+        self._with_unit = self.written.keys() - plain.keys()
+
+    @classmethod
+    def of(cls, arm: Manipulator) -> Self:
+        """Those of an arm."""
+        return cls(parameters_by_every_name(arm))
+
+    def number(self, key: str, value: object, unit: str | None = None) -> float:
+        """A value in SI: a number under a key with its unit, or text with it; else ValueError."""
+        unit = self.by_key[key].unit if unit is None else unit
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError(value)
+        if key in self._with_unit:
+            return from_written(read_quantity(str(value), "1"), unit)
+        if not isinstance(value, str) and value != 0 and unit != "1":
+            raise ValueError(value)
+        return read_quantity(str(value), unit)
+
+    def allowed(self, key: str, unit: str | None = None) -> str:
+        """Kind of value allowed under a key, in words."""
+        unit = self.by_key[key].unit if unit is None else unit
+        if key in self._with_unit:
+            return "a finite number without a unit, which the name holds"
+        units = ", ".join(unit_names(unit))
+        if not units:
+            return "a finite number without a unit"
+        under = f", or a number under {written_name(key, unit)}" if key in self.by_key else ""
+        return f"a finite number with its unit ({units}){under}"
+
+
+def from_written(value: float, unit: str) -> float:
+    """A value in SI units, from degrees where these are radians."""
+    return math.radians(value) if unit == "rad" else value
