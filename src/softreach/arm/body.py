@@ -98,11 +98,7 @@ class RestStrains(UnseenActuator):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Body:
-    """A slender body with actuators in it.
-
-    Raises:
-        InvalidDesign: It cannot exist; the error names every fault.
-    """
+    """A slender body with actuators in it."""
 
     profile: Profile
     """R2(Z), the outer radius along the arm, and its length."""
@@ -313,11 +309,7 @@ def named_actuators(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
 
 
 def mass(arm: Body) -> float:
-    """Mass of the arm [kg].
-
-    Raises:
-        InvalidDesign: A layer without a density.
-    """
+    """Mass of the arm [kg]; raises InvalidDesign for a layer without a density."""
     inside = (arm.length * x for x in arm.section.breaks)
     ends = np.array(sorted({0.0, *arm.profile.breakpoints, *inside, arm.length}))
     half = 0.5 * np.diff(ends)[:, None]

@@ -94,10 +94,7 @@ def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
 
 @lru_cache(maxsize=64)
 def check_extension(arm: Body) -> None:
-    """The theory ends where an activation would shorten the arm to nothing.
-
-    Args:
-        arm: The inner arm.
+    """The theory ends where an activation would shorten the inner arm to nothing.
 
     Raises:
         InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, dimensions too

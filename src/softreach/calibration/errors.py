@@ -62,10 +62,9 @@ class Repeatability(NamedTuple):
 
 
 def repeatability(data: Measurements, residuals: Array) -> Repeatability:
-    """From pairs of samples with the same inputs, or with near ones.
+    """From residuals (n, marker, 3) [m], NaN where unknown, of pairs of same or near inputs.
 
-    Residuals are compared, predicted minus measured places (n, marker, 3) [m], NaN where unknown,
-    so that the arm's own motion between near inputs does not count.
+    So the arm's own motion between near inputs does not count.
     """
     spans = np.ptp(data.inputs, axis=0)
     moving = spans > 0

@@ -118,10 +118,7 @@ def _orders(model: MarkerModel, values: Array, own: Array, places: Array) -> lis
 
 
 def _exchanges(model: MarkerModel) -> Iterator[_Order]:
-    """Exchanges of two inputs of one unit, two axes, two markers, or two of their columns.
-
-    Of several actuators with three bundles or more also all counted the other way round.
-    """
+    """Exchanges of two inputs of one unit, axes, markers or columns, and all senses of bundles."""
     arm, names = model.free.arm, model.names
     inputs, columns = np.arange(arm.inputs), np.arange(3 * len(names))
     each, words = columns.reshape(-1, 3), [f"{name} {axis}" for name in names for axis in "xyz"]
@@ -175,9 +172,6 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
     """Refuse numbers that the data cannot tell: those that do nothing, and those that trade.
 
     `slopes` are derivatives of all residuals and priors, shape (residual, number).
-
-    Raises:
-        InvalidInput: The names of the numbers, and which to leave out.
     """
     scaled = slopes * free.scale
     sizes = np.linalg.norm(scaled, axis=0)

@@ -134,12 +134,7 @@ class FreeNumbers:
 def free_numbers(
     arm: Manipulator, free: Sequence[str], prior: Mapping[str, Any] | None = None
 ) -> FreeNumbers:
-    """Free numbers by their names, with "pose.position" and "pose.rotation" for parts of a pose.
-
-    Raises:
-        InvalidInput: A name that no number has, a number that counts something, or a prior that is
-            no width above 0.
-    """
+    """Free numbers by their names, with "pose.position" and "pose.rotation" for parts of a pose."""
     given = as_names("free", free)
     if arm.rest.is_straight and any("rest." in name for name in given):
         # All arms on the way have a rest shape, were it of the size of rounding.

@@ -207,10 +207,7 @@ class MarkerModel:
         pulled: Array,
         near: tuple[list[_Explicit], list[Neighbors]],
     ) -> Array:
-        """Derivatives of the rod's activations where guides hold tendons, (n, bundle, number).
-
-        `pulled` are those of activations with displacements.
-        """
+        """Derivatives of the rod's activations with guides, by those with displacements."""
         columns, on_arcs = tendons.law.columns, np.zeros_like(pulled)
         for k, (change, neighbors) in enumerate(zip(*near, strict=True)):
             own = gamma[:, columns] * change.compliance + change.taut_from
@@ -267,10 +264,7 @@ def _slopes(
     *,
     by_length: bool = False,
 ) -> Array:
-    """Derivatives of the places by all numbers, (n, marker, 3, number).
-
-    `driven` are those of activations: with displacements where these are still to become tensions.
-    """
+    """Derivatives of places, (n, marker, 3, number); `driven` are those of activations."""
     bundles = state.gamma.shape[1]
     tables = [change.table for change in changes]
     response = linear_response(at.table, state, tables, at.measures)
