@@ -52,7 +52,8 @@ class Driving:
     @lazy
     def is_bundles(self) -> bool:
         """True if the activations of the bundles are those of the inner arm."""
-        return not (self.law.columns.size or has_guides(self.arm))
+        pulled = any(isinstance(each, LengthTendon) for each in self.arm.actuators)
+        return not (pulled or has_guides(self.arm))
 
     @lazy
     def is_affine(self) -> bool:
