@@ -269,7 +269,6 @@ def test_an_arm_with_drives_is_what_its_file_says():
     assert Manipulator.from_toml(arm.to_toml()) == arm
     assert hash(Manipulator.from_toml(arm.to_toml())) == hash(arm)
     assert "[[drives]]" in arm.to_toml()
-    assert "drives" not in four().to_toml()
 
 
 def test_parameters_of_drives_change_gains_and_keep_their_signs():

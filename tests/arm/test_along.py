@@ -24,11 +24,7 @@ from softreach.arm import (
     Section,
 )
 from softreach.arm.along import AlongArm
-from softreach.arm.lines import (
-    limit_shortening,
-    line_lengths,
-    line_strains,
-)
+from softreach.arm.lines import limit_shortening, line_lengths, line_strains
 from softreach.arm.parameters import changed, parameters
 from softreach.support.errors import InvalidDesign
 from tests.kinds import angles_along, fibers_and_a_tendon, profiles, stations, values_at

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach.arm.base import POINTS
 from softreach.arm.design_file.keys import keys_of
-from softreach.arm.written import Written
+from softreach.arm.parameters import Written
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber
@@ -91,9 +91,9 @@ class TestPose:
 class TestFiles:
     """`[base]` in design files."""
 
-    def test_an_upright_base_at_the_origin_has_no_table(self, trunk):
-        assert "base" not in trunk.to_toml()
-        assert trunk.base == sr.Base()
+    def test_what_an_arm_does_not_have_has_no_table(self, trunk):
+        assert not any(name in trunk.to_toml() for name in ("base", "loads", "drives"))
+        assert (trunk.base, trunk.loads, trunk.drives) == (sr.Base(), None, ())
         assert trunk.base.is_identity
 
     def test_words_and_degrees_are_as_people_write_them(self, trunk):
@@ -115,11 +115,6 @@ class TestFiles:
 
 
 # Loads are a part of an arm: values, files, parameters
-
-
-def test_an_arm_without_loads_has_no_table_of_them(trunk):
-    assert "loads" not in trunk.to_toml()
-    assert sr.Manipulator.from_toml(trunk.to_toml()).loads is None
 
 
 @pytest.mark.parametrize(

@@ -119,13 +119,6 @@ def test_fibers_that_leave_no_length_of_matter_are_refused_also_where_pressure_l
         check_extension(arm(fiber, chamber(activation_bounds=(pressure, pressure))))
 
 
-def test_three_even_chambers_of_one_pressure_only_lengthen():
-    pressure = 2e4
-    tip = sr.tip_positions(arm(chamber(bundles=3, offset=0.7)), [[pressure] * 3])[0]
-    zeta = 1 + 3 * pressure * math.pi * 0.004**2 / K0
-    np.testing.assert_allclose(tip, [0, 0, zeta * LENGTH], atol=1e-13)
-
-
 def test_sizes_that_are_ratios_shrink_with_the_arm_and_lengths_do_not():
     tapered = CYLINDER.replace(taper=0.03)
     z = np.array([0.0, LENGTH])

@@ -16,7 +16,6 @@ from softreach.arm import (
     Material,
     Ring,
     Section,
-    Tendon,
 )
 from softreach.arm.tables import compliance, tables
 from softreach.support.errors import InvalidDesign
@@ -80,27 +79,6 @@ class TestYoungsModulus:
         section = Section(rings=(Ring(inner_ratio=0.5), Ring(inner_ratio=0.2, outer_ratio=0.4)))
         arm = self.arm(section, FiberArchitecture(helical_angle=0.1, extent=0.5))
         assert np.isfinite(tables(arm, [0.0]).curvature).all()
-
-    def test_it_is_asked_for_by_name_where_materials_differ(self):
-        soft = Material(poisson_ratio=0.3, name="soft")
-        with pytest.raises(InvalidDesign) as caught:
-            Section(
-                rings=(Ring(inner_ratio=0.5, material=RUBBER), Ring(inner_ratio=0.5)), core=soft
-            )
-        assert [fault.path for fault in caught.value.faults] == [
-            "core.young_modulus",
-            "rings[1].material.young_modulus",
-        ]
-        assert "must be given in Pa where materials differ" in str(caught.value)
-
-    def test_it_is_asked_for_by_name_where_an_activation_is_a_force(self):
-        section = Section(rings=(Ring(inner_ratio=0.5),))
-        tendon = Tendon(name="left", distance=0.01, activation_bounds=(0, 5))
-        with pytest.raises(
-            InvalidDesign,
-            match=r"^rings\[0\].material.young_modulus: must be given in Pa for tendon 'left'",
-        ):
-            self.arm(section, tendon)
 
 
 # Laws of the section: its stiffness is what elasticity says, and what it may be made of

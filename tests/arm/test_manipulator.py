@@ -135,10 +135,6 @@ class TestNames:
         assert names[0] == "fiber 2"
         assert len(set(names)) == 3
 
-    def test_two_actuators_of_one_name_are_refused(self, trunk):
-        with pytest.raises(sr.InvalidDesign, match=r"actuators\[1\].name = 'left': must differ"):
-            trunk.replace(actuators=tuple(f.replace(name="left") for f in trunk.actuators))
-
     def test_two_bundles_of_one_name_are_refused(self):
         fiber = sr.FiberArchitecture(helical_angle=0.0, extent=0.1)
         with pytest.raises(sr.InvalidDesign, match="'a 1': names two bundles"):

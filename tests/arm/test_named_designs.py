@@ -181,13 +181,9 @@ def test_every_number_has_a_source_among_the_references(name):
     }
     keys = re.findall(r"^### (\w+)$", (DOCS / "references.md").read_text("utf-8"), re.MULTILINE)
     assert set(record.sources) == numbers >= {"young_modulus", "poisson_ratio"}
+    assert record.material.name == name
     cited = {*record.sources.values(), *re.findall(r"\[(\w+)\]", record.note)}
     assert cited <= set(keys)
-
-
-@pytest.mark.parametrize("name", MATERIALS)
-def test_a_material_of_the_library_carries_its_name(name):
-    assert named_material(name).name == name
 
 
 def test_materials_come_from_soft_to_stiff():

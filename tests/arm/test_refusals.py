@@ -13,7 +13,6 @@ import pytest
 import softreach as sr
 from softreach.arm import (
     Actuator,
-    AlongArm,
     Chamber,
     Drive,
     FiberArchitecture,
@@ -35,8 +34,6 @@ from softreach.arm import (
     Section,
     Tendon,
 )
-from softreach.arm.design_file.keys import keys_of
-from softreach.arm.design_file.schema import json_schema
 from softreach.arm.number import fields_of, number, own_fields
 from softreach.arm.parameters import changed, parameters
 from softreach.arm.tables import tables
@@ -269,19 +266,6 @@ def test_the_declared_range_is_that_of_the_part(kind, field):
         assert field in {fault.path for fault in caught.value.faults}
 
 
-@pytest.mark.parametrize("kind", [kind for kind in PARTS if not issubclass(kind, AlongArm)])
-def test_the_declared_unit_is_that_of_the_key_and_of_the_schema(kind):
-    known = {
-        key: one
-        for table in json_schema()["$defs"].values()
-        for key, one in table["properties"].items()
-    }
-    for name, key in keys_of(kind).items():
-        if key.number is not None:
-            assert name == key.number.key
-            assert "description" in known[name]
-
-
 def test_every_declared_number_of_an_arm_is_a_parameter_with_its_range(trunk):
     for one in parameters(trunk).values():
         assert one.symbol
@@ -410,8 +394,3 @@ def test_a_function_along_the_arm_is_allowed_where_it_is_declared():
     assert sr.Tendon(distance=Samples(values=(0.1, 0.2), **places), activation_bounds=(0, 1))
     with pytest.raises(InvalidDesign, match="or Samples along the arm"):
         sr.Tendon(distance=Pieces(values=(0.1,), **places), activation_bounds=(0, 1))
-
-
-def test_the_text_of_a_design_is_written_once(trunk):
-    assert trunk.to_toml() is trunk.to_toml()
-    assert trunk.replace().to_toml() == trunk.to_toml()

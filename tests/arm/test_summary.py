@@ -26,12 +26,7 @@ from softreach.arm import (
     designs,
 )
 from softreach.arm.actuators.sector import ring_integrals
-from softreach.arm.bending import (
-    bending_at,
-    largest_bending,
-    sharpest_bending,
-    smallest_bending,
-)
+from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.driving import extension_range
 from softreach.arm.tables import check_extension, tables
 from softreach.requirements import Limits, Requirements

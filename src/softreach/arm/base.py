@@ -35,8 +35,7 @@ _ALLOWED = (
     f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z), "
     "or a rotation vector (three numbers [rad])"
 )
-_NEAR = 1e-6
-"""Largest error of the numbers of a rotation: what is typed with seven digits."""
+_NEAR = 1e-6  # Largest error of the numbers of a rotation: what is typed with seven digits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,34 +116,24 @@ def _as_rotation(points: Any) -> Array | str:
     if isinstance(points, str):
         return np.array(POINTS[points]) if points in POINTS else _ALLOWED
     numbers = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)
-    read = {(3,): _of_vector, (4,): _of_quaternion, (3, 3): _of_matrix}.get(numbers.shape)
-    return read(numbers) if read and np.isfinite(numbers).all() else _ALLOWED
-
-
-def _of_matrix(matrix: Array) -> Array | str:
-    off = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
-    if off > _NEAR:
-        columns = f"its columns are not of length 1 and at right angles, by {off:.2g}"
-        return f"must be a rotation; {columns}"
-    if np.linalg.det(matrix) < 0:
-        return "must be a rotation; these axes are left-handed"
-    return matrix
-
-
-def _of_quaternion(quaternion: Array) -> Array | str:
-    size = float(np.linalg.norm(quaternion))
-    if abs(size - 1.0) > _NEAR:
-        return f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}"
-    return rotation_matrices(quaternion / size)
-
-
-def _of_vector(vector: Array) -> Array | str:
-    angle = float(np.linalg.norm(vector))
-    if abs(angle - 1.0) < _NEAR:  # (0, 0, -1) is meant to be down, and would be up, turned by 1 rad
+    if numbers.shape not in ((3,), (4,), (3, 3)) or not np.isfinite(numbers).all():
+        return _ALLOWED
+    if numbers.ndim == 2:
+        off = float(np.abs(numbers.T @ numbers - np.eye(3)).max())
+        if off > _NEAR:
+            columns = f"its columns are not of length 1 and at right angles, by {off:.2g}"
+            return f"must be a rotation; {columns}"
+        left_handed = np.linalg.det(numbers) < 0
+        return "must be a rotation; these axes are left-handed" if left_handed else numbers
+    size = float(np.linalg.norm(numbers))
+    if len(numbers) == 4:
+        if abs(size - 1.0) > _NEAR:
+            return f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}"
+        return rotation_matrices(numbers / size)
+    if abs(size - 1.0) < _NEAR:  # (0, 0, -1) is meant to be down, and would be up, turned by 1 rad
         why = "three numbers are a rotation vector [rad], and these look like a direction"
         return f"must be a word or a rotation; {why}: say it by a matrix"
-    x, y, z = (np.sinc(0.5 * angle / np.pi) * 0.5 * vector).tolist()
-    return _of_quaternion(np.array([np.cos(0.5 * angle), x, y, z]))
+    return _as_rotation([np.cos(0.5 * size), *(np.sinc(0.5 * size / np.pi) * 0.5 * numbers)])
 
 
 def rotation_matrices(quaternions: Array) -> Array:
@@ -164,5 +153,4 @@ def _turned(rotation: Array, vectors: Array) -> Array:
     return np.stack([a * x + b * y + c * z for a, b, c in rotation.tolist()], axis=-1)
 
 
-UPRIGHT = Base()
-"""At the origin of the world, where the frame of the base is that of the world."""
+UPRIGHT = Base()  # At the origin of the world, where the frame of the base is that of the world

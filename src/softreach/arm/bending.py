@@ -1,10 +1,8 @@
 """Extremes of bending κ over the bounds of an arm, exact: at stations and along the arm.
 
-κ is the curvature of the centerline as it is, |u| η/ζ of theory (7) and (45). Fibers and muscles
-have η = ζ: the (u1, u2) that they reach at a station are a zonogon, the image of the box of inputs.
-Forces have η = 1: they reach a polygon, the box seen from ζ = 0, whose vertices and edges are those
-of corners and edges of the box. The farthest vertex and the point nearest to the origin are the
-range.
+κ is |u| η/ζ of theory (7) and (45). The (u1, u2) that fibers and muscles reach at a station, of
+η = ζ, are a zonogon, the image of the box of inputs. Forces, of η = 1, reach a polygon, the box
+seen from ζ = 0. The farthest vertex and the point nearest to the origin are the range.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array
 
 _STATIONS = 101
 _PER_TURN = 24  # stations for each turn of one bundle relative to another
@@ -33,17 +31,12 @@ _MOST_INPUTS = 8  # of which all corners are looked at
 class Extreme(NamedTuple):
     """An extreme value along an arm and where it is."""
 
-    value: float
-    """Of bending [1/m], or of bending times radius [-]."""
-    station: float
-    """The first Z where it is reached [m]."""
+    value: float  # Of bending [1/m], or of bending times radius [-]
+    station: float  # The first Z where it is reached [m]
 
 
 def has_exact_bending(arm: Manipulator) -> bool:
-    """True if the functions below hold: no loads, strains that are affine in the inputs.
-
-    And fibers and muscles alone, or forces alone by at most eight inputs.
-    """
+    """True without loads, if strains are affine in the inputs, of fibers alone or few forces."""
     driving = Driving(arm)
     if arm.loads is not None or not driving.is_affine:
         return False
@@ -53,24 +46,20 @@ def has_exact_bending(arm: Manipulator) -> bool:
 
 
 def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
-    """Least and largest bending κ = √(u1² + u2²) η/ζ, theory (45), within the bounds.
-
-    Args:
-        arm: A design that `has_exact_bending`.
-        stations: Z [m], shape (station,).
-
-    Returns:
-        Least and largest bending [1/m], each of shape (station,).
-    """
-    center, halves, edges = _reached(arm, stations)
-    return np.where(_holds_origin(center, halves), 0.0, _distance_to_edges(*edges)), _farthest(
-        edges
-    )
-
-
-def _largest_at(arm: Manipulator, stations: Array) -> Array:
-    """As `bending_at`, the largest alone [1/m]: with many bundles by far the cheaper half."""
-    return _farthest(_reached(arm, stations)[2])
+    """Least and largest κ = √(u1² + u2²) η/ζ [1/m] within the bounds, (station,): theory (45)."""
+    center, halves, (start, end) = _reached(arm, stations)
+    # Zonogons hold the origin where no line along an edge separates them, nor one across the
+    # center, which is what remains where all edges are parallel or of no length.
+    normals = np.stack([halves[..., 1], -halves[..., 0]], axis=-1)
+    normals = np.concatenate([normals, center[:, None]], axis=1)
+    away = np.abs(np.einsum("snc,sc->sn", normals, center))
+    reach = np.abs(np.einsum("snc,sbc->snb", normals, halves)).sum(axis=-1)
+    edges = end - start
+    square, along = (edges**2).sum(axis=-1), -(start * edges).sum(axis=-1)
+    part = np.divide(along, square, out=np.zeros_like(square), where=square > 0)
+    nearest = np.linalg.norm(start + np.clip(part, 0.0, 1.0)[..., None] * edges, axis=-1)
+    least = np.where((away <= reach).all(axis=1), 0.0, nearest.min(axis=1))
+    return least, _farthest((start, end))
 
 
 def _farthest(edges: tuple[Array, Array]) -> Array:
@@ -79,12 +68,12 @@ def _farthest(edges: tuple[Array, Array]) -> Array:
 
 def largest_bending(arm: Manipulator) -> Extreme:
     """The largest bending [1/m] within the bounds and along the arm, to 1e-9 of it."""
-    return _largest(arm, lambda z: _largest_at(arm, z))
+    return _largest(arm, lambda z: _farthest(_reached(arm, z)[2]))
 
 
 def sharpest_bending(arm: Manipulator) -> Extreme:
     """The largest bending times R2(Z) [-]: the inner side folds where it is 1 or more."""
-    return _largest(arm, lambda z: _largest_at(arm, z) * arm.profile.radius(z))
+    return _largest(arm, lambda z: _farthest(_reached(arm, z)[2]) * arm.profile.radius(z))
 
 
 def smallest_bending(arm: Manipulator) -> Extreme:
@@ -122,10 +111,7 @@ def _reached(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array, tuple
 
 
 def _vertices(center: Array, halves: Array) -> Array:
-    """All vertices in order around the zonogon, shape (station, 2 * bundle, 2).
-
-    Edges that all point upward, sorted by direction, lead from one vertex to the opposite one.
-    """
+    """Vertices in order around zonogons, (station, 2 * bundle, 2): edges sorted by direction."""
     x, y = halves[..., 0], halves[..., 1]
     upward = np.where(((y < 0) | ((y == 0) & (x < 0)))[..., None], -halves, halves)
     order = np.argsort(np.arctan2(upward[..., 1], upward[..., 0]), axis=1)
@@ -134,74 +120,39 @@ def _vertices(center: Array, halves: Array) -> Array:
     return center[:, None] + np.concatenate([side, -side], axis=1)
 
 
-def _holds_origin(center: Array, halves: Array) -> Mask:
-    """Zonogons that hold the origin: no line along an edge or across the center separates them.
-
-    The last is what remains to be asked where all edges are parallel or of no length.
-    """
-    normals = np.stack([halves[..., 1], -halves[..., 0]], axis=-1)
-    normals = np.concatenate([normals, center[:, None]], axis=1)
-    away = np.abs(np.einsum("snc,sc->sn", normals, center))
-    reach = np.abs(np.einsum("snc,sbc->snb", normals, halves)).sum(axis=-1)
-    return (away <= reach).all(axis=1)
-
-
-def _distance_to_edges(start: Array, end: Array) -> Array:
-    edges = end - start
-    square = (edges**2).sum(axis=-1)
-    along = -(start * edges).sum(axis=-1)
-    part = np.divide(along, square, out=np.zeros_like(square), where=square > 0)
-    nearest = start + np.clip(part, 0.0, 1.0)[..., None] * edges
-    return np.linalg.norm(nearest, axis=-1).min(axis=1)
-
-
 def _largest(arm: Manipulator, measure: Callable[[Array], Array]) -> Extreme:
     """The largest value of a function of Z that is smooth or kinks downward between breakpoints."""
     grid = bending_stations(arm)
-    values = measure(grid.ravel())
-    low, high = _brackets(grid, values.reshape(grid.shape))
+    values, last = measure(grid.ravel()), grid.shape[1] - 1
+    # Brackets lie around the highest local maxima; none crosses a breakpoint.
+    each = values.reshape(grid.shape)
+    padded = np.pad(each, ((0, 0), (1, 1)), constant_values=-np.inf)
+    piece, place = np.nonzero((each >= padded[:, :-2]) & (each >= padded[:, 2:]))
+    highest = np.argsort(-each[piece, place], kind="stable")[:_BRACKETS]
+    piece, place = piece[highest], place[highest]
+    low, high = grid[piece, np.maximum(place - 1, 0)], grid[piece, np.minimum(place + 1, last)]
     stations = [grid.ravel()]
     for _ in range(_ROUNDS):
         inside = np.linspace(low, high, _POINTS, axis=1)
         finer = measure(inside.ravel())
         stations.append(inside.ravel())
         values = np.concatenate([values, finer])
-        best = finer.reshape(inside.shape).argmax(axis=1)
-        row = np.arange(len(inside))
-        low, high = (
-            inside[row, np.maximum(best - 1, 0)],
-            inside[row, np.minimum(best + 1, _POINTS - 1)],
-        )
+        best, row = finer.reshape(inside.shape).argmax(axis=1), np.arange(len(inside))
+        low = inside[row, np.maximum(best - 1, 0)]
+        high = inside[row, np.minimum(best + 1, _POINTS - 1)]
     top = values.max()
     reached = np.concatenate(stations)[values >= top - 1e-12 * abs(top)]
     return Extreme(float(top), float(reached.min()))
 
 
-def _brackets(grid: Array, values: Array) -> tuple[Array, Array]:
-    """Ends of intervals around the highest local maxima [m]; none crosses a breakpoint."""
-    padded = np.pad(values, ((0, 0), (1, 1)), constant_values=-np.inf)
-    piece, place = np.nonzero((values >= padded[:, :-2]) & (values >= padded[:, 2:]))
-    highest = np.argsort(-values[piece, place], kind="stable")[:_BRACKETS]
-    piece, place = piece[highest], place[highest]
-    last = grid.shape[1] - 1
-    return grid[piece, np.maximum(place - 1, 0)], grid[piece, np.minimum(place + 1, last)]
-
-
 def bending_stations(arm: Manipulator) -> Array:
-    """Stations fine enough to see each turn of the bundles [m], shape (piece, station).
-
-    A piece lies between two breakpoints, where the curvature may jump: it ends just inside them.
-    """
+    """Stations [m] that see each turn of bundles, (piece, station), just inside breakpoints."""
     arm = body_of(arm)
     ends = np.array([0.0, *arm.breakpoints, arm.length])
     start, end = ends[:-1].copy(), ends[1:].copy()
     start[1:], end[:-1] = np.nextafter(start[1:], np.inf), np.nextafter(end[:-1], -np.inf)
-    along = _STATIONS + _PER_TURN * _turns(arm)
-    count = math.ceil(along * float((end - start).max()) / arm.length)
-    return np.linspace(start, end, max(_FEWEST, count), axis=1)
-
-
-def _turns(arm: Manipulator) -> float:
     center = arm.outline(np.linspace(0.0, arm.length, _STATIONS)).center
     relative = np.abs(np.diff(center - center[:, :1], axis=0)).sum(axis=0)
-    return float(relative.max(initial=0.0)) / (2 * np.pi)
+    along = _STATIONS + _PER_TURN * (float(relative.max(initial=0.0)) / (2 * np.pi))
+    count = math.ceil(along * float((end - start).max()) / arm.length)
+    return np.linspace(start, end, max(_FEWEST, count), axis=1)

@@ -1,8 +1,6 @@
 """The body of an arm: what bends, and what acts in it and on it, wherever it is clamped.
 
-A body knows where it is not smooth, how stiff it is and what its bundles are; its tables and
-tensions follow from it alone, and so do its mass and Λ, which says how much loads bend it. A
-`Manipulator` is a body with a base, drives and markers.
+Its tables and tensions follow from it alone, and so do its mass and Λ.
 """
 
 from __future__ import annotations
@@ -29,8 +27,7 @@ from softreach.support.arrays import Array, Mask, as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
-VERIFIED_LOAD_NUMBER = 12.0
-"""Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
+VERIFIED_LOAD_NUMBER = 12.0  # Largest Λ for which loaded arms were verified over the box
 
 # Exact for the square of a cubic, which is the mass of a piece of any profile.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -69,8 +66,7 @@ class RestShape(Part):
         return np.stack([values_along(value, x) for value in each], axis=1)
 
 
-STRAIGHT = RestShape()
-"""A straight arm without twist."""
+STRAIGHT = RestShape()  # A straight arm without twist
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,11 +98,7 @@ class RestStrains(UnseenActuator):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Body:
-    """A slender body with actuators in it.
-
-    Raises:
-        InvalidDesign: It cannot exist; the error names every fault.
-    """
+    """A slender body with actuators in it."""
 
     profile: Profile
     """R2(Z), the outer radius along the arm, and its length."""
@@ -317,11 +309,7 @@ def named_actuators(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
 
 
 def mass(arm: Body) -> float:
-    """Mass of the arm [kg].
-
-    Raises:
-        InvalidDesign: A layer without a density.
-    """
+    """Mass of the arm [kg]; raises InvalidDesign for a layer without a density."""
     inside = (arm.length * x for x in arm.section.breaks)
     ends = np.array(sorted({0.0, *arm.profile.breakpoints, *inside, arm.length}))
     half = 0.5 * np.diff(ends)[:, None]
@@ -350,11 +338,7 @@ def load_number(arm: Body) -> float:
 
 
 def is_overloaded(arm: Body) -> bool:
-    """The load number is above what was verified, by more than rounding.
-
-    Raises:
-        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
-    """
+    """The load number is above what was verified, by more than rounding; raises its errors."""
     return load_number(arm) > VERIFIED_LOAD_NUMBER * (1 + 1e-9)
 
 

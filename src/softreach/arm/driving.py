@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,33 +27,13 @@ _SAFETY = 1.25  # of the largest tensions that samples reach
 _LEAST_EXTENSION = 0.05  # that a box of tensions has
 
 
-class Pulled(Protocol):
-    """How an arm takes what is pulled in, and guides."""
-
-    law: LengthLaw
-
-    def inner(self, bundles: Array) -> tuple[Array, Mask]:
-        """Activations of the inner arm, and which tendons are taut, at those with displacements."""
-        ...
-
-    def slopes(self, inner: Array, is_taut: Mask) -> Array:
-        """∂(activations of the inner arm)/∂(those with displacements), (n, bundle, bundle)."""
-        ...
-
-    def continued_from(self, inner: Array, frames: Array | None = None) -> Self:
-        """Those of the arm in its posture at activations of the inner arm, shape (k, bundles)."""
-        ...
-
-
 @dataclass(frozen=True)
 class Driving:
     """The map from the inputs x of an arm to the activations of its inner arm, γ(x)."""
 
     arm: Manipulator
-    pulled: Pulled | None = None
-    """Tendons driven by length or held by guides under loads; by default those without loads."""
-    is_effective: bool = False
-    """True if x are inputs beyond the dead zones of the drives."""
+    pulled: PulledTendons | None = None  # Those of the arm under loads; None without
+    is_effective: bool = False  # True if x are inputs beyond the dead zones of the drives
 
     @lazy
     def driven(self) -> Manipulator:
@@ -70,14 +49,11 @@ class Driving:
         """Law of the tendons that are driven by length, without loads."""
         return LengthLaw(body_of(self.arm)) if self.pulled is None else self.pulled.law
 
-    @property
+    @lazy
     def is_bundles(self) -> bool:
         """True if the activations of the bundles are those of the inner arm."""
-        return not (self._has_lengths or has_guides(self.arm))
-
-    @lazy
-    def _has_lengths(self) -> bool:
-        return any(isinstance(each, LengthTendon) for each in self.arm.actuators)
+        pulled = any(isinstance(each, LengthTendon) for each in self.arm.actuators)
+        return not (pulled or has_guides(self.arm))
 
     @lazy
     def is_affine(self) -> bool:
@@ -94,9 +70,9 @@ class Driving:
         """True if γ(x) has no kinks within the bounds: is affine, or all lengths stay taut."""
         if self.is_affine:
             return True
-        if self._has_kinked_drives or not self._has_lengths:
+        if self._has_kinked_drives or not self.law.columns.size:
             return not self._has_kinked_drives
-        if self.arm.loads is not None or self.law.works.has_growth:
+        if self.arm.loads is not None or self.law.works.growing.size:
             return False
         low, high = self.driven.input_bounds.T
         bundles = self.bundles(low + pilot(self.arm.inputs) * (high - low))
@@ -185,7 +161,7 @@ class Driving:
         return inner, self.tendons.slopes(inner, is_taut) @ of_drives
 
     @lazy
-    def tendons(self) -> Pulled | LengthLaw | PulledTendons:
+    def tendons(self) -> LengthLaw | PulledTendons:
         """How the arm takes what is pulled in, and guides."""
         if self.pulled is not None:
             return self.pulled
@@ -203,8 +179,7 @@ class Driving:
 def inner_arm(arm: Manipulator) -> Manipulator:
     """The arm as tables and kernels see it, with bounds that hold what activations lead to.
 
-    It is the arm itself where inputs load its sections as they are. A rest shape is a bundle held
-    at 1, and tendons that are driven by length have tensions.
+    It is the arm itself where inputs load its sections as they are: else see `body_of`.
 
     Raises:
         InvalidDesign: Displacements within the bounds shorten the arm to nothing.

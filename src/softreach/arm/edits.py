@@ -27,17 +27,13 @@ _TURN = 2.0  # bending of a new actuator at its bound, over the arm [rad]
 
 
 def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
-    """The arm with one more actuator of a kind, where there is most room, of a new name.
-
-    Args:
-        arm: The design.
-        kind: One of `ACTUATOR_KINDS`.
-
-    Raises:
-        InvalidDesign: A tendon or a chamber in an arm without Young's modulus.
-    """
+    """The arm with one more actuator of one of `ACTUATOR_KINDS`, where there is most room."""
     name = _new_name(kind, [actuator.name for actuator in arm.actuators])
-    where: dict[str, Any] = {"name": name, "offset": _widest_gap(arm)}
+    angles = np.sort(np.mod(arm.outline([0.0]).center[0], 2 * np.pi))
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    widest = int(np.argmax(gaps))  # between bundles at the base, in whose middle it goes
+    offset = float(np.mod(angles[widest] + gaps[widest] / 2, 2 * np.pi))
+    where: dict[str, Any] = {"name": name, "offset": offset}
     radius, bending = float(arm.profile.radius(0.0)), arm.section.stiffness_at(arm.profile, 0.0)
     moment = _TURN * float(bending.bending) / arm.length  # which turns the arm by that in all
     if kind == "fiber":
@@ -61,11 +57,7 @@ def _rounded(value: float) -> float:
 
 
 def without_actuator(arm: Manipulator, name: str) -> Manipulator:
-    """The arm without one of its actuators.
-
-    Raises:
-        InvalidInput: It is the last one.
-    """
+    """The arm without one of its actuators, which must not be the last."""
     others = tuple(actuator for actuator in arm.actuators if actuator.name != name)
     if not others:
         raise InvalidInput("actuators", name, "one of several: the last one cannot be removed")
@@ -73,20 +65,13 @@ def without_actuator(arm: Manipulator, name: str) -> Manipulator:
 
 
 def with_changed_actuator(arm: Manipulator, name: str, /, **changes: Any) -> Manipulator:
-    """The arm with other values of one of its actuators, such as its name or its ring.
-
-    Raises:
-        InvalidDesign: Another one has this name, or a value is not what it must be.
-    """
+    """The arm with other values of one of its actuators, such as its name or its ring."""
     parts = (part.replace(**changes) if part.name == name else part for part in arm.actuators)
     return arm.replace(actuators=tuple(parts))
 
 
 def with_ring(arm: Manipulator) -> Manipulator:
-    """The arm with one more ring, of the same material, inside the innermost or in its inner half.
-
-    Rings that an actuator names by index keep their place: the new one comes last.
-    """
+    """The arm with one more ring, inside the innermost or in its inner half; it comes last."""
     section = arm.section
     first = min(section.rings, key=lambda ring: ring.inner_ratio)
     room = section.inner_ratio - section.bore_ratio
@@ -99,12 +84,7 @@ def with_ring(arm: Manipulator) -> Manipulator:
 
 
 def without_ring(arm: Manipulator, index: int) -> Manipulator:
-    """The arm without one of its rings; actuators in the others stay in theirs.
-
-    Raises:
-        InvalidInput: It is the last one, or actuators are in it.
-        InvalidDesign: The others do not reach the surface of the arm.
-    """
+    """The arm without one of its rings, not the last; actuators in the others stay in theirs."""
     rings, label = arm.section.rings, ring_label(arm, index)
     if len(rings) == 1:
         raise InvalidInput("rings", label, "one of several: the last one cannot be removed")
@@ -118,12 +98,7 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
 
 
 def with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Manipulator:
-    """The arm with other values of one of its rings, such as its material; actuators stay in it.
-
-    Raises:
-        InvalidDesign: Another ring has this name, or different materials, of which one has no
-            Young's modulus.
-    """
+    """The arm with other values of one of its rings, such as its material; actuators stay in it."""
     rings, old = [*arm.section.rings], arm.section.rings[index]
     rings[index] = old.replace(**changes)
     return _with_rings(arm, rings, {} if rings[index].name == old.name else {old.name: index})
@@ -156,14 +131,6 @@ def ring_label(arm: Manipulator, index: int) -> str:
     """Label of a ring: its index, and its name if it has one."""
     name = arm.section.rings[index].name
     return f"ring {index} ({name})" if name else f"ring {index}"
-
-
-def _widest_gap(arm: Manipulator) -> float:
-    """Polar angle in the middle of the widest gap between bundles at the base [rad]."""
-    angles = np.sort(np.mod(arm.outline([0.0]).center[0], 2 * np.pi))
-    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
-    widest = int(np.argmax(gaps))
-    return float(np.mod(angles[widest] + gaps[widest] / 2, 2 * np.pi))
 
 
 def _new_name(kind: str, taken: Sequence[str]) -> str:

@@ -39,8 +39,7 @@ class ArcLoads(UnseenActuator):
     """N and M about the three directors, even along each arc between guides."""
 
     is_force: ClassVar[bool] = True
-    edges: tuple[float, ...]
-    """Z of the ends of the arcs [m]."""
+    edges: tuple[float, ...]  # Z of the ends of the arcs [m]
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         arc = np.searchsorted(self.edges, z, side="right") - 1
@@ -83,14 +82,10 @@ def _guided(arm: Body) -> list[Tendon]:
 class _Chords(NamedTuple):
     """Straight pieces of tendons between guides."""
 
-    tendon: NDArray[np.intp]
-    """Guided tendon of each, shape (chord,)."""
-    arc: NDArray[np.intp]
-    """Arcs that each spans, from base to tip, (chord, place); one past the last for none."""
-    start: Array
-    """In the section of the first guide [m], shape (chord, 3)."""
-    end: Array
-    """In the section of the next [m], shape (chord, 3)."""
+    tendon: NDArray[np.intp]  # Guided tendon of each, shape (chord,)
+    arc: NDArray[np.intp]  # Arcs that each spans, (chord, place), base first; one too far is none
+    start: Array  # In the section of the first guide [m], shape (chord, 3)
+    end: Array  # In the section of the next [m], shape (chord, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,18 +185,11 @@ class Guides:
         return by_works, -np.swapaxes(self.slopes(works) - self._straight, 1, 2)
 
     def settled(self, inner: Array, works_of: Callable[[Array], Array]) -> Array:
-        """Activations with the loads of arcs at which the arcs are those that they make.
+        """Activations with loads of arcs at which these make the arcs, NaN where nothing settles.
 
-        The first steps have the slopes of straight arcs, each by itself; what does not settle by
-        them takes Newton's method. A sample stays once it has settled, so that none depends on
-        those beside it.
-
-        Args:
-            inner: Activations with tensions, and loads of arcs to begin with, shape (n, bundle).
-            works_of: Works of arcs at such activations, NaN without an equilibrium.
-
-        Returns:
-            Shape (n, bundle); NaN where nothing settles.
+        The first steps have the slopes of straight arcs, each by itself; what does not settle takes
+        Newton's. A sample stays once it has settled, so that none depends on those beside it.
+        `works_of` are the works of arcs at activations, NaN without an equilibrium.
         """
         slopes, start = self.works.slopes(inner), inner[:, self.loads]
         every = np.broadcast_to(slopes, (len(inner), *slopes.shape[1:]))[..., self.loads]

@@ -56,16 +56,7 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
 
 
 def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
-    """Length of the middle line of each bundle [m] by strains at the nodes of `quadrature`.
-
-    Args:
-        arm: The design.
-        turn: ω, curvature per length before activation [1/m], shape (n, node, 3).
-        zeta: ζ [-], shape (n, node).
-
-    Returns:
-        Shape (n, bundle).
-    """
+    """Length of each bundle's middle line [m] by ω (n, node, 3) and ζ (n, node) at `quadrature`."""
     z, weights, half = quadrature(body_of(arm))
     step = _STEP * half
     slopes = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
@@ -87,10 +78,7 @@ def _tangents(places: Array, slopes: Array, turn: Array, zeta: Array) -> Array:
 
 
 def line_strains(arm: Manipulator) -> Array:
-    """Smallest and largest change of length of each bundle's line by its own activation [-].
-
-    The others stay zero: shape (bundle, 2), negative where the line shortens.
-    """
+    """Least and largest strain of each bundle's line [-] by its own activation, (bundle, 2)."""
     return np.sort(_strains_at(arm, arm.bounds), axis=1)
 
 

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from softreach.arm.profile import Profile
     from softreach.arm.section import Section
 
-GRAVITY = 9.81
-"""g, standard acceleration of what falls [m/s²]."""
+GRAVITY = 9.81  # g, standard acceleration of what falls [m/s²]
 
 GRAVITIES: Mapping[str, Triple] = {
     "down": (0.0, 0.0, -GRAVITY),

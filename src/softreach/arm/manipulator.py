@@ -21,14 +21,7 @@ from softreach.arm.part import gathered, kind_faults
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.arm.stations import Marker
-from softreach.support.arguments import (
-    as_flag,
-    as_given,
-    as_integer,
-    as_path,
-    as_text,
-    plain,
-)
+from softreach.support.arguments import as_flag, as_given, as_integer, as_path, as_text, plain
 from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.text import write_text
@@ -216,7 +209,14 @@ class Manipulator(Body):
         """
         count = as_integer("count", count, 1, 1000)
         keep_extent = as_flag("keep_extent", keep_extent)
-        index, original = self._sector(fiber)
+        key, each = plain(fiber), enumerate(self.actuators)
+        sectors = {k: part for k, part in each if isinstance(part, SectorActuator)}
+        meant = [k for k in sectors if type(key) in (int, str) and key in (k, sectors[k].name)]
+        if not meant:
+            listed = ", ".join(f"{k} ({part.name})" for k, part in sectors.items())
+            allowed = f"the name or index of one architecture: {listed}"
+            raise InvalidInput("fiber", as_given(fiber), allowed)
+        index, original = meant[0], sectors[meant[0]]
         if original.bundles != 1:
             hint = "its bundles are independent already"
             raise InvalidInput(f"{original.name}.bundles", original.bundles, "1 to be split", hint)
@@ -350,16 +350,6 @@ class Manipulator(Body):
         from softreach.arm.skin import arm_card
 
         return arm_card(self, self.base)
-
-    def _sector(self, which: str | int) -> tuple[int, SectorActuator]:
-        key, sectors = plain(which), [*enumerate(self.actuators)]
-        sectors = [(k, each) for k, each in sectors if isinstance(each, SectorActuator)]
-        for k, each in sectors:
-            if type(key) in (int, str) and key in (k, each.name):
-                return k, each
-        listed = ", ".join(f"{k} ({each.name})" for k, each in sectors)
-        allowed = f"the name or index of one architecture: {listed}"
-        raise InvalidInput("fiber", as_given(which), allowed)
 
 
 def a_manipulator(name: str, value: object) -> Manipulator:

@@ -56,14 +56,10 @@ class Material(Part):
 class MaterialRecord:
     """A material of the library and where its numbers come from."""
 
-    material: Material
-    """The material under its name."""
-    modulus: str
-    """Kind of number of Young's modulus: `Young's modulus`, `stress at 100 % strain`, ..."""
-    sources: Mapping[str, str]
-    """For every number of the material, by its field, a heading of the page of references."""
-    note: str
-    """Advice to a designer, in a line."""
+    material: Material  # The material under its name
+    modulus: str  # Kind of Young's modulus: `Young's modulus`, `stress at 100 % strain`, ...
+    sources: Mapping[str, str]  # Field of a number -> heading of the page of references
+    note: str  # Advice to a designer, in a line
 
 
 def material_names() -> tuple[str, ...]:
@@ -72,14 +68,7 @@ def material_names() -> tuple[str, ...]:
 
 
 def material_record(name: str) -> MaterialRecord:
-    """A material of the library with the sources of its numbers.
-
-    Args:
-        name: One of `material_names()`.
-
-    Raises:
-        InvalidInput: No material has this name.
-    """
+    """A material of the library with the sources of its numbers; raises InvalidInput."""
     if name not in (library := _library()):
         hint = _hint(name, tuple(library))
         raise InvalidInput("material", name, "a material of the library", hint)

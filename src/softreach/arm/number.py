@@ -1,10 +1,6 @@
-"""Numbers of a design, each declared once: symbol, unit, meaning, range.
+"""Numbers of a design, each declared once: symbol, unit, meaning, range; see DESIGN.md.
 
-    offset: float = number("θ0", "rad", "polar angle of the first bundle", default=0.0)
-
-stands in a frozen dataclass, and `fields_of` lists the numbers of a kind of part. Checks, keys and
-units of design files, their JSON schema, parameters and sliders follow from it. In kinds outside
-softreach, fields of type `float`, `int` or `tuple[float, ...]` are numbers too, without a unit.
+In kinds outside softreach, fields of numbers without a declaration are numbers without a unit.
 """
 
 from __future__ import annotations
@@ -30,11 +26,8 @@ Shape = Literal["single", "along", "triple", "series", "stations", "several"]
 """One number, a function along the arm alone, a vector, several along the arm, their places, or
 several that are none of these."""
 
-_NEAREST = 1e-12
-"""Z/L by which stations differ at least: less is rounding."""
-
-_NOTHING = 1e-30
-"""Size up to which a component of a vector is 0: its powers would be."""
+_NEAREST = 1e-12  # Z/L by which stations differ at least: less is rounding
+_NOTHING = 1e-30  # Size up to which a component of a vector is 0: its powers would be
 
 _SENSE: Mapping[str, tuple[float, float]] = {
     "L": (1e-6, 1e3),
@@ -48,8 +41,7 @@ _SENSE: Mapping[str, tuple[float, float]] = {
 }
 """Symbol or unit -> smallest size above 0 and largest that a number of an arm has [unit]."""
 
-MOST = 1e15
-"""The largest size of numbers of an arm in other units, and of activations."""
+MOST = 1e15  # The largest size of numbers of an arm in other units, and of activations
 
 _PLAIN = re.compile(
     r"(?:typing\.Optional\[)?(float|int)(\|None|\])?|tuple\[float(,(float|\.\.\.))*\]"
@@ -124,29 +116,18 @@ class NamedFloats(Mapping[str, float]):
 class Number:
     """A number of a part of an arm."""
 
-    field: str = ""
-    """Name in the part."""
-    symbol: str
-    """Symbol in formulas."""
-    meaning: str
-    """Meaning in a few words."""
-    allowed: Range
-    """Unit, limits, and whether it is an integer."""
+    field: str = ""  # Name in the part
+    symbol: str  # Symbol in formulas
+    meaning: str  # Meaning in a few words
+    allowed: Range  # Unit, limits, and whether it is an integer
     shape: Shape = "single"
-    along: type | None = None
-    """Class of functions along the arm that may take its place."""
-    optional: bool = False
-    """None is allowed."""
-    named: bool = False
-    """The name of a station of the arm may take its place."""
-    pair: str = ""
-    """Two values that may take its place, such as "two at its ends"; "" for none."""
-    each: bool = False
-    """One value for each bundle of an actuator may take its place."""
-    instead_of: str = ""
-    """Field of the part that says the same in another way: one of the two is given."""
-    hint: str = ""
-    """Ends the sentence "give exactly one of ..."."""
+    along: type | None = None  # Class of functions along the arm that may take its place
+    optional: bool = False  # None is allowed
+    named: bool = False  # The name of a station of the arm may take its place
+    pair: str = ""  # Two values that may take its place, such as "two at its ends"; "" for none
+    each: bool = False  # One value for each bundle of an actuator may take its place
+    instead_of: str = ""  # Field that says the same in another way: one of the two is given
+    hint: str = ""  # Ends the sentence "give exactly one of ..."
 
     @property
     def unit(self) -> str:
@@ -159,10 +140,7 @@ class Number:
         return self.field + unit_suffix(self.unit)
 
     def refusal(self, value: object) -> Range | None:
-        """The limits that one number is beyond: its own, or the sizes that no arm has; else None.
-
-        Every number of a design passes here, from files, Python and the command line alike.
-        """
+        """The limits that a number is beyond: its own, or the sizes that no arm has; or None."""
         limits = (self.allowed, self._sense)
         return next((each for each in limits if not each.admits(value)), None)
 

@@ -1,8 +1,6 @@
 """Design parameters: the numbers of an arm that a sweep, a slider or an optimizer varies.
 
-Parts say what numbers they have (`Part.numbers`), what values (`values_of`), and make changed
-copies (`replace`). A parameter is a number of a part, one that several parts share, or one that
-numbers of several parts follow by a law of its own.
+A parameter is a number of a part, one that several parts share, or a law that several follow.
 """
 
 from __future__ import annotations
@@ -13,37 +11,33 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
-from softreach.arm.number import Number, alternatives, fields_of
+from softreach.arm.number import Number, alternatives, fields_of, unit_suffix
 from softreach.arm.part import gathered
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
 from softreach.support.arguments import as_instance, as_text, plain
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean
+from softreach.support.quantity import read_quantity, unit_names
 
 __all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "parameters"]
 
 PartKey = tuple[str | int, ...]
 """("profile",), ("rings", 0, "material"), ("core",), ("actuators", "left"), ("loads",), ..."""
 
-Address = tuple[PartKey, str]
-"""A part, and the name of one of its numbers there."""
-
-Rule = Callable[[float], float]
-"""New value from the old one."""
-
+Address = tuple[PartKey, str]  # A part, and the name of one of its numbers there
+Rule = Callable[[float], float]  # New value from the old one
 _ROUNDING = 1e-12  # of an angle that follows from another one
 _FEW = 12
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]$")
 _ACTIVATIONS = ("activation", "force", "pressure", "tension")
 """Names under which activations are looked for among the parameters of an actuator."""
-_BOUNDS = {"actuators": "activation_bounds", "drives": "bounds"}
-"""Fields that `lower` and `upper` are of."""
+_BOUNDS = {"actuators": "activation_bounds", "drives": "bounds"}  # Fields of `lower` and `upper`
 _ABSENT = {
     "loads": "the arm has no loads: give it some first",
     "base": "the arm stands upright at the origin: give it another base first",
@@ -364,21 +358,11 @@ def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipula
     edits: _Edits = {}
     for each, value in new.items():
         _add_edits(edits, arm, each, lambda _, value=value: value)
-    names = {each.name: value for each, value in new.items()}
-    return _made(arm, edits, names) if edits else arm
+    return _made(arm, edits, {each.name: x for each, x in new.items()}) if edits else arm
 
 
 def shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
-    """The design with an amount added to one parameter, in each part to the part's own value.
-
-    Args:
-        arm: The design to start from.
-        parameter: One of its parameters.
-        amount: What is added [its unit].
-
-    Raises:
-        InvalidDesign: No such arm can exist.
-    """
+    """The design with an amount [unit] added to one parameter, in each part to its own value."""
     edits: _Edits = {}
     _add_edits(edits, arm, parameter, lambda old: old + amount)
     return _made(arm, edits, {parameter.name: parameter.value(arm) + amount})
@@ -469,7 +453,10 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
     part = name.partition(".")[0]
     if part in _ABSENT and not any(key.startswith(f"{part}.") for key in known):
         hint = _ABSENT[part]
-    allowed = f"one of {', '.join(_shortened(own))}"
+    runs = itertools.groupby(own, lambda key: _ELEMENT.sub(r"\1[", key))
+    series = [(base, *same) for base, same in runs]  # of which `radii[0] to [2]` is listed
+    ends = [each[1] + (f" to {each[-1][len(each[0]) - 1 :]}" * (len(each) > 2)) for each in series]
+    allowed = f"one of {', '.join(ends)}"
     if owners and not meant:
         listed = ", ".join(owners[:_FEW]) + (", ..." if len(owners) > _FEW else "")
         example = next(key for key, parameter in known.items() if parameter.owner)
@@ -477,8 +464,55 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
     return InvalidInput("parameter", name, allowed, hint)
 
 
-def _shortened(names: Iterable[str]) -> Iterator[str]:
-    """Elements of a series as `radii[0] to [2]`."""
-    for base, same in itertools.groupby(names, lambda name: _ELEMENT.sub(r"\1[", name)):
-        first, *others = same
-        yield f"{first} to {others[-1][len(base) - 1 :]}" if others else first
+# Parameters as files and the command line write them: the unit in the name, angles in degrees.
+
+
+def written_name(name: str, unit: str) -> str:
+    """A name with its unit: `taper_deg`, `left.helical_angle.values_deg[2]`."""
+    return with_suffix(name, unit_suffix(unit))
+
+
+def with_suffix(name: str, suffix: str) -> str:
+    """The name with a suffix, which stands before the place in a series."""
+    return re.sub(r"(\[\d+\])?$", lambda place: suffix + place[0], name, count=1)
+
+
+class Written:
+    """Parameters by every name, with and without units, and values as people write them."""
+
+    def __init__(self, plain: Mapping[str, Parameter]) -> None:
+        self.written = {written_name(name, p.unit): p for name, p in plain.items()}
+        self.by_key = {**self.written, **plain}
+        self._with_unit = self.written.keys() - plain.keys()
+
+    @classmethod
+    def of(cls, arm: Manipulator) -> Self:
+        """Those of an arm."""
+        return cls(parameters_by_every_name(arm))
+
+    def number(self, key: str, value: object, unit: str | None = None) -> float:
+        """A value in SI: a number under a key with its unit, or text with it; else ValueError."""
+        unit = self.by_key[key].unit if unit is None else unit
+        if isinstance(value, bool) or not isinstance(value, int | float | str):
+            raise ValueError(value)
+        if key in self._with_unit:
+            return from_written(read_quantity(str(value), "1"), unit)
+        if not isinstance(value, str) and value != 0 and unit != "1":
+            raise ValueError(value)
+        return read_quantity(str(value), unit)
+
+    def allowed(self, key: str, unit: str | None = None) -> str:
+        """Kind of value allowed under a key, in words."""
+        unit = self.by_key[key].unit if unit is None else unit
+        if key in self._with_unit:
+            return "a finite number without a unit, which the name holds"
+        units = ", ".join(unit_names(unit))
+        if not units:
+            return "a finite number without a unit"
+        under = f", or a number under {written_name(key, unit)}" if key in self.by_key else ""
+        return f"a finite number with its unit ({units}){under}"
+
+
+def from_written(value: float, unit: str) -> float:
+    """A value in SI units, from degrees where these are radians."""
+    return math.radians(value) if unit == "rad" else value

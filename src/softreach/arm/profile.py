@@ -26,8 +26,7 @@ from softreach.support.lazy import lazy
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEWTON_STEPS = 60
 _WIDEST = 100.0  # over L, of any radius
-_CHECKED = 65
-"""Places at which a radius is seen to be positive."""
+_CHECKED = 65  # Places at which a radius is seen to be positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,7 +159,14 @@ class LinearTaper(Profile):
         tip_radius: float | None = None,
     ) -> None:
         if tip_radius is not None:
-            taper = _taper_to(plain(tip_radius), plain(length), plain(outer_radius), taper)
+            tip, positive = plain(tip_radius), Range(0.0, unit="m", open_low=True)
+            if not positive.admits(tip):
+                raise InvalidDesign([Fault("tip_radius", tip, positive)])
+            if taper != 0.0:
+                allowed = "must be left out beside a taper"
+                raise InvalidDesign([Fault("tip_radius", tip, allowed)])
+            if positive.admits(plain(length)) and positive.admits(plain(outer_radius)):
+                taper = math.atan((plain(outer_radius) - tip) / plain(length))
         for field, value in (("length", length), ("taper", taper), ("outer_radius", outer_radius)):
             object.__setattr__(self, field, value)
         self.__post_init__()
@@ -207,17 +213,6 @@ class LinearTaper(Profile):
         limit = math.atan(self.outer_radius / self.length)
         why = f"leaves no tip (R2(L) = {tip:.4g} m, R2(0) = {self.outer_radius:.4g} m)"
         return [Fault("taper", self.taper, Range(high=limit, unit="rad", open_high=True, why=why))]
-
-
-def _taper_to(tip_radius: Any, length: Any, outer_radius: Any, taper: Any) -> float:
-    positive = Range(0.0, unit="m", open_low=True)
-    if not positive.admits(tip_radius):
-        raise InvalidDesign([Fault("tip_radius", tip_radius, positive)])
-    if taper != 0.0:
-        raise InvalidDesign([Fault("tip_radius", tip_radius, "must be left out beside a taper")])
-    if not (positive.admits(length) and positive.admits(outer_radius)):
-        return 0.0
-    return math.atan((outer_radius - tip_radius) / length)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,12 +64,6 @@ class Measured(Part):
         first = bending[0] if isinstance(bending, tuple) else bending
         return self.axial_stiffness, first, self.torsion_stiffness
 
-    @property
-    def bending_ratio(self) -> float:
-        """K2/K1 [-]."""
-        pair = self.bending_stiffness
-        return pair[1] / pair[0] if isinstance(pair, tuple) else 1.0
-
 
 @dataclass(frozen=True, kw_only=True)
 class Ring(Part):
@@ -248,7 +242,8 @@ class Section(Part):
     @property
     def bending_ratio(self) -> float:
         """K2/K1 [-]: 1 but for measured sections that are not round."""
-        return 1.0 if self.measured is None else self.measured.bending_ratio
+        pair = None if self.measured is None else self.measured.bending_stiffness
+        return pair[1] / pair[0] if isinstance(pair, tuple) else 1.0
 
     def resistance_at(self, profile: Profile, z: ArrayLike) -> Array:
         """K1, K2 and K3 [N m²] about the directors at stations Z [m], shape (*z.shape, 3)."""
@@ -350,22 +345,16 @@ _RESERVED = ("actuators", "core", "loads", "profile", "rings", "section")
 
 
 def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
-    """Names in a sequence at a path that are given twice, or ambiguous in names of parameters.
-
-    An empty one does not count.
-    """
+    """Names in a sequence at a path that are given twice, or ambiguous in names of parameters."""
+    reserved = f"must not be one of {', '.join(_RESERVED)}, by which paths name parts of the arm"
     for k, name in enumerate(names):
-        if isinstance(name, str) and (allowed := _allowed_name(name, path)):
-            yield Fault(f"{path}[{k}].name", name, allowed)
+        place = f"{path}[{k}].name"
+        if isinstance(name, str) and not is_path_name(name):
+            allowed = "must be one line without dots and brackets, and without spaces around it"
+            yield Fault(place, name, allowed)
+        elif path == "actuators" and name in _RESERVED:
+            yield Fault(place, name, reserved)
+        elif path == "rings" and isinstance(name, str) and name.isdecimal():
+            yield Fault(place, name, "must not be a number, by which paths count rings")
         if name and name in names[:k]:
-            first = names.index(name)
-            yield Fault(f"{path}[{k}].name", name, f"must differ from {path}[{first}].name")
-
-
-def _allowed_name(name: str, path: str) -> str:
-    if not is_path_name(name):
-        return "must be one line without dots and brackets, and without spaces around it"
-    if path == "actuators" and name in _RESERVED:
-        return f"must not be one of {', '.join(_RESERVED)}, by which paths name parts of the arm"
-    counts = path == "rings" and name.isdecimal()
-    return "must not be a number, by which paths count rings" if counts else ""
+            yield Fault(place, name, f"must differ from {path}[{names.index(name)}].name")

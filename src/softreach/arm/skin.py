@@ -1,8 +1,4 @@
-"""Skins of an arm on a centerline: its body, and a surface for each bundle.
-
-Bundles that fill a sector of a ring are bands on the outside of that ring, lines are thin tubes,
-lumens tubes of their radius. They are cut where they begin and end to act.
-"""
+"""Skins of an arm on a centerline: its body, and a surface for each bundle where it acts."""
 
 from __future__ import annotations
 
@@ -20,7 +16,7 @@ from softreach.arm.stations import Marker
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
 
@@ -39,12 +35,9 @@ _CARD_STATIONS, _CARD_STEP = 41, np.pi / 27
 class Centerline:
     """Sections of an arm in one configuration."""
 
-    z: Array
-    """Stations before activation [m], ascending, shape (station,)."""
-    position: Array
-    """Their centers [m], shape (station, 3)."""
-    directors: Array
-    """d1, d2, d3 of each, shape (station, 3, 3)."""
+    z: Array  # Stations before activation [m], ascending, shape (station,)
+    position: Array  # Their centers [m], shape (station, 3)
+    directors: Array  # d1, d2, d3 of each, shape (station, 3, 3)
 
     @classmethod
     def unactivated(cls, z: Array, base: Base) -> Self:
@@ -55,11 +48,7 @@ class Centerline:
 
     @classmethod
     def of(cls, shape: xr.Dataset | Centerline) -> Centerline:
-        """That of one configuration.
-
-        Raises:
-            InvalidInput: Several configurations, or one of an arm without length.
-        """
+        """That of one configuration; raises InvalidInput for several, or one without length."""
         if isinstance(shape, Centerline):
             return shape
         if not (least := float(shape["extension"].min())) > 0.0:
@@ -114,8 +103,7 @@ class _Span(NamedTuple):
 
     extent: float
     z: Array
-    held: Array
-    """Z of guides between which a line is straight; none if it follows the arm."""
+    held: Array  # Z of guides between which a line is straight; none if it follows the arm
     position: Array
     directors: Array
     center: Array
@@ -146,16 +134,7 @@ class _Span(NamedTuple):
 
 
 def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
-    """The body of the arm as a closed tube.
-
-    Args:
-        arm: The design; where its radius is not smooth, the tube has a section.
-        shape: One configuration of that arm, or its centerline.
-        sides: Corners of each section.
-
-    Raises:
-        InvalidInput: Several configurations, fewer than two stations or three sides.
-    """
+    """The body of an arm in one configuration as a closed tube with so many sides."""
     line = _drawn_line(arm, shape)
     d1, d2 = line.directors[:, 0], line.directors[:, 1]
     return tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
@@ -164,19 +143,10 @@ def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
 def bundle_skins(
     arm: Body, shape: Shape, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Surface]:
-    """Surfaces of all bundles where they act: bands, thin tubes for lines, tubes for lumens.
+    """A surface for each bundle where it acts: bands, thin tubes for lines, tubes for lumens.
 
-    Args:
-        arm: The design; band j covers a_j - σ_j/2 to a_j + σ_j/2 on the outside of its ring.
-        shape: As for `arm_surface`.
-        lift: Height of bands above their ring, in R2 [-].
-        step: Largest angle between neighboring points across a band [rad].
-
-    Returns:
-        One surface for each bundle; bands are open, and the points of each are (stations, across).
-
-    Raises:
-        InvalidInput: Several configurations.
+    Bands are open, lie `lift` R2 above the outside of their ring, and have a point every `step`
+    [rad] across; their points are (stations, across).
     """
 
     def sector(span: _Span) -> Surface:
@@ -188,15 +158,7 @@ def bundle_skins(
 
 
 def bundle_surfaces(arm: Body, shape: Shape) -> list[Surface]:
-    """Every bundle as a closed surface; bands are half sunk into the outside of their ring.
-
-    Args:
-        arm: The design.
-        shape: As for `arm_surface`.
-
-    Raises:
-        InvalidInput: Several configurations.
-    """
+    """Every bundle as a closed surface; bands are half sunk into the outside of their ring."""
 
     def sector(span: _Span) -> Surface:
         # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
@@ -207,18 +169,7 @@ def bundle_surfaces(arm: Body, shape: Shape) -> list[Surface]:
 
 
 def marker_points(markers: Sequence[Marker], shape: Shape) -> Array:
-    """Places of markers, between the stations of a configuration for pictures.
-
-    Args:
-        markers: Those of the arm.
-        shape: As for `arm_surface`, from the base to the tip.
-
-    Returns:
-        Points [m], shape (marker, 3).
-
-    Raises:
-        InvalidInput: Several configurations.
-    """
+    """Places [m] of markers, between the stations of a configuration for pictures, (marker, 3)."""
     if not markers:
         return np.empty((0, 3))
     line = Centerline.of(shape)
@@ -269,17 +220,13 @@ def _skins(arm: Body, shape: Shape, sector: Callable[[_Span], Surface]) -> list[
         extent, z = float(outline.extent[k]), line.z[part]
         return _Span(extent, z, held, *section, center, inner, outer, radius[part])
 
-    return [
-        joined([make[kind](span(k, part)) for part in _runs(acts[:, k])])
-        for k, kind in enumerate(outline.shape)
-    ]
-
-
-def _runs(acts: Mask) -> list[slice]:
-    """Stations from the start to the end of each run of pieces that act."""
-    change = np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))
-    pairs = zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True)
-    return [slice(int(start), int(end) + 1) for start, end in pairs]
+    surfaces: list[Surface] = []
+    change = np.diff(np.pad(acts.astype(np.int8), ((1, 1), (0, 0))), axis=0)
+    for k, kind in enumerate(outline.shape):  # from start to end of each run of pieces that act
+        ends = zip(np.flatnonzero(change[:, k] > 0), np.flatnonzero(change[:, k] < 0), strict=True)
+        runs = [slice(int(start), int(end) + 1) for start, end in ends]
+        surfaces.append(joined([make[kind](span(k, run)) for run in runs]))
+    return surfaces
 
 
 def _line_tube(span: _Span, radius: float) -> Surface:

@@ -22,11 +22,7 @@ _SHORTEST = 1e-9  # of L, of a part between two places: below it, places round t
 
 
 class Stations(NamedFloats):
-    """Z [m] of stations by name; frozen.
-
-    Raises:
-        InvalidDesign: No mapping from names to places, or a name that paths cannot hold.
-    """
+    """Z [m] of stations by name; frozen."""
 
     def __init__(self, places: Any = ()) -> None:
         try:
@@ -63,11 +59,7 @@ class Stations(NamedFloats):
 
 
 class Located(Part):
-    """A part at one place along the arm or more, each given over L, in m, or by a station's name.
-
-    Raises:
-        InvalidDesign: A place off the arm, or given twice.
-    """
+    """A part at places along the arm, each given over L, in m, or by the name of a station."""
 
     @property
     def places(self) -> list[str]:
@@ -101,11 +93,7 @@ class Located(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Span(Located):
-    """A part between two places along the arm.
-
-    Raises:
-        InvalidDesign: A place off the arm, given twice, or an end that is not beyond the start.
-    """
+    """A part between two places along the arm."""
 
     start_over_length: float = number("Z0/L", "", "its start", low=0.0, below=1.0, default=0.0)
     """Z0/L, where along the arm it begins [-]."""
@@ -195,11 +183,7 @@ Made = TypeVar("Made", bound=Located)
 
 
 def placed(part: Made, stations: Mapping[str, float]) -> Made:
-    """The part where the stations that it names are.
-
-    Raises:
-        InvalidDesign: It names a station that is none of these.
-    """
+    """The part where the stations that it names are; raises InvalidDesign for unknown ones."""
     given = {field: getattr(part, field) for field in part.places}
     names = {
         field: place.name if isinstance(place, Station) else place

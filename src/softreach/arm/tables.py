@@ -2,14 +2,11 @@
 
 The map is linear in the activations, theory (7). Curvature u is per length of η = 1 + Σ zγ over
 fibers and muscles alone: these change the length of matter at rest, which forces leave as it is.
-All physics lives in this room: a new actuator, profile or material changes these tables, and
-nothing that reads them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -34,12 +31,9 @@ _JUMP = 1e-3
 class Tables:
     """The response of an arm at given stations per unit of activation of each bundle."""
 
-    stations: Array
-    """Z [m], shape (station,)."""
-    extension: Array
-    """z = dζ/dγ [-], shape (station, bundle)."""
-    curvature: Array
-    """U = du/dγ [1/m], per length of η, in the directors, shape (station, 3, bundle)."""
+    stations: Array  # Z [m], shape (station,)
+    extension: Array  # z = dζ/dγ [-], shape (station, bundle)
+    curvature: Array  # U = du/dγ [1/m], per length of η, in the directors, (station, 3, bundle)
     rest_length_factor: Array
     """dη/dγ [-]: z of bundles that change the length of matter at rest, 0 of those that are forces;
     shape (station, bundle). Of fibers and muscles alone it is `extension` itself."""
@@ -51,13 +45,9 @@ class Tables:
 
 
 def tables(arm: Body, stations: ArrayLike) -> Tables:
-    """z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
+    """z = N/K0 and U = K⁻¹M at Z [m] (station,): theory (6), which for fibers is (8) to (10).
 
     U of a rest shape is its curvature; what an arm is at rest, its `inner` arm has.
-
-    Args:
-        arm: The design.
-        stations: Z [m], shape (station,).
 
     Raises:
         InvalidDesign: An actuator loads the sections by another number of bundles than it has.
@@ -91,10 +81,7 @@ def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
 
 
 def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
-    """1/K0 [1/N], 1/K1 = 1/K2 and 1/K3 [1/(N m²)] at stations Z [m]; 0 in rigid pieces.
-
-    Returns:
-        One value for each station, shape (station,) each.
+    """1/K0 [1/N], 1/K1 = 1/K2 and 1/K3 [1/(N m²)] at stations Z [m], (station,); 0 in rigid pieces.
 
     Raises:
         InvalidDesign: A material without Young's modulus, or two bending stiffnesses.
@@ -107,18 +94,22 @@ def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
 
 @lru_cache(maxsize=64)
 def check_extension(arm: Body) -> None:
-    """The theory ends where an activation would shorten the arm to nothing.
-
-    Args:
-        arm: The inner arm.
+    """The theory ends where an activation would shorten the inner arm to nothing.
 
     Raises:
         InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, dimensions too
             large or too small for numbers of double precision, or more than a hundred turns.
     """
-    if faults := list(_winding_faults(arm)):
-        raise InvalidDesign(faults)
+    faults, most = list[Fault](), MOST_TURN / math.tau
     with np.errstate(all="ignore"):
+        for actuator in arm.actuators:  # those that wind so often that no steps follow them
+            if "revolution" in fields_of(type(actuator)):
+                turn = abs(actuator.value_on("revolution", arm.profile, arm.section))
+                if not (turns := float(turn / math.tau)) <= most:
+                    allowed = f"must be at most {most:g}: give a smaller angle"
+                    faults.append(Fault(f"turns of {actuator.name}", turns, allowed))
+        if faults:
+            raise InvalidDesign(faults)
         table = tables(arm, strain_stations(arm))
     if not (np.isfinite(table.extension).all() and np.isfinite(table.curvature).all()):
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
@@ -133,17 +124,6 @@ def check_extension(arm: Body) -> None:
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
 
 
-def _winding_faults(arm: Body) -> Iterator[Fault]:
-    """Fibers and tendons that wind so often about the arm that no steps follow them."""
-    for actuator in arm.actuators:
-        if "revolution" in fields_of(type(actuator)):
-            with np.errstate(all="ignore"):
-                turns = abs(actuator.value_on("revolution", arm.profile, arm.section)) / math.tau
-            if not turns <= (most := MOST_TURN / math.tau):
-                allowed = f"must be at most {most:g}: give a smaller angle"
-                yield Fault(f"turns of {actuator.name}", float(turns), allowed)
-
-
 def range_of_extension(arm: Body, extension: Array) -> tuple[float, float]:
     """Smallest and largest 1 + Σ zγ anywhere in the activation box and along the arm [-]."""
     least, most = ends_over(extension, arm.bounds).T
@@ -151,12 +131,7 @@ def range_of_extension(arm: Body, extension: Array) -> tuple[float, float]:
 
 
 def ends_over(rates: Array, bounds: Array) -> Array:
-    """Least and largest of Σ rates γ over a box of activations, shape (station, 2).
-
-    Args:
-        rates: Per unit of each activation, shape (station, bundle).
-        bounds: Of the box, shape (bundle, 2).
-    """
+    """Ends of Σ rates γ, with rates (station, bundle), over a box (bundle, 2), (station, 2)."""
     ends = rates[..., None] * bounds
     return np.stack([ends.min(-1).sum(-1), ends.max(-1).sum(-1)], axis=1)
 
@@ -171,10 +146,7 @@ def both_sides(arm: Body, stations: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def jumps(arm: Body) -> tuple[float, ...]:
-    """Breakpoints [m] at which strains or stiffnesses jump by over a thousandth of their largest.
-
-    At the others it is their slopes that jump, as at the samples of a measured profile.
-    """
+    """Breakpoints [m] at which strains or stiffnesses, not their slopes alone, jump."""
     breaks = np.array(arm.breakpoints)
     sides = np.concatenate([breaks, np.nextafter(breaks, 0.0)])
     table, stiffness = tables(arm, sides), arm.stiffness_at(sides)
@@ -192,11 +164,7 @@ def strain_stations(arm: Body) -> Array:
 
 
 def quadrature(arm: Body, pieces: int = _PIECES) -> tuple[Array, Array, Array]:
-    """Gauss nodes between all stations where something begins, ends or acts.
-
-    Returns:
-        The nodes, their weights, and half the gap that each is in [m].
-    """
+    """Gauss nodes between places where something begins or acts, weights, half their gaps [m]."""
     points = [] if arm.loads is None else [load.station for load in arm.loads.point_loads]
     knots = np.union1d(np.linspace(0.0, arm.length, pieces + 1), [*arm.breakpoints, *points])
     half = np.diff(knots)[:, None] / 2.0
@@ -212,16 +180,11 @@ class Works:
     """
 
     arm: Body
-    columns: NDArray[np.intp]
-    """Bundles whose unit loads do the work."""
-
-    @property
-    def has_growth(self) -> bool:
-        """True if bundles change the length of matter."""
-        return len(self._growing) > 0
+    columns: NDArray[np.intp]  # Bundles whose unit loads do the work
 
     @lazy
-    def _growing(self) -> NDArray[np.intp]:
+    def growing(self) -> NDArray[np.intp]:
+        """Bundles that change the length of matter."""
         return np.flatnonzero([not each.is_force for each in self.arm.bundle_actuators])
 
     def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:
@@ -241,7 +204,7 @@ class Works:
         table = tables(self.arm, z)
         bent = np.einsum("sct,scb->stb", moment, table.curvature)
         axial = np.einsum("st,sb->tb", force, table.extension)
-        eta = table.rest_length_factor[:, self._growing]
+        eta = table.rest_length_factor[:, self.growing]
         return axial + bent.sum(axis=0), np.einsum("stb,sg->tbg", bent, eta)
 
     def of(self, inner: Array) -> Array:
@@ -251,7 +214,7 @@ class Works:
     def slopes(self, inner: Array) -> Array:
         """Its derivatives by the activations, shape (n or 1, work, bundle)."""
         slopes = self.by_bundle(inner)
-        for k, column in enumerate(self._growing):
+        for k, column in enumerate(self.growing):
             slopes[..., column] += self._sum(self._rates[1][None, ..., k], inner)
         return slopes
 
@@ -259,7 +222,7 @@ class Works:
         """∫ N z + η M·U dZ, shape (n or 1, work, bundle)."""
         linear, growing = self._rates
         work = linear[None].copy()
-        for k, column in enumerate(self._growing):
+        for k, column in enumerate(self.growing):
             work = work + inner[:, column, None, None] * growing[..., k]
         return work
 

@@ -38,10 +38,8 @@ _HALVINGS = 6
 class Tensions(NamedTuple):
     """Tensions of the tendons that are driven by length."""
 
-    tension: Array
-    """τ >= 0 [N], shape (n, tendon)."""
-    is_taut: Mask
-    """Tendons whose tension follows the displacements, shape (n, tendon)."""
+    tension: Array  # τ >= 0 [N], shape (n, tendon)
+    is_taut: Mask  # Tendons whose tension follows the displacements, shape (n, tendon)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +50,7 @@ class LengthLaw:
     displacements [m].
     """
 
-    arm: Body
-    """With its rest shape as a bundle: see `body_of`."""
+    arm: Body  # With its rest shape as a bundle: see `body_of`
 
     @lazy
     def columns(self) -> NDArray[np.intp]:
@@ -99,10 +96,7 @@ class LengthLaw:
     def complementary(self, matrix: Array, excess: Array) -> Tensions:
         """Tensions τ >= 0 with w = matrix τ - excess >= 0 and τ·w = 0.
 
-        Args:
-            matrix: ∂s/∂τ + 1/k [m/N], shape (n or 1, tendon, tendon).
-            excess: By how much they are pulled in beyond their paths without tension [m], (n,
-                tendon).
+        The matrix is ∂s/∂τ + 1/k [m/N], (n or 1, tendon, tendon), the excess in m, (n, tendon).
         """
         from softreach.kernels.box.complementarity import complementary  # loads Numba
 
@@ -145,12 +139,9 @@ class LengthLaw:
 class _State(NamedTuple):
     """Tensions on their way, for some samples."""
 
-    inner: Array
-    """Activations of the inner arm, shape (n, bundle)."""
-    shortening: Array
-    """s [m], shape (n, tendon)."""
-    slopes: Array
-    """Estimate of ∂s/∂τ [m/N], shape (n, tendon, tendon)."""
+    inner: Array  # Activations of the inner arm, shape (n, bundle)
+    shortening: Array  # s [m], shape (n, tendon)
+    slopes: Array  # Estimate of ∂s/∂τ [m/N], shape (n, tendon, tendon)
 
 
 @dataclass(frozen=True)
@@ -178,6 +169,10 @@ class PulledTendons:
         if self.guides is None:
             return inner
         return self.guides.settled(inner, partial(self.works, which=self.guides.works))
+
+    def continued_from(self, inner: Array, frames: Array | None = None) -> PulledTendons:
+        """Those of the arm in its posture at activations of the inner arm, shape (k, bundles)."""
+        return self
 
     def shortening(self, inner: Array) -> Array:
         """s of paths [m] at activations of the inner arm, (n, tendon); NaN without equilibrium."""
@@ -280,12 +275,8 @@ class PulledTendons:
     def response(self, inner: Array, is_taut: Mask, pulled: Array, on_arcs: Array) -> Array:
         """Changes of the activations of the inner arm with what drives it, (n, bundle, change).
 
-        Args:
-            inner: Activations of the inner arm, shape (n, bundle).
-            is_taut: Shape (n, tendon).
-            pulled: Changes of activations with displacements, shape (n or none, bundle, change).
-            on_arcs: Changes of the loads of arcs at the same strains and tensions, likewise, in the
-                rows of these loads.
+        `pulled` are those of activations with displacements, `on_arcs` in the rows of the loads of
+        arcs those at the same strains and tensions, (n or none, bundle, change) each.
         """
         law, guides = self.law, self.guides
         if guides is None:

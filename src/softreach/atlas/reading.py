@@ -15,7 +15,7 @@ from zarr.abc.store import Store  # noqa: TID253  (imported where stores are)
 from zarr.storage import StoreLike, StorePath  # noqa: TID253
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.written import from_written, written_name
+from softreach.arm.parameters import from_written, written_name
 from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.metrics import Need

@@ -14,14 +14,15 @@ from softreach.arm.design_file import document_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import (
     Parameter,
+    Written,
     changed,
     find_parameter,
     find_parameters,
+    from_written,
     parameters,
     unknown_parameter,
 )
 from softreach.arm.tables import check_extension
-from softreach.arm.written import Written, from_written
 from softreach.sampling import sample_cube
 from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite

@@ -115,7 +115,15 @@ def calibrate(
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
         result = replace(result, exchange=exchanged_columns(fit, model, train.places, fit_to))
     result = replace(result, seconds=perf_counter() - begin)
-    return replace(result, rivals=_rivals(arm, table, held, progress)) if rivals else result
+    if not rivals:
+        return result
+    laws = {
+        "constant curvature": constant_curvature(arm, train, table, progress),
+        "quadratic ridge": quadratic(train, table),
+    }
+    off = [(name, count, places - table.places) for name, (places, count) in laws.items()]
+    others = (Rival(name, n, misses(x[~held]), misses(x[held])) for name, n, x in off)
+    return replace(result, rivals=tuple(others))
 
 
 def _held_out(table: Measurements, share: float, by_run: bool | None, seed: int) -> Mask:
@@ -131,18 +139,6 @@ def _held_out(table: Measurements, share: float, by_run: bool | None, seed: int)
         raise InvalidInput("hold_out", share, f"small enough to leave some of {count} {what}")
     chosen = np.random.default_rng(seed).permutation(count)[:out]
     return np.isin(parts, chosen)
-
-
-def _rivals(
-    arm: Manipulator, table: Measurements, held: Mask, progress: Progress
-) -> tuple[Rival, ...]:
-    def rival(name: str, places: Array, numbers: int) -> Rival:
-        off = places - table.places
-        return Rival(name, numbers, misses(off[~held]), misses(off[held]))
-
-    train = table.of(~held)
-    arcs = constant_curvature(arm, train, table, progress)
-    return rival("constant curvature", *arcs), rival("quadratic ridge", *quadratic(train, table))
 
 
 def leave_one_run_out(
@@ -202,10 +198,7 @@ def _warn_of_numbers(result: Calibration) -> None:
 
 
 def _ridge(features: Array, target: Array, wanted: Array) -> Array:
-    """Targets at the features that are wanted, (n, number), by a linear law of the known ones.
-
-    Its penalty is that of the least generalized cross-validation.
-    """
+    """Targets at wanted features, by the ridge of least generalized cross-validation."""
     middle, size = features.mean(axis=0), features.std(axis=0)
     size = np.where(size > 0, size, 1.0)
     scaled, mean = (features - middle) / size, target.mean(axis=0)
@@ -224,12 +217,7 @@ def _ridge(features: Array, target: Array, wanted: Array) -> Array:
 
 
 def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
-    """Places of the test samples by a ridge on inputs, their squares and products.
-
-    Returns:
-        Places, (n, marker, 3), NaN for a marker that is missing in training; and how many numbers
-        it has.
-    """
+    """Places (n, marker, 3) by a ridge on inputs and their products; count of its numbers."""
     middle, span = train.inputs.mean(axis=0), np.ptp(train.inputs, axis=0)
     size = np.where(span > 0, span, 1.0)
     seen, wanted = (with_products((each.inputs - middle) / size) for each in (train, test))
@@ -244,12 +232,9 @@ def quadratic(train: Measurements, test: Measurements) -> tuple[Array, int]:
 def constant_curvature(
     arm: Manipulator, train: Measurements, test: Measurements, progress: Progress = silent
 ) -> tuple[Array, int]:
-    """Places of the test samples by arcs of circles, one between each two ends of actuators.
+    """Places (n, marker, 3) by arcs of circles between ends of actuators; count of numbers.
 
     The bend of an arc is linear in the inputs that act on it; the base stands anywhere.
-
-    Returns:
-        Places, (n, marker, 3), and how many numbers were fitted.
     """
     from scipy.optimize import least_squares
 

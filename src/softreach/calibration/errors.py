@@ -13,10 +13,8 @@ from softreach.support.arrays import Array, Mask
 _NEAR = (0.05, 0.1)  # distances of inputs, over their ranges, within which two samples are near
 _FEW = 8
 _NOISE = 1.5  # held-out error over what the data repeats, up to which noise is all
-_MEMORY = 0.05
-"""Share of the squared residuals that the last command must explain, beyond all laws of inputs."""
-_LAW = 0.2
-"""Share of the squared residuals that a law of the inputs explains where noise is not all."""
+_MEMORY = 0.05  # Share of squared residuals that last commands must explain, beyond laws of inputs
+_LAW = 0.2  # Share of squared residuals that a law of inputs explains where noise is not all
 _SURE = 2.5  # gain in a tenth of the samples, over its standard error, that is not chance
 _WIDTHS = (0.5, 0.25)  # of the bells in laws of the inputs, over their ranges
 _BELLS = 80
@@ -64,10 +62,9 @@ class Repeatability(NamedTuple):
 
 
 def repeatability(data: Measurements, residuals: Array) -> Repeatability:
-    """From pairs of samples with the same inputs, or with near ones.
+    """From residuals (n, marker, 3) [m], NaN where unknown, of pairs of same or near inputs.
 
-    Residuals are compared, predicted minus measured places (n, marker, 3) [m], NaN where unknown,
-    so that the arm's own motion between near inputs does not count.
+    So the arm's own motion between near inputs does not count.
     """
     spans = np.ptp(data.inputs, axis=0)
     moving = spans > 0

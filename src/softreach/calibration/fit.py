@@ -17,16 +17,13 @@ from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from softreach.support.progress import Progress
 
-SAME = 1e-7
-"""Smallest singular value over the largest, in scales of the numbers, that data can tell."""
+SAME = 1e-7  # Least singular value over the largest, in scales of numbers, that data can tell
 _IDLE = 1e-9  # motion of markers in L, or over that of the other numbers, that is rounding
 _ROBUST = 3.0  # residuals beyond so many widths count less than their squares
-_FINE, _COARSE = 1e-7, 1e-3
-"""Least share by which a step must improve: of the last round, of those before."""
+_FINE, _COARSE = 1e-7, 1e-3  # Least share by which a step improves: last round, those before
 _MOST = 60
 _SAMPLES = 100  # samples by which exchanges are compared
-_PROMISING, _BETTER = 0.8, 0.5
-"""Error over that of the columns as they are: before a fit, and after it."""
+_PROMISING, _BETTER = 0.8, 0.5  # Error over that of the columns as they are: before a fit, after it
 _ALIKE, _FAR_BETTER = 1.2, 0.35
 """Factor between errors that nothing tells apart, and that with which a fit is not begun."""
 _FAR = 1.0  # m, what a sample without equilibrium misses
@@ -39,22 +36,15 @@ class Fit:
     free: FreeNumbers
     values: Array
     prediction: Prediction
-    residuals: Array
-    """Predicted minus measured places [m], NaN where none was seen, (n, marker, 3)."""
-    weights: Array
-    """Of each marker of each sample in the fit: 1, less for outliers; (n, marker)."""
-    at_bound: Mask
-    """Numbers that end at a bound, shape (number,)."""
+    residuals: Array  # Predicted minus measured places [m], NaN where none was seen, (n, marker, 3)
+    weights: Array  # Of each marker of each sample in the fit: 1, less for outliers; (n, marker)
+    at_bound: Mask  # Numbers that end at a bound, shape (number,)
     evaluations: int
     converged: bool
 
 
 def started(model: MarkerModel, places: Array) -> FreeNumbers:
-    """Numbers to start from: the pose by which predicted places match measured ones [Kabsch1976].
-
-    Raises:
-        InvalidInput: Axes that only a mirror brings together.
-    """
+    """Numbers to start from: the pose that puts predicted places on measured ones [Kabsch1976]."""
     free = model.free
     turning = [name for name in POSE[3:] if name in free.names]
     moving = [name for name in POSE[:3] if name in free.names]
@@ -128,10 +118,7 @@ def _orders(model: MarkerModel, values: Array, own: Array, places: Array) -> lis
 
 
 def _exchanges(model: MarkerModel) -> Iterator[_Order]:
-    """Exchanges of two inputs of one unit, two axes, two markers, or two of their columns.
-
-    Of several actuators with three bundles or more also all counted the other way round.
-    """
+    """Exchanges of two inputs of one unit, axes, markers or columns, and all senses of bundles."""
     arm, names = model.free.arm, model.names
     inputs, columns = np.arange(arm.inputs), np.arange(3 * len(names))
     each, words = columns.reshape(-1, 3), [f"{name} {axis}" for name in names for axis in "xyz"]
@@ -185,9 +172,6 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
     """Refuse numbers that the data cannot tell: those that do nothing, and those that trade.
 
     `slopes` are derivatives of all residuals and priors, shape (residual, number).
-
-    Raises:
-        InvalidInput: The names of the numbers, and which to leave out.
     """
     scaled = slopes * free.scale
     sizes = np.linalg.norm(scaled, axis=0)
@@ -229,10 +213,6 @@ def fitted(
     """The numbers at which predicted places are nearest to measured ones, as `calibrate` says.
 
     `places` are measured [m], NaN where none was seen, shape (n, marker, 3).
-
-    Raises:
-        InvalidInput: Numbers that the data cannot tell apart.
-        NotPossible: Columns in another order, or no equilibrium at the start.
     """
     model = replace(model, free=started(model, places))
     problem = _Problem(model, places, progress)
@@ -253,7 +233,10 @@ def fitted(
     residuals = prediction.places - places
     (low, high), hair = problem.bounds, 1e-6 * model.free.scale
     at_bound = (values <= low + hair) | (values >= high - hair)
-    weights = problem.weights_of(residuals)
+    weights = problem.seen.astype(float)
+    if problem.width is not None:
+        distance = np.linalg.norm(np.where(problem.seen[..., None], residuals, 0.0), axis=2)
+        weights = problem.seen / np.sqrt(1.0 + (distance / problem.width) ** 2)
     return Fit(model.free, values, prediction, residuals, weights, at_bound, count, converged)
 
 
@@ -315,13 +298,6 @@ class _Problem:
             gtol=1e-14,
             max_nfev=_MOST,
         )
-
-    def weights_of(self, residuals: Array) -> Array:
-        """Weight of each marker of each sample in the fit, (n, marker)."""
-        if self.width is None:
-            return self.seen.astype(float)
-        distance = np.linalg.norm(np.where(self.seen[..., None], residuals, 0.0), axis=2)
-        return self.seen / np.sqrt(1.0 + (distance / self.width) ** 2)
 
 
 def _loss(count: int, width: float | None) -> str | Callable[[Array], Array]:

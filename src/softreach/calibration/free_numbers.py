@@ -23,8 +23,7 @@ from softreach.support.errors import InvalidDesign, InvalidInput, Range
 POSE = ("pose.x", "pose.y", "pose.z", "pose.rx", "pose.ry", "pose.rz")
 """Place of the base [m], and its rotation beyond that of the design as a rotation vector [rad]."""
 
-SCALE = "scale"
-"""Lengths of the data over those of the arm, seen from its base: of a camera without a scale."""
+SCALE = "scale"  # Lengths of the data over those of the arm: of a camera without a scale
 
 _PLACES = ("station", "start", "end")  # Numbers in m that lie on the arm
 _UNFIT = re.compile(r"(.*\.)?(lower|upper)(\[\d+\])?|base\..*|loads\.(follower|tip_moment).*")
@@ -85,11 +84,7 @@ class FreeNumbers:
         )
 
     def made(self, values: Array) -> Manipulator:
-        """The arm with these values.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """The arm with these values; raises InvalidDesign if there is none."""
         given = dict(zip(self.names, values.tolist(), strict=True))
         pose = {name: value for name, value in given.items() if name in POSE}
         paths = {path: value for name, value in given.items() for path in _tied(name)}
@@ -139,12 +134,7 @@ class FreeNumbers:
 def free_numbers(
     arm: Manipulator, free: Sequence[str], prior: Mapping[str, Any] | None = None
 ) -> FreeNumbers:
-    """Free numbers by their names, with "pose.position" and "pose.rotation" for parts of a pose.
-
-    Raises:
-        InvalidInput: A name that no number has, a number that counts something, or a prior that is
-            no width above 0.
-    """
+    """Free numbers by their names, with "pose.position" and "pose.rotation" for parts of a pose."""
     given = as_names("free", free)
     if arm.rest.is_straight and any("rest." in name for name in given):
         # All arms on the way have a rest shape, were it of the size of rounding.
@@ -167,7 +157,13 @@ def free_numbers(
 def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
     for name in free:
         if name == "pose" or name.startswith("pose."):
-            yield from _of_pose(arm, name)
+            kinds = {"pose": POSE, "pose.position": POSE[:3], "pose.rotation": POSE[3:]}
+            for each in kinds.get(as_one_of("free", name, [*kinds, *POSE]), (name,)):
+                axis = POSE.index(each)
+                start = arm.base.position[axis] if axis < 3 else 0.0
+                unit, scale = ("m", 1e-2 * arm.length) if axis < 3 else ("rad", 0.02)
+                allowed = Range(unit=unit)
+                yield FreeNumber(name=each, unit=unit, start=start, range=allowed, scale=scale)
         elif name == SCALE:
             yield FreeNumber(name=SCALE, unit="1", start=1.0, range=Range(1e-3, 1e3), scale=0.02)
         elif "*" in name:
@@ -175,8 +171,14 @@ def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
             hits = [key for key in known if fnmatchcase(key, name.replace("[", "[[]"))]
             if not hits:
                 find_parameters(arm, (name,))
-            each = (_of_parameters(arm, hit) for hit in _once(arm, known, hits) or hits)
-            yield from (number for number in each if _changes_alone(arm, number))
+            for hit in _once(arm, known, hits) or hits:
+                number = _of_parameters(arm, hit)
+                alone = FreeNumbers(arm, (number,))
+                try:
+                    alone.neighbors(alone.start, 0)
+                except InvalidDesign:  # others fix it, such as the outermost outer ratio
+                    continue
+                yield number
         else:
             yield _of_parameters(arm, name)
 
@@ -199,15 +201,6 @@ def _once(arm: Manipulator, known: Mapping[str, Parameter], names: Sequence[str]
     return [name for name in own or kept if name not in twins]
 
 
-def _changes_alone(arm: Manipulator, number: FreeNumber) -> bool:
-    """False of a number that others fix, such as the outer ratio of the outermost ring."""
-    alone = FreeNumbers(arm, (number,))
-    try:
-        return bool(alone.neighbors(alone.start, 0))
-    except InvalidDesign:
-        return False
-
-
 def _tied(name: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in name.split("="))
 
@@ -225,30 +218,17 @@ def _of_parameters(arm: Manipulator, name: str) -> FreeNumber:
     if len({parameter.unit for parameter in known.values()}) > 1:
         raise InvalidInput("free", name, "tied to numbers of the same unit")
     values = [value for p in known.values() for value in p.values(arm) if math.isfinite(value)]
-    typical, allowed = _typical(arm, first.unit), first.range
+    # A size of numbers in the unit, for those that are zero.
+    pairs = zip(arm.bounds, arm.bundle_units, strict=True)
+    pulls = [abs(bound) for bounds, own in pairs if own == first.unit for bound in bounds]
+    sizes = {"m": float(arm.profile.radius(0.0)), "1/m": 1.0 / arm.length, "kg": 0.01}
+    sizes |= {"kg/m³": 1000.0} | dict.fromkeys(("N", "Pa"), max([*pulls, 1e-3]))
+    typical, allowed = sizes.get(first.unit, 1.0), first.range
     start = float(np.mean(values)) if values else typical
     if paths[0].rpartition(".")[2] in _PLACES:
         allowed = allowed._replace(high=arm.length)
     scale = max(0.1 * abs(start), 1e-2 * typical)
     return FreeNumber(name=name, unit=first.unit, start=start, range=allowed, scale=scale)
-
-
-def _typical(arm: Manipulator, unit: str) -> float:
-    """A size of numbers in a unit, for those that are zero."""
-    radius = float(arm.profile.radius(0.0))
-    pairs = zip(arm.bounds, arm.bundle_units, strict=True)
-    pulls = [abs(bound) for bounds, own in pairs if own == unit for bound in bounds]
-    lengths = {"m": radius, "1/m": 1.0 / arm.length, "rad": 1.0, "kg": 0.01, "kg/m³": 1000.0}
-    return lengths.get(unit, max([*pulls, 1e-3]) if unit in ("N", "Pa") else 1.0)
-
-
-def _of_pose(arm: Manipulator, name: str) -> Iterator[FreeNumber]:
-    parts = {"pose": POSE, "pose.position": POSE[:3], "pose.rotation": POSE[3:]}
-    for each in parts.get(as_one_of("free", name, [*parts, *POSE]), (name,)):
-        axis = POSE.index(each)
-        start = arm.base.position[axis] if axis < 3 else 0.0
-        unit, scale = ("m", 1e-2 * arm.length) if axis < 3 else ("rad", 0.02)
-        yield FreeNumber(name=each, unit=unit, start=start, range=Range(unit=unit), scale=scale)
 
 
 def _moved(base: Base, pose: Mapping[str, float]) -> Base:

@@ -52,8 +52,7 @@ _ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")
 _PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNORECASE)
 _MOST_ROWS = 2_000_000
 _MOST_BYTES = 1000 * MEGABYTE
-_WIDEST = 4.0
-"""Distance of a place from the middle of all, in lengths of the arm, that is no pose of it."""
+_WIDEST = 4.0  # Distance of a place from the middle of all, in lengths of the arm, that is no pose
 _HARD = 100.0  # inputs beyond the bounds of the design, in them, that are a wrong unit or a slip
 _SLACK = 0.01  # of the largest tension: a negative one that is the zero of a load cell
 
@@ -256,11 +255,7 @@ def _opened(data: Any) -> tuple[pd.DataFrame, str]:
 
 
 def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
-    """The table of a file that its name calls Parquet, else a CSV, packed if it says .gz or .zip.
-
-    Raises:
-        InvalidInput: It is no table.
-    """
+    """The table of a file whose name says Parquet, else CSV, packed if it says .gz or .zip."""
     import pandas as pd
 
     suffix = Path(name).suffix.lower()

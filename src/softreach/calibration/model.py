@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.base import Base
-from softreach.arm.driving import Driving, Pulled, body_of
+from softreach.arm.driving import Driving, body_of
 from softreach.arm.guides import has_guides
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tensions import LengthLaw, PulledTendons
@@ -44,7 +44,6 @@ _TOL = 1e-6
 _STEPS = 24
 _BODY = ("profile", "section", "actuators", "loads", "rest", "stations", "rigid_pieces", "markers")
 """Parts of an arm that are more than its drives and the pose of its base."""
-Tendons: TypeAlias = "Pulled | LengthLaw | PulledTendons"
 _ENDS = ("start", "end", "stations.")  # In names of numbers that move ends of actuators
 
 
@@ -67,28 +66,17 @@ class _Explicit(NamedTuple):
     bundles: Array  # Activations of all bundles, displacements among them, (n, bundle)
     taut_from: Array
     compliance: Array
-    measures: Array
-    """M and N of tendons that are driven by length at the nodes, (step, 3, 4, tendon)."""
+    measures: Array  # M and N of tendons driven by length at the nodes, (step, 3, 4, tendon)
     rest: Array  # û at rest at the nodes, (step, 3, 3)
 
 
 def marker_stations(arm: Manipulator, names: Iterable[str]) -> tuple[Array, Array]:
-    """Stations Z [m] of some markers of an arm, and their offsets in the directors [m].
-
-    An arm without markers has one at its tip.
-    """
+    """Z [m] of some markers, or of the tip without any, and offsets in the directors [m]."""
     if not arm.markers:
         return np.array([arm.length]), np.zeros((1, 3))
     known = {marker.name: marker for marker in arm.markers}
     places = [known[name].station_at("station", arm.length) for name in names]
     return np.array(places), np.array([known[name].offset for name in names])
-
-
-def _moves_guides(arm: Manipulator, neighbors: list[Neighbors]) -> bool:
-    """True if arcs between guides come or go with a number."""
-    near = (other for each in neighbors for _, other in each if isinstance(other, Manipulator))
-    bundles = body_of(arm).bundles
-    return has_guides(arm) and any(body_of(other).bundles != bundles for other in near)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +93,7 @@ class MarkerModel:
         return cls(free, data.inputs, data.marker_names)
 
     def predict(self, values: Array, *, slopes: bool = False) -> Prediction:
-        """Places of the markers, and their derivatives if asked for.
-
-        Raises:
-            InvalidDesign: No such arm can exist.
-        """
+        """Places of the markers, and their derivatives if asked for; may raise InvalidDesign."""
         arm, scale = self.free.made(values), self.free.scaled(values)
         return self.of_arm(arm, scale, values if slopes else None)
 
@@ -121,8 +105,10 @@ class MarkerModel:
         moving = any(word in name for name in free.names for word in _ENDS)
         grid = step_grid(body_of(arm), stations, _STEPS, moving_ends=moving)
         neighbors = [] if values is None else [free.neighbors(values, k) for k in range(len(free))]
-        if _moves_guides(arm, neighbors):
-            return self._by_differences(arm, scale, neighbors)
+        if has_guides(arm):
+            near = [x for each in neighbors for _, x in each if isinstance(x, Manipulator)]
+            if any(body_of(x).bundles != body_of(arm).bundles for x in near):  # of other arcs
+                return self._by_differences(arm, scale, neighbors)
         blocks = (self.inputs[rows] for rows in parallel.blocks(len(self.inputs), _BLOCK))
         return joined([self._block(arm, scale, neighbors, grid, inputs) for inputs in blocks])
 
@@ -203,7 +189,7 @@ class MarkerModel:
                 slopes[known] = _slopes(rod.arm, at, some, changes, driven, by_length=True)
         return Prediction(places, slopes, state.status)
 
-    def _rod(self, arm: Manipulator, grid: StepGrid) -> tuple[ArmRod, Tendons]:
+    def _rod(self, arm: Manipulator, grid: StepGrid) -> tuple[ArmRod, LengthLaw | PulledTendons]:
         """The rod of the inner arm, and how that takes what is pulled in."""
         driving = Driving(arm)
         body = body_of(arm).with_bounds(driving.law.rest.T + np.zeros(2))  # which decide nothing
@@ -221,10 +207,7 @@ class MarkerModel:
         pulled: Array,
         near: tuple[list[_Explicit], list[Neighbors]],
     ) -> Array:
-        """Derivatives of the rod's activations where guides hold tendons, (n, bundle, number).
-
-        `pulled` are those of activations with displacements.
-        """
+        """Derivatives of the rod's activations with guides, by those with displacements."""
         columns, on_arcs = tendons.law.columns, np.zeros_like(pulled)
         for k, (change, neighbors) in enumerate(zip(*near, strict=True)):
             own = gamma[:, columns] * change.compliance + change.taut_from
@@ -281,10 +264,7 @@ def _slopes(
     *,
     by_length: bool = False,
 ) -> Array:
-    """Derivatives of the places by all numbers, (n, marker, 3, number).
-
-    `driven` are those of activations: with displacements where these are still to become tensions.
-    """
+    """Derivatives of places, (n, marker, 3, number); `driven` are those of activations."""
     bundles = state.gamma.shape[1]
     tables = [change.table for change in changes]
     response = linear_response(at.table, state, tables, at.measures)

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 _CORNERS = 10  # free inputs up to which all corners of their box are candidates
 _APART = 0.5  # distance of two poses in the box at least, over the mean distance of so many points
-_TRUSTED = 2.0
-"""Largest reaction of a pose to the numbers that counts in full, over the median of all."""
+_TRUSTED = 2.0  # Largest reaction of a pose to the numbers that counts in full, over the median
 _ROUNDS = 50
 _GAIN = 1e-6  # least gain of the logarithm of the determinant for which a pose is exchanged
 _START = 1e-9  # information on each number before the first pose, over that of all candidates

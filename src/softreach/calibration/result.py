@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -159,7 +159,22 @@ class Calibration(Reported):
     @cached_property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the model or its numbers, in a sentence each, with what to try."""
-        return tuple([*_doubtful_inputs(self), *_doubtful_priors(self), *_better_rivals(self)])
+        doubts, own = [*_doubtful_inputs(self)], self.held_out
+        for number, value in zip(self.fit.free.numbers, self.fit.values.tolist(), strict=True):
+            mean, width = number.prior or (value, 1.0)
+            if (off := abs(value - mean) / width) > _FAR_FROM_PRIOR:
+                doubts.append(
+                    f"{number.name} is {off:.1f} widths from its prior: free another number that "
+                    "may explain the data, or widen the prior"
+                )
+        known = [rival for rival in self.rivals if rival.held_out.number]
+        best = min(known, key=lambda rival: rival.held_out.rms, default=None)
+        if best is not None and best.held_out.rms < _BETTER * own.rms:
+            doubts.append(
+                f"{best.name} predicts better than the arm ({1e3 * best.held_out.rms:.3g} mm, not "
+                f"{1e3 * own.rms:.3g}): check order, sign and unit of inputs, or free more numbers"
+            )
+        return tuple(doubts)
 
     @property
     def held_runs(self) -> bool:
@@ -196,7 +211,7 @@ class Calibration(Reported):
         """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
         table = read_measurements(self.start, data, **columns)
         scale = self.fit.free.scaled(self.fit.values)
-        return self._model(table).of_arm(self.arm, scale).places - table.places
+        return MarkerModel.of(self.fit.free, table).of_arm(self.arm, scale).places - table.places
 
     def predict(self, inputs: ArrayLike, *, numbers_only: bool = False) -> tuple[Array, Array]:
         """Places of the markers and the standard deviations to expect of measured ones.
@@ -217,7 +232,8 @@ class Calibration(Reported):
         """
         allowed = f"shape (n, {self.arm.inputs})"
         x = as_rows("inputs", inputs, self.arm.inputs, allowed)
-        prediction = replace(self._model(self.data), inputs=x).predict(self.fit.values, slopes=True)
+        model = MarkerModel(self.fit.free, x, self.data.marker_names)
+        prediction = model.predict(self.fit.values, slopes=True)
         covariance = self.uncertainty.covariance
         square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
         square = np.maximum(square, 0.0)
@@ -264,9 +280,6 @@ class Calibration(Reported):
     @property
     def _held_text(self) -> str:
         return f"{int(self.held.sum())} {'in held-out runs' if self.held_runs else 'held out'}"
-
-    def _model(self, data: Measurements) -> MarkerModel:
-        return MarkerModel.of(self.fit.free, data)
 
     def to_dataset(self) -> xr.Dataset:
         """Numbers with their errors over `number`, residuals over `sample`, `marker`, `axis`."""
@@ -477,26 +490,3 @@ def _doubtful_inputs(result: Calibration) -> Iterator[str]:
                 seen = ", ".join(data.marker_names[m] for m in hits)
                 times = share[k, hits[0]]
                 yield f"{name} moves {seen} {words} ({times:.2f} times as far as the model)"
-
-
-def _doubtful_priors(result: Calibration) -> Iterator[str]:
-    for number, value in zip(result.fit.free.numbers, result.fit.values.tolist(), strict=True):
-        if number.prior is None:
-            continue
-        mean, width = number.prior
-        if (off := abs(value - mean) / width) > _FAR_FROM_PRIOR:
-            yield (
-                f"{number.name} is {off:.1f} widths from its prior: free another number that may "
-                "explain the data, or widen the prior"
-            )
-
-
-def _better_rivals(result: Calibration) -> Iterator[str]:
-    own = result.held_out
-    better = [r for r in result.rivals if r.held_out.number and r.held_out.rms < _BETTER * own.rms]
-    if better:
-        best = min(better, key=lambda rival: rival.held_out.rms)
-        yield (
-            f"{best.name} predicts better than the arm ({1e3 * best.held_out.rms:.3g} mm, not "
-            f"{1e3 * own.rms:.3g}): check order, sign and unit of inputs, or free more numbers"
-        )

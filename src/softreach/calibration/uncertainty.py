@@ -11,11 +11,9 @@ from softreach.calibration.fit import SAME, Fit, robust_width
 from softreach.calibration.measurements import Measurements
 from softreach.support.arrays import Array, Mask
 
-FEWEST_RUNS = 8
-"""Runs from which they, and not samples, are what shares errors and what is held out."""
+FEWEST_RUNS = 8  # Runs from which these share errors and are held out, not samples
 _SEEN = 0.1  # least share of a variance that the residuals would show if they were plain noise
-_VAGUE = 30.0
-"""Standard deviation, in changes that matter, from which the data does not tell a number."""
+_VAGUE = 30.0  # Standard deviation, in changes that matter, of what the data does not tell
 
 
 @dataclass(frozen=True, eq=False)

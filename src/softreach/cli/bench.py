@@ -23,7 +23,7 @@ from softreach.support.units import TYPED, LengthUnit, read_length, readable
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.arm.written import Written
+    from softreach.arm.parameters import Written
 
 _COLUMNS = Group("Column names", sort_key=1)
 Free = Annotated[
@@ -240,7 +240,7 @@ def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]
 
 def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
-    from softreach.arm.written import Written
+    from softreach.arm.parameters import Written
 
     names = Written.of(arm)
     given = [name.strip() for text in texts for name in text.split(",")]
@@ -253,7 +253,7 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
     Raises:
         InvalidInput: Text that is anything else, or no such number.
     """
-    from softreach.arm.written import Written
+    from softreach.arm.parameters import Written
     from softreach.calibration.free_numbers import POSE, SCALE
 
     names, result = Written.of(arm), {}

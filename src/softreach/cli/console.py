@@ -225,7 +225,7 @@ def _shown_in(value: Any, error: Any, size: float) -> str:
 
 def for_machines(rows: Rows, length: float | None = None) -> dict[str, Any]:
     """The rows by names with their units; lengths, areas and volumes in SI units and in L."""
-    from softreach.arm.written import written_name
+    from softreach.arm.parameters import written_name
 
     fields: dict[str, Any] = {}
     for name, (value, unit) in rows.items():

@@ -215,8 +215,7 @@ def _objectives() -> Table:
 
 
 def _parameters(arm: sr.Manipulator) -> Table:
-    from softreach.arm.parameters import parameters
-    from softreach.arm.written import written_name
+    from softreach.arm.parameters import parameters, written_name
 
     yield "parameter", "value", "unit", "symbol", "meaning"
     for name, one in parameters(arm).items():

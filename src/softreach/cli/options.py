@@ -305,8 +305,7 @@ def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, .
 
 
 def _values(arm: sr.Manipulator, written: Sequence[tuple[str, object]]) -> dict[str, float]:
-    from softreach.arm.parameters import find_parameter
-    from softreach.arm.written import Written
+    from softreach.arm.parameters import Written, find_parameter
 
     values: dict[str, float] = {}
     names = Written.of(arm) if written else Written({})

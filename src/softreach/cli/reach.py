@@ -176,8 +176,7 @@ def gradient(
         parameters: Parameters, as softreach list parameters DESIGN names them, or without units.
         accuracy: Relative error allowed in volumes found on a raster.
     """
-    from softreach.arm.parameters import parameters_by_every_name
-    from softreach.arm.written import written_name
+    from softreach.arm.parameters import parameters_by_every_name, written_name
 
     arm = design_from(design, changes)
     plain = {written_name(name, p.unit): name for name, p in parameters_by_every_name(arm).items()}

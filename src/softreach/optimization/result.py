@@ -15,7 +15,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import unit_suffix
-from softreach.arm.written import with_suffix
+from softreach.arm.parameters import with_suffix
 from softreach.optimization.free_parameters import FreeParameter
 from softreach.optimization.problem import NEAR, Candidate, Fidelity, Goal, Problem
 from softreach.requirements.checks import Check

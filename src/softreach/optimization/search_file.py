@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import unknown_parameter
-from softreach.arm.written import Written
+from softreach.arm.parameters import Written, unknown_parameter
 from softreach.atlas.space import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.problem import goals, known_objective

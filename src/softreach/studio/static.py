@@ -17,8 +17,7 @@ import numpy as np
 
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Parameter
-from softreach.arm.written import written_name
+from softreach.arm.parameters import Parameter, written_name
 from softreach.atlas.space import DesignSpace
 from softreach.picture.page import packed, script_text, web_page
 from softreach.plot.axes import bounding_box

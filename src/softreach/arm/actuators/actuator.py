@@ -26,8 +26,7 @@ MOST_TURN = 200 * math.pi
 """A hundred turns [rad]: steps along the arm grow with them, and with a thousand no tolerance is
 met."""
 
-MOST_BUNDLES = 100
-"""Of an arm in all: the time to bound its bending grows with their square."""
+MOST_BUNDLES = 100  # Of an arm in all: the time to bound its bending grows with their square
 
 
 _BOUND = re.compile(r"(lower|upper)(?:\[(\d+)\])?")
@@ -258,10 +257,7 @@ class PolarActuator(Actuator):
         return tuple((value + turn * (field == "offset")).tolist())
 
     def length_along(self, field: str, profile: Profile, z: Array) -> tuple[Array, Array]:
-        """A length [m] and its slope along Z [-], both of the shape of z.
-
-        It is given over R2(Z) under `FIELD_ratio`, or in m: one, two, or samples along the arm.
-        """
+        """A length [m] and its slope [-] at Z, under FIELD, or over R2(Z) under FIELD_ratio."""
         length, ratio = getattr(self, field), getattr(self, f"{field}_ratio")
         if ratio is not None:
             return ratio * profile.radius(z), -ratio * profile.slope(z)

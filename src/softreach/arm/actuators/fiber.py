@@ -111,25 +111,19 @@ def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Arra
     breaks = [profile.length * x for x in angle.breaks]
     knots = np.union1d([0.0, *breaks, profile.length], profile.breakpoints)
     knots = knots[np.append(np.diff(knots) > 1e-14 * profile.length, True)]
-    gap = _constant_gap if isinstance(angle, Pieces) else _smooth_gap
-    each = gap(profile, ratio, angle, knots[:-1], knots[1:])
-    before = np.concatenate([[0.0], np.cumsum(each)])
+
+    def turn(start: Array, end: Array) -> Array:
+        if isinstance(angle, Pieces):
+            middle = angle((start + 1e-13 * profile.length) / profile.length)
+            return _along_cone(profile, ratio, start, end) * np.tan(middle)
+        half = 0.5 * (end - start)[..., None]
+        z = start[..., None] + half * (1.0 + _NODES)
+        secant = np.hypot(1.0, ratio * profile.slope(z)) / (ratio * profile.radius(z))
+        return np.sum(half * _WEIGHTS * np.tan(angle(z / profile.length)) * secant, axis=-1)
+
+    before = np.concatenate([[0.0], np.cumsum(turn(knots[:-1], knots[1:]))])
     piece = np.clip(np.searchsorted(knots, z, "right") - 1, 0, len(knots) - 2)
-    return before[piece] + gap(profile, ratio, angle, knots[piece], z)
-
-
-def _constant_gap(
-    profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array
-) -> Array:
-    middle = angle((start + 1e-13 * profile.length) / profile.length)
-    return _along_cone(profile, ratio, start, end) * np.tan(middle)
-
-
-def _smooth_gap(profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array) -> Array:
-    half = 0.5 * (end - start)[..., None]
-    z = start[..., None] + half * (1.0 + _NODES)
-    secant = np.hypot(1.0, ratio * profile.slope(z)) / (ratio * profile.radius(z))
-    return np.sum(half * _WEIGHTS * np.tan(angle(z / profile.length)) * secant, axis=-1)
+    return before[piece] + turn(knots[piece], z)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -167,10 +167,7 @@ class Tendon(PolarActuator):
         return super()._following(field, other, profile, section)
 
     def _route(self, profile: Profile, z: Array) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """ρt(Z) [m] and its slope [-], (station, 1); θ(Z) [rad], (station, bundle), and its [1/m].
-
-        All slopes have the shape (station, 1).
-        """
+        """ρt [m] with its slope [-], (station, 1); θ [rad], (station, bundle), with its [1/m]."""
         distance = self.length_along("distance", profile, z[:, None])
         x = z[:, None] / profile.length
         if self.routing is not None:

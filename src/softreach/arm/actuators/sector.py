@@ -114,16 +114,9 @@ class SectorActuator(PolarActuator):
 def ring_integrals(
     radius_ratio: ArrayLike, taper: ArrayLike, helical_angle: ArrayLike, poisson_ratio: ArrayLike
 ) -> RingIntegrals:
-    """Integrate fiber contraction over the ring: theory (3), with k and t of (1) and (2).
+    """I0, I1, I3 [-] of fiber contraction over the ring: theory (3), with k and t of (1) and (2).
 
-    Args:
-        radius_ratio: ρ = R1/R2 [-]; all four arguments broadcast.
-        taper: Taper angle φ [rad].
-        helical_angle: Helical angle α at the outer radius, from the axis [rad].
-        poisson_ratio: Poisson's ratio ν [-].
-
-    Returns:
-        I0, I1, I3 [-], each of the broadcast shape of the arguments.
+    All arguments broadcast: ρ = R1/R2, taper φ, helical angle α at the outer radius [rad], and ν.
     """
     each = np.broadcast_arrays(radius_ratio, taper, helical_angle, poisson_ratio)
     ratio, phi, alpha, nu = np.array(each, float)[..., None]
@@ -154,8 +147,7 @@ def _nodes(ratio: Array, tangent: Array) -> tuple[Array, Array]:
 def cone_integrals(ring: Ring, slope: Array, angle: Array) -> RingIntegrals:
     """I0, I1, I3 of one ring, each pair of slope and angle integrated once, shape (station,).
 
-    The slope is tan φ of the arm's surface, with that of the ring in proportion; the angle is α at
-    the outer radius of the ring [rad].
+    The slope is tan φ of the arm's surface, the angle α at the outer radius of the ring [rad].
     """
     pairs, station = np.unique(slope + 1j * angle, return_inverse=True)
     of_ring = np.arctan(pairs.real * ring.outer_ratio)

@@ -9,5 +9,4 @@ from softreach.arm.design_file.write import display_text as display_text
 from softreach.arm.design_file.write import render as render
 from softreach.support.files.formats import FileFormat, Formats
 
-DESIGN_FILE: Formats = {".toml": FileFormat()}
-"""Format that a design is saved in."""
+DESIGN_FILE: Formats = {".toml": FileFormat()}  # Format that a design is saved in

@@ -1,8 +1,4 @@
-"""Vocabulary of design files: keys with their units, kinds of tables, values as TOML writes them.
-
-Keys follow from the numbers that the parts of an arm declare; angles are in degrees, and no digit
-is lost either way.
-"""
+"""Vocabulary of design files: keys with their units, kinds of tables, degrees of all digits."""
 
 from __future__ import annotations
 
@@ -37,8 +33,7 @@ from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
-Kind = TypeVar("Kind", bound=Part)
-"""Actuators or profiles."""
+Kind = TypeVar("Kind", bound=Part)  # Actuators or profiles
 
 KINDS: Mapping[type, Mapping[str, type]] = {
     Actuator: {
@@ -76,12 +71,9 @@ _LONG = 17  # digits from which a number of degrees is read exactly
 class Block(NamedTuple):
     """What a file says under a key at its top."""
 
-    shape: type
-    """One table, a list of tables, text or a number."""
-    kind: Any
-    """Kind of part that a table describes; None for none."""
-    about: str = ""
-    """Description; that of a table alone is its kind's."""
+    shape: type  # One table, a list of tables, text or a number
+    kind: Any  # Kind of part that a table describes; None for none
+    about: str = ""  # Description; that of a table alone is its kind's
     required: bool = False
 
 
@@ -108,17 +100,11 @@ LAYOUT: Mapping[str, Block] = {
 class Key(NamedTuple):
     """A key of a table."""
 
-    name: str
-    """As the file has it: `offset_deg`."""
-    field: str
-    """Field of the part."""
-    number: Number | None
-    """Declaration of a number; None for names, bounds, materials, and lists of tables."""
-    default: Any
-    """Default of the field; MISSING where the key is required."""
-
-    of_names: bool = False
-    """It holds the name of a station, beside a key of the field that holds its place in m."""
+    name: str  # As the file has it: `offset_deg`
+    field: str  # Field of the part
+    number: Number | None  # None for names, bounds, materials, and lists of tables
+    default: Any  # Default of the field; MISSING where the key is required
+    of_names: bool = False  # It holds the name of a station, another key its place in m
 
     @property
     def required(self) -> bool:
@@ -163,11 +149,7 @@ def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
 
 
 def own_kind(of: type[Kind], name: str) -> type[Kind] | None:
-    """The kind of this name that is not softreach's, from an installed package if need be.
-
-    Raises:
-        InvalidInput: A package that declares it cannot be imported.
-    """
+    """The kind of this name that is not softreach's, from an installed package if need be."""
     entries = plugins.declared(_GROUPS[of])
     if name not in own_kinds(of) and name in entries:
         plugins.loaded(entries[name])
@@ -200,12 +182,9 @@ def _every_key() -> Mapping[str, str]:
 class Place(NamedTuple):
     """Where in a file a part stands."""
 
-    path: str
-    """`actuators[0]`."""
-    keys: Mapping[str, str] = MappingProxyType({})
-    """Field -> key of its table; without those that are the same."""
-    table: Mapping[str, Any] = MappingProxyType({})
-    """What the file says there."""
+    path: str  # `actuators[0]`
+    keys: Mapping[str, str] = MappingProxyType({})  # Field -> key of its table, where they differ
+    table: Mapping[str, Any] = MappingProxyType({})  # What the file says there
 
 
 def in_file_terms(
@@ -213,8 +192,7 @@ def in_file_terms(
 ) -> InvalidDesign:
     """The same faults under the keys of a file and in its units.
 
-    `places` are those of the parts in the file by their paths in the arm; without them, paths stay
-    but for the field at their end.
+    `places` are those of the parts in the file; without them only the field at the end is renamed.
     """
     faults = [_in_file_terms(fault, places) for fault in error.faults]
     return InvalidDesign(one_a_path(faults), source)
@@ -281,23 +259,9 @@ class WrittenFloat(float):
 
 
 def radians(degrees: Any) -> float:
-    """Degrees as people write them convert like `math.radians`; longer ones by exact decimals.
-
-    Floating-point degrees miss one angle in ten by a unit in the last place; twenty digits do not.
-    """
-    return _radians(getattr(degrees, "text", repr(degrees)).replace("_", ""))
-
-
-def degrees_text(angle: float) -> str:
-    """The shortest number of degrees that converts to exactly this angle [rad]."""
-    if angle == 0:
-        return repr(float(angle))
-    degrees = Decimal(angle) * 180 / _PI
-    texts = (_decimal_text(f"{degrees:.{digits}g}") for digits in range(1, 26))
-    return next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
-
-
-def _radians(text: str) -> float:
+    """Degrees as `math.radians` has them, those of many digits by exact decimals."""
+    text = degrees if isinstance(degrees, str) else getattr(degrees, "text", repr(degrees))
+    text = text.replace("_", "")
     digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
     short = len(digits) < _LONG and math.isfinite(float(text))
     if short or not Decimal(text).is_finite():
@@ -305,7 +269,15 @@ def _radians(text: str) -> float:
     return float(Decimal(text) * _PI / 180)
 
 
-def _decimal_text(number: str) -> str:
-    plain = -6 < Decimal(number).adjusted() < 16
-    text = f"{Decimal(number):f}" if plain else number
-    return text if "." in text or "e" in text else f"{text}.0"
+def degrees_text(angle: float) -> str:
+    """The shortest number of degrees that converts to exactly this angle [rad]."""
+    if angle == 0:
+        return repr(float(angle))
+    degrees = Decimal(angle) * 180 / _PI
+    for digits in range(1, 26):
+        text = f"{degrees:.{digits}g}"
+        if -6 < Decimal(text).adjusted() < 16:
+            text = f"{Decimal(text):f}"
+        if radians(text) == angle:
+            return text if "." in text or "e" in text else f"{text}.0"
+    return repr(math.degrees(angle))

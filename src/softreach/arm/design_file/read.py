@@ -1,9 +1,6 @@
 """From the text of a design file to the fields of an arm.
 
-The reader knows how a file says things: keys, units, tables inside tables. What may be said, the
-parts judge themselves when they are made, and the arm when they are put together; their faults
-come back under the keys of the file (`keys.in_file_terms`), as the reader remembers where in the
-file each part stands.
+The parts and the arm judge themselves; their faults come back under the keys of the file.
 """
 
 from __future__ import annotations
@@ -49,22 +46,14 @@ Arm = TypeVar("Arm")
 
 
 def text_of(path: str | PathLike[str]) -> str:
-    """The text of a design file.
-
-    Raises:
-        InvalidInput: No file that can be read, one too large to be a design, or no text in UTF-8.
-    """
+    """The text of a design file; raises InvalidInput without one, or without text in UTF-8."""
     return read_text("design", path, LONGEST)
 
 
 def document_of(
     text: str, source: str, number: Callable[[str], Any] = WrittenFloat
 ) -> dict[str, Any]:
-    """The tables of TOML text as `toml.document_of`, by default with numbers as they were written.
-
-    Raises:
-        InvalidDesign: Text that is no TOML, or too long to be a design.
-    """
+    """The tables of TOML text as `toml.document_of`, by default with numbers as written."""
     return toml.document_of(text, LONGEST, source, number)
 
 
@@ -72,8 +61,7 @@ def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     """The arm that `make` makes of the fields in a TOML text, which errors call `source`.
 
     Raises:
-        InvalidDesign: Every fault of the tables, and of the arm that the sound ones make, with
-            key, value and what is allowed.
+        InvalidDesign: Every fault of the tables, and of the arm that the sound ones make.
     """
     document = document_of(text, source)
     version = document.get("version", 2)
@@ -193,10 +181,7 @@ class _Reader(FaultReader):
         values: Mapping[str, Any],
         wrong: Set[str] = frozenset(),
     ) -> Any:
-        """A part, which judges its values; `WRONG`, and its faults, where they are wrong.
-
-        Fields that no value can be given are None, so that the part can judge the others.
-        """
+        """A part, which judges its values but for those in `wrong`; `WRONG` for a faulty one."""
         self.places[place.path] = place
         if "" in wrong:
             return WRONG
@@ -258,9 +243,13 @@ class _Reader(FaultReader):
         self.places[of] = Place(path, field_keys(Material))
         if isinstance(raw, str) and raw in material_names():
             return named_material(raw)
-        if isinstance(raw, str):
-            return self._refuse(path, raw, _materials_text(raw, [*self._materials]))
-        return self._refuse(path, raw, "must be the name of a material, or a table of its values")
+        if not isinstance(raw, str):
+            allowed = "must be the name of a material, or a table of its values"
+            return self._refuse(path, raw, allowed)
+        own = [*self._materials]
+        hint = did_you_mean(raw, [*own, *material_names()]) or LIBRARY_HINT
+        here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
+        return self._refuse(path, raw, f"must be a material {here}, or of the library; {hint}")
 
     def _section(self) -> Any:
         rings = [self._part(Ring, raw, path) for raw, path in self._tables(self._document, "rings")]
@@ -284,8 +273,15 @@ class _Reader(FaultReader):
                 self._refuse(key, self._document[key], words[block.shape])
         if self._document.get("rings") == []:
             self._refuse("rings", [], "must not be empty")
+        homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
+        homes |= {"[materials.NAME]": Material, "[loads]": Loads}
         for key in (key for key in self._document if key not in LAYOUT):
-            said = _home(key) or unknown_key(key, {name: name for name in LAYOUT})
+            home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
+            said = f"unknown key; it belongs in {home}"
+            if (kind := key.removesuffix("s")) in KINDS[Actuator]:
+                said = f'unknown key; write [[actuators]] with kind = "{kind}"'
+            elif not home:
+                said = unknown_key(key, {name: name for name in LAYOUT})
             self._refuse(key_text(key), self._document[key], said)
 
     def _plain(self, value: Any, path: str) -> Any:
@@ -301,21 +297,6 @@ class _Reader(FaultReader):
 
 def _in_radians(value: Any) -> Any:
     return radians(value) if Range().admits(value) else value
-
-
-def _home(key: str) -> str:
-    if (kind := key.removesuffix("s")) in KINDS[Actuator]:
-        return f'unknown key; write [[actuators]] with kind = "{kind}"'
-    homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
-    homes |= {"[materials.NAME]": Material, "[loads]": Loads}
-    home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
-    return f"unknown key; it belongs in {home}" if home else ""
-
-
-def _materials_text(name: str, own: list[str]) -> str:
-    hint = did_you_mean(name, [*own, *material_names()]) or LIBRARY_HINT
-    here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
-    return f"must be a material {here}, or of the library; {hint}"
 
 
 def _kinds_text(of: type[Kind], kind: Any) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from functools import cache
 from typing import Any
@@ -30,19 +30,14 @@ _ORDER = (
 
 
 def render(arm: Mapping[str, Any]) -> str:
-    """TOML text of a design, of version 2, from its fields.
-
-    Raises:
-        InvalidDesign: A part of one's own kind that is not made of plain values.
-    """
+    """TOML text of a design, of version 2; raises InvalidDesign where a part is no plain values."""
     section, stations, loads = arm["section"], arm["stations"], arm["loads"]
     names: dict[str, Material] = {}
     for material in (section.core, *(ring.material for ring in section.rings)):
         if material is not None and material.name:
             names.setdefault(material.name, material)
-    top = ["version = 2"]
-    top += [] if arm["point"] is None else [f"point = {value_text(arm['point'])}"]
-    top += [] if arm["actuators"] else ["actuators = []"]
+    point = [] if arm["point"] is None else [f"point = {value_text(arm['point'])}"]
+    top = ["version = 2", *point, *([] if arm["actuators"] else ["actuators = []"])]
     blocks = [top, ["[profile]", *_lines(arm["profile"])]]
     for name, material in names.items():
         blocks.append([f"[materials.{key_text(name)}]", *_lines(material, without=("name",))])
@@ -130,16 +125,13 @@ def _text(key: str, value: Any) -> str:
         return inline_table((key_text(name), value_text(x)) for name, x in value.items())
     number = degrees_text if key.endswith("_deg") else value_text
     if isinstance(value, AlongArm):
-        return _along_text(value, number)
+        kind = value.interpolation if isinstance(value, Samples) else "constant"
+        pairs = [
+            ("stations_over_length", value_text(value.stations_over_length)),
+            ("values", f"[{', '.join(map(number, value.values))}]"),
+            ("interpolation", value_text(kind)),
+        ]
+        return inline_table(pairs[: 2 if kind == "cubic" else 3])
     if isinstance(value, tuple):
         return f"[{', '.join(map(number, value))}]"
     return value_text(value.name) if isinstance(value, Station) else number(value)
-
-
-def _along_text(along: AlongArm, number: Callable[[float], str]) -> str:
-    kind = along.interpolation if isinstance(along, Samples) else "constant"
-    pairs = [
-        ("stations_over_length", value_text(along.stations_over_length)),
-        ("values", f"[{', '.join(map(number, along.values))}]"),
-    ]
-    return inline_table(pairs if kind == "cubic" else [*pairs, ("interpolation", value_text(kind))])
