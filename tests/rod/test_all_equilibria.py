@@ -104,7 +104,7 @@ def softest_of(every, links=24):
     chain = Chain(*oracle_rod(rod.arm, every.activation, rod.arm.loads), links)
     many = np.repeat(every.activation[None], len(every), axis=0)
     shapes = every.solver.shapes_facing(many, every.directions, chain.joints)[0]
-    frames, moments = shapes.frames.directors, shapes.moment
+    frames, moments = shapes.directors, shapes.moment
     for frame, moment in zip(frames, moments, strict=True):
         fixed = np.einsum("sij,si->sj", frame, moment)
         q = chain.near(SimpleNamespace(frame=frame, moment=fixed))

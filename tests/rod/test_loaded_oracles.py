@@ -50,8 +50,8 @@ def test_a_force_and_a_moment_about_its_direction_wind_a_helix(force):
     stations = np.linspace(0.0, 1.0, 6)
     shapes = posture_shapes(solver, REST, stations)
     places = [helix.place(z) for z in stations]
-    np.testing.assert_allclose(shapes.frames.position[0], places, atol=1e-9)
-    moment = np.einsum("sd,sdc->sc", shapes.moment[0], shapes.frames.directors[0])
+    np.testing.assert_allclose(shapes.position[0], places, atol=1e-9)
+    moment = np.einsum("sd,sdc->sc", shapes.moment[0], shapes.directors[0])
     np.testing.assert_allclose(moment, [helix.moment(z) for z in stations], atol=1e-8)
 
 

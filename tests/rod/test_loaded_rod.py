@@ -77,10 +77,10 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
     tips = found.tips(gamma)
     for k, one in enumerate(gamma):
         expected = loaded_rod.equilibrium(*oracle_rod(found.arm, one, loads), stations, rtol=1e-10)
-        moment = np.einsum("sd,sdc->sc", shapes.moment[k], shapes.frames.directors[k])
+        moment = np.einsum("sd,sdc->sc", shapes.moment[k], shapes.directors[k])
         np.testing.assert_allclose(tips[k], expected.tip, atol=1e-9)
-        np.testing.assert_allclose(shapes.frames.position[k], expected.place, atol=2e-9)
-        np.testing.assert_allclose(shapes.frames.directors[k], expected.frame, atol=1e-8)
+        np.testing.assert_allclose(shapes.position[k], expected.place, atol=2e-9)
+        np.testing.assert_allclose(shapes.directors[k], expected.frame, atol=1e-8)
         np.testing.assert_allclose(moment, expected.moment, atol=5e-8)
 
 

@@ -95,7 +95,7 @@ class AllEquilibria:
         z, inner = stations_along(rod, stations), rod.inputs.activations(gamma)
         together = np.union1d(z, marker_sections(rod.arm))
         shapes = self.solver.shapes_facing(inner, self.directions, together)[0]
-        frames = rod.placed(shapes.frames)
+        frames = rod.placed(Frames(*shapes[:2]))
         strains = self.solver.strains_under(inner, together, shapes)
         places = marked(rod.arm, together, frames)
         rows = np.searchsorted(together, z)

@@ -52,17 +52,13 @@ _STRAIGHT = 1e-8  # [L], aside, of an arm that no activation leans to any side
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """Postures of one arm, by lines from rest.
-
-    Args:
-        solver: That of the arm.
-        side: Sense of the twist that decides between mirror images, 1 or -1.
-        flood: Starts on a grid over the box of activations; None for those on lines alone.
-    """
+    """Postures of one arm, by lines from rest."""
 
     solver: Solver
     side: int = 1
+    """Sense of the twist that decides between mirror images, 1 or -1."""
     flood: Flood | None = None
+    """Starts on a grid over the box of activations; None for those on lines alone."""
 
     @lazy
     def box(self) -> ActivationBox:
@@ -85,17 +81,17 @@ class Postures:
     @lazy
     def rest(self) -> Equilibria:
         """The twin at rest, as it was hung; not found where nothing holds it there."""
-        return self._hung(self.rest_activation).last
+        return self._hung(self.rest_activation)
 
     @property
     def is_held_at_rest(self) -> bool:
         """True if the arm has a stable posture at rest."""
         return bool(self.rest.is_stable[0])
 
-    def _hung(self, gamma: Array) -> Followed:
-        """Loads put on the twin at fixed activations."""
+    def _hung(self, gamma: Array) -> Equilibria:
+        """The twin after its loads are put on at fixed activations."""
         start = self.twin.search(gamma, None, np.zeros(1))
-        return follow(self.twin, gamma, gamma, start, hangs=False)
+        return follow(self.twin, gamma, gamma, start, hangs=False).last
 
     def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
         """Postures at activations (n, bundles); where not found at once, by lines if wanted.
@@ -161,20 +157,12 @@ class Postures:
             self.solver.put(gamma, left, new.only(~new.is_stable | at_rest), equilibria)
 
     def followed(self, gamma: Array) -> Followed:
-        """Branches of the twin from nodes of the flood, or along lines from rest."""
-        return self._from_rest(gamma) if self.flood is None else self._flooded(self.flood, gamma)
+        """Branches of the twin from the nearest node of the flood, or along lines from rest.
 
-    def _from_rest(self, gamma: Array) -> Followed:
-        """Along lines from rest; where nothing holds the twin there, from beside it."""
-        if self.is_held_at_rest:
-            begin = np.repeat(self.rest_activation, len(gamma), axis=0)
-            start = self.rest.of(np.zeros(len(gamma), int))
-        else:
-            begin, start = self._leaning(gamma)
-        return follow(self.twin, begin, gamma, start)
-
-    def _flooded(self, flood: Flood, gamma: Array) -> Followed:
-        """In uncut cells from the nearest node, else from where the lines meet the first cut."""
+        In cut cells they begin where the lines from rest meet the first cut.
+        """
+        if (flood := self.flood) is None:
+            return self._from_rest(gamma)
         uncut = flood.is_uncut(gamma)
         begin, start = flood.nearest(gamma)
         slopes = flood.at(gamma)[0] - start.frame
@@ -189,6 +177,15 @@ class Postures:
             followed.has_ended[lost] = by_line.has_ended
             followed.last.put(lost, by_line.last)
         return followed
+
+    def _from_rest(self, gamma: Array) -> Followed:
+        """Along lines from rest; where nothing holds the twin there, from beside it."""
+        if self.is_held_at_rest:
+            begin = np.repeat(self.rest_activation, len(gamma), axis=0)
+            start = self.rest.of(np.zeros(len(gamma), int))
+        else:
+            begin, start = self._leaning(gamma)
+        return follow(self.twin, begin, gamma, start)
 
     def _before_cuts(self, flood: Flood, gamma: Array) -> tuple[Array, Equilibria, Array]:
         """Where lines meet their first cut, else rest; postures there, and changes of frames."""
@@ -210,7 +207,7 @@ class Postures:
         rest, ring = self.rest_activation, self._ring
         begin = rest + _FIRST_PARTS[0] * (gamma - rest)
         if ring is None:
-            return begin, self._hung(begin).last
+            return begin, self._hung(begin)
         start = self._near_ring(*ring, begin)
         for part in _FIRST_PARTS[1:]:
             left = np.flatnonzero(~start.is_found)
@@ -288,6 +285,7 @@ class ContinuedPostures(Postures):
     """Activations, shape (k, bundles)."""
     frame: Array = field(kw_only=True)
     """How the arm sees the world there, shape (k, component)."""
+    is_held_at_rest = True
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
         return self.origin.continued_from(gamma, frame)
@@ -327,10 +325,6 @@ class ContinuedPostures(Postures):
     @lazy
     def rest(self) -> Equilibria:
         return self._begun[1]
-
-    @property
-    def is_held_at_rest(self) -> bool:
-        return True
 
 
 def _turned(frame: Array, angles: Array, axes: Array) -> Array:

@@ -30,9 +30,7 @@ class LoadedTendons(PulledTendons):
     """The map of the inner arm under loads, accurate enough for s."""
 
     def works(self, inner: Array, which: Works) -> Array:
-        if which not in self._known:
-            self._known[which] = self._loads(which)
-        z, force, moment = self._known[which]
+        z, force, moment = self._known.get(which) or self._loads(which)
         strains = self.rod.strains(inner, z)
         turn = (strains.curvature * strains.extension[..., None]).reshape(len(inner), 1, -1)
         # One product for each sample, so that none depends on those beside it.
@@ -52,7 +50,8 @@ class LoadedTendons(PulledTendons):
         ]
         z, weights, _ = quadrature(arm, _PIECES + int(max(turns, default=0.0)))
         force, moment = which.loads_at(z, weights)
-        return z, force, moment.reshape(3 * len(z), len(which.columns))
+        self._known[which] = z, force, moment.reshape(3 * len(z), len(which.columns))
+        return self._known[which]
 
     def continued_from(self, inner: Array, frames: Array | None = None) -> LoadedTendons:
         """Those of the arm in its posture at activations of the inner arm, shape (k, bundles)."""
@@ -61,10 +60,7 @@ class LoadedTendons(PulledTendons):
         return replace(self, rod=rod)
 
     def work_slopes(self, inner: Array, each: list[Works]) -> list[Array]:
-        """Derivatives of works, (n, work, bundle) each; NaN where activations are.
-
-        Exact where loads have a linear response, else by central differences.
-        """
+        """Derivatives of works, (n, work, bundle) each; NaN where activations are."""
         counts = [len(which.columns) for which in each]
         slopes = np.full((len(inner), sum(counts), inner.shape[1]), np.nan)
         known = ~np.isnan(inner).any(axis=1)
@@ -72,6 +68,7 @@ class LoadedTendons(PulledTendons):
         return np.split(slopes, np.cumsum(counts)[:-1], axis=1)
 
     def _slopes(self, inner: Array, each: list[Works]) -> Array:
+        """Exact where loads have a linear response, else by central differences."""
         if self._table is not None:
             z = self._table.stations
             loads = [which.loads_at(z.ravel(), np.ones(z.size)) for which in each]

@@ -42,7 +42,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
 Differences = Callable[[Solver, Array, Equilibria], Array]
-"""Distances [m] between results of a solver and of its judge, near known equilibria."""
+"""Distances [m] between results of a solver and of its judge, near known equilibria, (n,)."""
 
 _BLOCK = BLOCK // 8  # samples per task
 _RESPONSE_STEPS = 48
@@ -125,10 +125,12 @@ class LoadedRod(ArmRod):
             solver = self._solver_of(steps)
             equilibria = solver.near(gamma, known)
             settled = equilibria.is_found & (np.abs(equilibria.margin) > _CRITICAL)
-            errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
+            errors = differences(solver, gamma[settled], equilibria.of(settled))
+            errors = errors[np.isfinite(errors)]
             if not len(errors):
                 return _UNJUDGED
-            error = float(errors.max())
+            most = _OUTLYING * np.quantile(errors, _BULK, method="lower")
+            error = float(errors[errors <= most].max())
             if error <= allowed:
                 return steps
             steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
@@ -267,14 +269,14 @@ class LoadedRod(ArmRod):
         z, at = np.asarray(framed, float), np.asarray(strained, float)
         known = self.equilibria(gamma)
         walked, status = self._walked(gamma, known, z)
-        frames = walked.frames
+        frames = walked[:2]
         if not np.array_equal(z, at):
             walked, status = self._walked(gamma, known._replace(status=status), at)
         return Shapes(*frames, *self._shape_solver.strains_under(gamma, at, walked), status)
 
     def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
         walked, status = self._walked(gamma, self.equilibria(gamma), z)
-        return walked.frames, walked.moment, status
+        return Frames(*walked[:2]), walked.moment, status
 
     def _walked(self, gamma: Array, known: Equilibria, z: Array) -> tuple[LoadedShapes, Status]:
         """Shapes of known equilibria, undecided where steps that end at Z [m] do not find them."""
@@ -302,25 +304,13 @@ class _ContinuedRod(LoadedRod):
         return self.origin._shape_solver
 
 
-def _bulk(distances: Array) -> Array:
-    """Without those that are far larger than nearly all."""
-    known = distances[np.isfinite(distances)]
-    if not len(known):
-        return known
-    return known[known <= _OUTLYING * np.quantile(known, _BULK, method="lower")]
-
-
 def tip_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
     """Between tips."""
-    return _distances(known.tips, solver.judge().near(gamma, known).tips)
+    return np.linalg.norm(known.tips - solver.judge().near(gamma, known).tips, axis=1)
 
 
 def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
-    """Between centerlines, along the arm."""
-    stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
-    shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.judge())]
-    return _distances(*(shape.position for shape in shapes)).max(axis=1, initial=0.0)
-
-
-def _distances(a: Array, b: Array) -> Array:
-    return np.linalg.norm(a - b, axis=-1)
+    """Between centerlines, the largest along the arm."""
+    z = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
+    here, there = (each.shapes(gamma, z, known).position for each in (solver, solver.judge()))
+    return np.linalg.norm(here - there, axis=2).max(axis=1, initial=0.0)
