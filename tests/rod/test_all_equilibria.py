@@ -12,9 +12,9 @@ from softreach.arm import Manipulator, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import compliance
 from softreach.cloud.curvature import strain_ranges
+from softreach.geometry import sphere_maps
 from softreach.rod import TipStatus, as_tip_map, free_bundles
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded import all_equilibria as equilibria_by_degree
 from softreach.rod.loaded import flood
 from softreach.rod.loaded import rod as loaded_rod
 from softreach.rod.loaded.postures import Postures
@@ -229,20 +229,19 @@ def test_one_activation_is_asked_at_a_time():
 
 
 def test_what_may_be_missing_is_said(monkeypatch):
-    monkeypatch.setattr(equilibria_by_degree, "sphere_roots", _without_the_last)
+    search = sphere_maps.sphere_roots
+
+    def without_the_last(*args, **options):
+        roots, cut = search(*args, **options)
+        kept = np.sort(np.argsort(roots.determinants)[1:])
+        return sphere_maps.Roots(roots.points[kept], roots.determinants[kept]), cut
+
+    monkeypatch.setattr(sphere_maps, "sphere_roots", without_the_last)
     with pytest.warns(sr.errors.SoftreachWarning, match="degree of those found is 2"):
         every = sr.equilibria(trunk(25.0), BENT)
     assert not every.complete
     assert every.degree != 1
     assert "may be missing" in repr(every)
-
-
-def _without_the_last(*args, **options):
-    from softreach.geometry import sphere_maps as sphere_roots
-
-    roots, cut = sphere_roots.sphere_roots(*args, **options)
-    kept = np.sort(np.argsort(roots.determinants)[1:])
-    return sphere_roots.Roots(roots.points[kept], roots.determinants[kept]), cut
 
 
 def test_all_numbers_are_in_a_dataset():

@@ -174,7 +174,7 @@ def solver(loads, steps=12):
 
 
 def places(loads):
-    return posture_shapes(solver(loads), REST, STATIONS).frames.position[0] @ BASE
+    return posture_shapes(solver(loads), REST, STATIONS).position[0] @ BASE
 
 
 def of_file(case):

@@ -246,10 +246,6 @@ def linear_strains(table: Tables, gamma: Array) -> tuple[Array, Array, Array]:
     Samples vary fastest in memory, so that all values at one station lie side by side. The sum runs
     over the bundles in their order, so that BLAS and its threads do not decide the rounding.
 
-    Args:
-        table: z and U, and the part of z in η.
-        gamma: Activations, shape (n, bundles).
-
     Returns:
         Curvature [1/m] in the directors, per length of η, shape (n, station, 3); ζ [-] and η [-],
         what fibers and muscles make of the length of matter at rest, shape (n, station) each.

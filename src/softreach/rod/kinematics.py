@@ -110,8 +110,7 @@ def marker_positions(
         InvalidInput: As for `tip_positions`.
     """
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
-    gamma = tip_map.check_activations("activations", activations)
-    return _markers(tip_map, gamma)
+    return _markers(tip_map, tip_map.check_activations("activations", activations))
 
 
 def _markers(tip_map: TipMap, gamma: Array) -> Array:
@@ -128,10 +127,7 @@ def marker_sections(arm: Manipulator) -> Array:
 def marked(arm: Manipulator, z: Array, frames: Frames) -> Array:
     """r + x d1 + y d2 + z d3 of each marker [m], shape (n, marker, 3).
 
-    Args:
-        arm: The design.
-        z: Ascending stations that hold `marker_sections` [m].
-        frames: The arms there.
+    Of frames at ascending stations Z [m] that hold `marker_sections`.
     """
     if not arm.markers:
         return np.empty((len(frames.position), 0, 3))
@@ -190,12 +186,7 @@ def configuration(
 
 
 def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
-    """The arm before activation: straight from its base, directors along the axes of that.
-
-    Args:
-        arm: The design.
-        stations: Number of stations, evenly spaced in Z.
-    """
+    """The arm before activation: straight from its base, at so many stations even in Z."""
     z, lines = np.linspace(0.0, arm.length, stations), dict[str, Any]()
     if arm.bundles:
         nodes = len(quadrature(body_of(arm))[0])
@@ -248,11 +239,7 @@ def _lines(tip_map: ArmMap, gamma: Array, strains: Strains) -> dict[str, Array]:
 
 
 def stations_along(tip_map: TipMap, stations: int | ArrayLike) -> Array:
-    """Z [m] of stations given by their number or by themselves, ascending.
-
-    Args:
-        tip_map: The tip map.
-        stations: Number of stations, evenly spaced from base to tip, or their Z [m].
+    """Z [m] of stations given by their number, even from base to tip, or by themselves, ascending.
 
     Raises:
         InvalidInput: No such number or stations.

@@ -67,9 +67,7 @@ class StepRule:
     def edges(self, steps: int, stations: Array | None = None) -> Array:
         """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones.
 
-        Args:
-            steps: Uniform steps along the whole arm, if nothing breaks it.
-            stations: Z [m] where steps end too, ascending; the last one then stands for the tip.
+        Steps end at ascending stations Z [m], too, the last of which then stands for the tip.
         """
         z = [0.0, *ends_of_steps(self.arm, steps), self.arm.length]
         if stations is not None:
@@ -77,10 +75,7 @@ class StepRule:
         return edges_between(self.arm.profile, np.unique(z), steps)
 
     def nodes(self, edges: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
-
-        Args:
-            edges: Step boundaries S [-], ascending, shape (step + 1,).
+        """Tables at the Gauss nodes of the steps between ascending `edges` S [-].
 
         Returns:
             Length of the step as each node sees it [m], shape (step, node); z [-] and its part in
@@ -121,9 +116,6 @@ class StepRule:
         by more than 2 rad. Halving is sharp at sixth order: it sees 63/64 of the error. The pilot
         holds corners, faces and the inside of the activation box, the corners that bend the arm
         most, and what a search for larger differences finds from there.
-
-        Args:
-            tol: Largest tip error, in L.
 
         Raises:
             InvalidInput: `tol` is not reached within 4,096 steps.
@@ -201,13 +193,12 @@ class StepRule:
     def _shape_differences(self, steps: int) -> Differences:
         """Largest distances [m] along the centerlines with `steps` and with twice as many."""
         coarse, fine = self._halves(steps)
-        steps = len(coarse)
-        ends = np.arange(1, steps + 1)
+        ends = np.arange(1, len(coarse) + 1)
 
         def difference(gamma: Array) -> Array:
             errors = np.empty(len(gamma))
             for block in parallel.blocks(len(gamma), _SHAPES):
-                places = np.empty((2, len(errors[block]), steps, 3))
+                places = np.empty((2, len(errors[block]), len(ends), 3))
                 directors = np.empty((*places.shape[1:], 3))
                 frames.frames(coarse, ends, gamma[block], places[0], directors)
                 frames.frames(fine, 2 * ends, gamma[block], places[1], directors)
@@ -244,10 +235,7 @@ def enough_for_all_breaks(arm: Manipulator) -> int:
 def edges_between(profile: Profile, z: Array, steps: int) -> Array:
     """Step boundaries S [-] that hold marks, with no step longer than `steps` uniform ones.
 
-    Args:
-        profile: Of the arm.
-        z: Ascending Z of the marks [m], the first and the last of which are the ends.
-        steps: Uniform steps along the whole arm.
+    The first and the last of the marks, ascending Z [m], are the ends.
     """
     marks = profile.slender_coordinate(z)
     gaps = np.diff(marks)
@@ -259,13 +247,10 @@ def edges_between(profile: Profile, z: Array, steps: int) -> Array:
 
 
 def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
-    """Corners, points on faces and points inside the activation box.
+    """Corners, points on faces and points inside the activation box, shape (n, bundles).
 
     All corners where they are no more than 1,024; else as many at random, and those that bend most.
     Only the last depend on more of an arm than its bounds.
-
-    Returns:
-        Activations, shape (n, bundles).
     """
     m, rng = box.bundles, np.random.default_rng(0)
     corners = cube_corners(m, rng)

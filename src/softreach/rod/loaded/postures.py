@@ -285,7 +285,6 @@ class ContinuedPostures(Postures):
     """Activations, shape (k, bundles)."""
     frame: Array = field(kw_only=True)
     """How the arm sees the world there, shape (k, component)."""
-    is_held_at_rest = True
 
     def continued_from(self, gamma: Array, frame: Array) -> ContinuedPostures:
         return self.origin.continued_from(gamma, frame)
@@ -325,6 +324,10 @@ class ContinuedPostures(Postures):
     @lazy
     def rest(self) -> Equilibria:
         return self._begun[1]
+
+    @property
+    def is_held_at_rest(self) -> bool:
+        return True
 
 
 def _turned(frame: Array, angles: Array, axes: Array) -> Array:
