@@ -224,7 +224,7 @@ class FreeRod(ArmRod):
 
     @lazy
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
-        steps = max(self._fineness, self.rule.fewest_for_frames)
+        steps = max(self._fineness, self.rule.fewest_steps())
         return self.rule.packed_stations(np.array([self.end]), steps)
 
 

@@ -182,10 +182,6 @@ class Inputs:
         driving = replace(self.driving, is_effective=True)
         return replace(self, own_box=_bounds(driving), driving=driving)
 
-    def only(self, columns: Sequence[int]) -> Inputs:
-        """Those of some columns of x; the others are fixed at their lower bounds."""
-        return replace(self, free=tuple(self.free[k] for k in columns))
-
     def measured(self, arm: Manipulator) -> Inputs:
         """The same in `activation_measures`."""
         measures = dict(zip(arm.input_names, activation_measures(arm).tolist(), strict=True))

@@ -1,7 +1,6 @@
 """Forward kinematics: where the tip is, how it moves, what shape the arm takes.
 
-The arm is clamped at Z = 0 by its base, whose z is the tangent d3 there. Places are in the frame of
-the world by default.
+The base clamps the arm at Z = 0, its z is d3 there; places are in the world by default.
 """
 
 from __future__ import annotations
@@ -129,11 +128,10 @@ def marked(arm: Manipulator, z: Array, frames: Frames) -> Array:
 
     Of frames at ascending stations Z [m] that hold `marker_sections`.
     """
-    if not arm.markers:
-        return np.empty((len(frames.position), 0, 3))
     stations = [marker.station_at("station", arm.length) for marker in arm.markers]
-    section, offsets = np.searchsorted(z, stations), [marker.offset for marker in arm.markers]
-    turned = np.einsum("mk,nmkx->nmx", np.array(offsets), frames.directors[:, section])
+    offsets = np.reshape([marker.offset for marker in arm.markers], (-1, 3))
+    section = np.searchsorted(z, stations)
+    turned = np.einsum("mk,nmkx->nmx", offsets, frames.directors[:, section])
     return frames.position[:, section] + turned
 
 

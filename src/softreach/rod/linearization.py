@@ -102,24 +102,20 @@ class Linearization:
         """The same for |dj| <= half_widths[j] around each center only, shape (n,)."""
         longest, bending = np.empty(len(centers)), np.empty(len(centers))
         offset = (1.0 + self.stretch @ half_widths) / self.longest
-        relative_strains(np.ascontiguousarray(centers), offset, *self._relative, longest, bending)
-        bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
+        inverse, *relative = self._relative
+        relative_strains(np.ascontiguousarray(centers), offset, *relative, longest, bending)
+        bending = np.sqrt(bending) + (self.size @ half_widths * inverse).max()
         longest, bending = np.minimum(longest, 1.0), np.minimum(bending, 1.0)
         square, terms = self._terms(half_widths)
         eta = 1.0 if self.has_forces else longest
         return square * np.asarray(terms.sum(longest, eta, bending))
 
     @lazy
-    def _bending_inverse(self) -> Array:
-        """1/bending at every station [m], 0 where nothing bends."""
-        return np.divide(1.0, self.bending, where=self.bending > 0, out=0 * self.bending)
-
-    @lazy
-    def _relative(self) -> tuple[Array, Array]:
-        """Extension and curvature of each bundle as parts of the largest ones."""
+    def _relative(self) -> tuple[Array, Array, Array]:
+        """1/bending [m], 0 without any, and parts of the largest ζ and u that each bundle makes."""
+        inverse = np.divide(1.0, self.bending, where=self.bending > 0, out=0 * self.bending)
         stretch = self.extension / self.longest[:, None]
-        curvature = self.curvature * self._bending_inverse[:, None, None]
-        return stretch, curvature
+        return inverse, stretch, self.curvature * inverse[:, None, None]
 
     def _terms(self, half_widths: Array) -> tuple[float, _Terms]:
         """The largest half width squared, and the terms for it at 1, known for each proportion."""

@@ -24,8 +24,7 @@ from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
-_TOGETHER = 64
-"""Samples to a task."""
+_TOGETHER = 64  # samples to a task
 
 
 class StepGrid(NamedTuple):

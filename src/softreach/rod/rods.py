@@ -35,8 +35,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
 
-_OF_LENGTHS = 0.03
-"""Tolerance of shapes of which lengths are taken, over that of tips."""
+_OF_LENGTHS = 0.03  # tolerance of shapes of which lengths are taken, over that of tips
 
 
 @dataclass(frozen=True, repr=False)
@@ -280,7 +279,8 @@ def free_bundles(tip_map: TipMap) -> TipMap:
     if tip_map.box.dimension == tip_map.box.bundles:
         return tip_map
     known = as_tip_map(tip_map)
-    return replace(known, inputs=known.inputs.only(tip_map.box.free.tolist()))
+    free = tuple(known.inputs.free[k] for k in tip_map.box.free)
+    return replace(known, inputs=replace(known.inputs, free=free))
 
 
 def measured_bundles(tip_map: TipMap) -> TipMap:

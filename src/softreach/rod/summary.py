@@ -30,9 +30,9 @@ from softreach.support.errors import Fault, InvalidInput
 from softreach.support.quantity import columns
 
 _TEXTS = ("lacking", "validity", "warnings")
-_UNITS = dict.fromkeys(("helical_angles", "revolutions"), "rad")
-_UNITS |= dict.fromkeys(("base_radius", "tip_radius", "breakpoints"), "m")
-_UNITS |= {"mass": "kg", "stiffness": "(K0 [N], K1, K3 [N m²], at base and tip)"}
+_UNITS = {"helical_angles": "rad", "revolutions": "rad", "base_radius": "m", "tip_radius": "m"}
+_UNITS |= {"breakpoints": "m", "mass": "kg"}
+_UNITS |= {"stiffness": "(K0 [N], K1, K3 [N m²], at base and tip)"}
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def _bending(arm: Manipulator) -> BendingRange:
     try:
         return bending_over_bounds(arm)
     except InvalidInput:
-        return BendingRange(*[np.nan] * 3, Extreme(np.nan, 0.0), exact=False)
+        return BendingRange(np.nan, np.nan, np.nan, Extreme(np.nan, 0.0), exact=False)
 
 
 def _beyond_theory(arm: Manipulator) -> Iterator[str]:

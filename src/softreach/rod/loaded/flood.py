@@ -27,8 +27,7 @@ _SHORTEST = 2.0**-20  # of a path, below which its branch has ended
 _MOST_STEPS = 3000
 _SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
-CUT = 1e6
-"""Roughness of cells that are cut."""
+CUT = 1e6  # roughness of cells that are cut
 PARTS = 64  # of a line, at the ends of which cuts are looked for
 
 

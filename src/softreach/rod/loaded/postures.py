@@ -29,10 +29,8 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 
-NEUTRAL = 1e-5
-"""What tolerances leave of the margin of a ring, which is 0."""
-SYMMETRIC = 1e-6
-"""Of the directions that the base of an axisymmetric arm would have to see [rad]."""
+NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
+SYMMETRIC = 1e-6  # [rad], of the directions that the base of an axisymmetric arm would have to see
 _AT_ONCE, _BY_LINE = BLOCK // 8, 32 * LANES  # samples per task
 _NODES = {1: 33, 2: 33, 3: 17}  # of the grid for each free bundle: at most a few thousand postures
 _TWIST = 1e-4  # [rad], of the twin over its length

@@ -26,8 +26,7 @@ from softreach.support.lazy import lazy
 
 PHASE_OF_SEGMENT = 4.0  # [rad]
 MOST_SEGMENTS = 64
-SHOT_AT_ONCE = 20.0
-"""Phase up to which one segment is shot [rad]; e^20 roundings are 1e-7 rad."""
+SHOT_AT_ONCE = 20.0  # [rad] of phase, up to which one segment is shot: e^20 roundings are 1e-7 rad
 _MOST_PHASE = math.pi / 2.0
 _MOST_STEPS = 1 << 16
 _STATIONS = 65
@@ -192,10 +191,8 @@ class LoadTables:
             force, softest = self._largest_force(z), np.maximum(bending, torsion)
             swing = force * (1.0 + force * axial) * softest + (0.5 * moment * softest) ** 2
             table = tables(arm, z)
-            longest, grown = (
-                1.0 + ends_over(part, arm.bounds).T
-                for part in (table.extension, table.rest_length_factor)
-            )
+            longest = 1.0 + ends_over(table.extension, arm.bounds).T
+            grown = 1.0 + ends_over(table.rest_length_factor, arm.bounds).T
             relative = grown[1] / longest[0] if table.has_forces else 1.0
             squeeze = float((force * axial * relative).max())
             rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
