@@ -177,12 +177,19 @@ class Postures:
         return followed
 
     def _from_rest(self, gamma: Array) -> Followed:
-        """Along lines from rest; where nothing holds the twin there, from beside it."""
+        """Along lines from rest; where nothing holds the twin there, from where it leans beside."""
+        rest = self.rest_activation
         if self.is_held_at_rest:
-            begin = np.repeat(self.rest_activation, len(gamma), axis=0)
-            start = self.rest.of(np.zeros(len(gamma), int))
-        else:
-            begin, start = self._leaning(gamma)
+            begin = np.repeat(rest, len(gamma), axis=0)
+            return follow(self.twin, begin, gamma, self.rest.of(np.zeros(len(gamma), int)))
+        begin = rest + _FIRST_PARTS[0] * (gamma - rest)
+        if (ring := self._ring) is None:
+            return follow(self.twin, begin, gamma, self._hung(begin))
+        start = self._near_ring(*ring, begin)
+        for part in _FIRST_PARTS[1:]:
+            left = np.flatnonzero(~start.is_found)
+            begin[left] = rest + part * (gamma[left] - rest)
+            start.put(left, self._near_ring(*ring, begin[left]))
         return follow(self.twin, begin, gamma, start)
 
     def _before_cuts(self, flood: Flood, gamma: Array) -> tuple[Array, Equilibria, Array]:
@@ -199,19 +206,6 @@ class Postures:
         start.put(lost, self.rest.of(np.zeros(len(lost), int)))
         begin[lost], slopes[lost] = rest, 0.0
         return begin, start, slopes
-
-    def _leaning(self, gamma: Array) -> tuple[Array, Equilibria]:
-        """Places on lines where the twin leans that nothing holds at rest, and how it does."""
-        rest, ring = self.rest_activation, self._ring
-        begin = rest + _FIRST_PARTS[0] * (gamma - rest)
-        if ring is None:
-            return begin, self._hung(begin)
-        start = self._near_ring(*ring, begin)
-        for part in _FIRST_PARTS[1:]:
-            left = np.flatnonzero(~start.is_found)
-            begin[left] = rest + part * (gamma[left] - rest)
-            start.put(left, self._near_ring(*ring, begin[left]))
-        return begin, start
 
     @lazy
     def _ring(self) -> tuple[Array, float] | None:
