@@ -103,9 +103,7 @@ ARMS = {
         Loads(gravity=(0.0, 0.0, 9.81), tip_force=(1.0, 0.0, 0.0)),
     ),
     "a fiber, whose length counts, and forces, whose does not": (
-        designs.minimal_trunk(
-            material=Material(young_modulus=1e6, density=1000.0),
-        ).replace(
+        designs.minimal_trunk(material=Material(young_modulus=1e6, density=1000.0)).replace(
             actuators=(
                 designs.minimal_trunk().actuators[0],
                 Tendon(distance_ratio=0.8, revolution=1.0, offset=2.0, activation_bounds=(0, 60)),
@@ -122,11 +120,7 @@ ARMS = {
             force_per_length=(0.0, 2.0, 0.0),
         ),
     ),
-    "chambers": (
-        designs.three_chamber_arm(),
-        None,
-        Loads(gravity=(0.0, 5.0, 8.0), payload=0.02),
-    ),
+    "chambers": (designs.three_chamber_arm(), None, Loads(gravity=(0.0, 5.0, 8.0), payload=0.02)),
 }
 
 

@@ -15,15 +15,7 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import (
-    SIDE,
-    UP,
-    oracle_rod,
-    posture_shapes,
-    rubber,
-    straight,
-    uniform,
-)
+from tests.bodies import SIDE, UP, oracle_rod, posture_shapes, rubber, straight, uniform
 from tests.laws import differences
 from tests.oracles import elastica, loaded_rod
 

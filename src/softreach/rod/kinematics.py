@@ -30,11 +30,7 @@ _LINES_TOGETHER = 256  # samples
 
 
 def tip_positions(
-    arm: Manipulator | TipMap,
-    activations: ArrayLike,
-    tol: float = 1e-6,
-    *,
-    frame: Frame = "world",
+    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
 ) -> Array:
     """Tip positions of many activations: theory (25), by sixth-order Magnus integration.
 
@@ -59,11 +55,7 @@ def tip_positions(
 
 
 def tip_jacobian(
-    arm: Manipulator | TipMap,
-    activations: ArrayLike,
-    tol: float = 1e-6,
-    *,
-    frame: Frame = "world",
+    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
 ) -> Array:
     """Spatial twist of the tip per unit of each activation: the exact derivative of the tip.
 
@@ -87,11 +79,7 @@ def tip_jacobian(
 
 
 def marker_positions(
-    arm: Manipulator | TipMap,
-    activations: ArrayLike,
-    tol: float = 1e-6,
-    *,
-    frame: Frame = "world",
+    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
 ) -> Array:
     """Places of the markers of an arm under many activations, such as those of a cloud.
 

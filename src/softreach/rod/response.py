@@ -211,10 +211,7 @@ def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
 
 
 def linear_response(
-    table: NodeTables,
-    state: RodState,
-    changes: list[NodeTables],
-    unit_loads: Array | None = None,
+    table: NodeTables, state: RodState, changes: list[NodeTables], unit_loads: Array | None = None
 ) -> Response:
     """Movements of equilibria per unit of each activation, then of each change of the tables.
 

@@ -229,12 +229,7 @@ class Solver:
         return seen.reshape(len(gamma), self.tables.frame_size)
 
     def respond(
-        self,
-        gamma: Array,
-        known: Equilibria,
-        *,
-        compliance: bool = False,
-        directors: bool = False,
+        self, gamma: Array, known: Equilibria, *, compliance: bool = False, directors: bool = False
     ) -> tuple[Array, Array, Array]:
         """Derivatives of tips at equilibria with these steps, theory (74); NaN where there is none.
 
