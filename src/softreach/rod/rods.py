@@ -343,7 +343,7 @@ def _with_tensions(inputs: Inputs, tol: float) -> Inputs:
     driving = inputs.driving
     if driving is None or driving.arm.loads is None or driving.is_bundles:
         return inputs
-    from softreach.rod.loaded.pulled import LoadedTendons
+    from softreach.rod.loaded.rod import LoadedTendons
 
     # A tip moves by far more than the length by which a tendon near the axis is off.
     rod = _rod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, SMALLEST_TOL))
