@@ -32,10 +32,14 @@ from tests.oracles.pulled_tendons import HeavyPulledArm, PulledArm
 
 LENGTH, RADIUS, MODULUS, DISTANCE = 0.3, 0.01, 1e6, 0.008
 K0, K1 = math.pi * MODULUS * RADIUS**2, math.pi / 4 * MODULUS * RADIUS**4
-SECTION = Section(
-    rings=(Ring(inner_ratio=0.0, material=Material(young_modulus=MODULUS, poisson_ratio=0.4)),)
-)
 BOUNDS = (-0.02, 0.02)
+
+
+def section(**matter):
+    return Section(rings=(Ring(inner_ratio=0.0, material=Material(poisson_ratio=0.4, **matter)),))
+
+
+SECTION = section(young_modulus=MODULUS)
 
 
 def arm_of(*actuators, taper=0.0):
@@ -153,18 +157,9 @@ def test_tips_of_many_arms_are_those_of_least_energy(arm, seed):
     assert max(tip_misses(arm, 3, seed)) < 1e-7 * LENGTH
 
 
-HEAVY = Section(
-    rings=(
-        Ring(
-            inner_ratio=0.0,
-            material=Material(young_modulus=4e6, poisson_ratio=0.4, density=1000.0),
-        ),
-    )
-)
-
-
 def heavy(arm, payload=0.02, gravity=(0.0, 9.81, 0.0)):
-    return arm.replace(section=HEAVY, loads=Loads(gravity=gravity, payload=payload))
+    matter = section(young_modulus=4e6, density=1000.0)
+    return arm.replace(section=matter, loads=Loads(gravity=gravity, payload=payload))
 
 
 def loaded_miss(arm, pulled):

@@ -50,8 +50,8 @@ def test_a_force_and_a_moment_about_its_direction_wind_a_helix(force):
     stations = np.linspace(0.0, 1.0, 6)
     shapes = posture_shapes(solver, REST, stations)
     places = [helix.place(z) for z in stations]
-    np.testing.assert_allclose(shapes.frames.position[0], places, atol=1e-9)
-    moment = np.einsum("sd,sdc->sc", shapes.moment[0], shapes.frames.directors[0])
+    np.testing.assert_allclose(shapes.position[0], places, atol=1e-9)
+    moment = np.einsum("sd,sdc->sc", shapes.moment[0], shapes.directors[0])
     np.testing.assert_allclose(moment, [helix.moment(z) for z in stations], atol=1e-8)
 
 
@@ -103,9 +103,7 @@ ARMS = {
         Loads(gravity=(0.0, 0.0, 9.81), tip_force=(1.0, 0.0, 0.0)),
     ),
     "a fiber, whose length counts, and forces, whose does not": (
-        designs.minimal_trunk(
-            material=Material(young_modulus=1e6, density=1000.0),
-        ).replace(
+        designs.minimal_trunk(material=Material(young_modulus=1e6, density=1000.0)).replace(
             actuators=(
                 designs.minimal_trunk().actuators[0],
                 Tendon(distance_ratio=0.8, revolution=1.0, offset=2.0, activation_bounds=(0, 60)),
@@ -122,11 +120,7 @@ ARMS = {
             force_per_length=(0.0, 2.0, 0.0),
         ),
     ),
-    "chambers": (
-        designs.three_chamber_arm(),
-        None,
-        Loads(gravity=(0.0, 5.0, 8.0), payload=0.02),
-    ),
+    "chambers": (designs.three_chamber_arm(), None, Loads(gravity=(0.0, 5.0, 8.0), payload=0.02)),
 }
 
 
@@ -174,7 +168,7 @@ def solver(loads, steps=12):
 
 
 def places(loads):
-    return posture_shapes(solver(loads), REST, STATIONS).frames.position[0] @ BASE
+    return posture_shapes(solver(loads), REST, STATIONS).position[0] @ BASE
 
 
 def of_file(case):

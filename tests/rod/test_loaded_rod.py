@@ -15,18 +15,7 @@ from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import (
-    DOWN,
-    SIDE,
-    UP,
-    by_lines,
-    oracle_rod,
-    posture_shapes,
-    rubber,
-    straight,
-    uniform,
-    weighed,
-)
+from tests.bodies import SIDE, UP, oracle_rod, posture_shapes, rubber, straight, uniform
 from tests.laws import differences
 from tests.oracles import elastica, loaded_rod
 
@@ -77,10 +66,10 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
     tips = found.tips(gamma)
     for k, one in enumerate(gamma):
         expected = loaded_rod.equilibrium(*oracle_rod(found.arm, one, loads), stations, rtol=1e-10)
-        moment = np.einsum("sd,sdc->sc", shapes.moment[k], shapes.frames.directors[k])
+        moment = np.einsum("sd,sdc->sc", shapes.moment[k], shapes.directors[k])
         np.testing.assert_allclose(tips[k], expected.tip, atol=1e-9)
-        np.testing.assert_allclose(shapes.frames.position[k], expected.place, atol=2e-9)
-        np.testing.assert_allclose(shapes.frames.directors[k], expected.frame, atol=1e-8)
+        np.testing.assert_allclose(shapes.position[k], expected.place, atol=2e-9)
+        np.testing.assert_allclose(shapes.directors[k], expected.frame, atol=1e-8)
         np.testing.assert_allclose(moment, expected.moment, atol=5e-8)
 
 
@@ -246,13 +235,3 @@ def test_statistics_of_strains_count_only_arms_that_have_an_equilibrium(monkeypa
     np.testing.assert_array_equal(found.bending_count.sum("bin"), [2, 2])
     for name in ("bending_mean", "torsion_mean", "extension_mean"):
         np.testing.assert_allclose(found[name], expected[name], rtol=1e-9)
-
-
-@pytest.mark.parametrize("gravity", [DOWN, SIDE])
-def test_what_is_found_at_once_is_what_is_followed_from_rest(gravity):
-    solver = Solver(LoadedRod(weighed(TRUNK, 5.0, gravity)).tables, 16, 1e-8)
-    gamma = np.random.default_rng(2).uniform(-5 / 3, 0, (128, 3))
-    found, followed = Postures(solver).find(gamma), by_lines(solver, gamma)
-    assert (followed.status == TipStatus.STABLE).mean() > 0.95
-    np.testing.assert_allclose(found.tips, followed.tips, atol=1e-7)
-    np.testing.assert_array_equal(found.status, followed.status)

@@ -407,13 +407,7 @@ class TestFrames:
         np.testing.assert_array_equal(tips, cloud.tip)
 
     @pytest.mark.parametrize(
-        "attrs",
-        [
-            {"frame": "tip"},
-            {"base_position": [1, 0, 0]},
-            {"base_rotation": "up"},
-        ],
-        ids=str,
+        "attrs", [{"frame": "tip"}, {"base_position": [1, 0, 0]}, {"base_rotation": "up"}], ids=str
     )
     def test_a_frame_that_is_none_or_another_pose_is_refused(self, trunk, tmp_path, attrs):
         cloud = sr.compute_cloud(trunk, 10).assign_attrs(attrs)

@@ -14,7 +14,6 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import Base, Manipulator, designs
@@ -23,7 +22,7 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import ArmMap, as_tip_map
+from softreach.rod.rods import ArmMap
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
@@ -401,15 +400,3 @@ def test_its_box_is_that_of_the_arm(make, arm):
     np.testing.assert_array_equal(np.stack([box.low, box.high], axis=1), arm.bounds)
     assert box.names == arm.bundle_names
     assert list(itertools.compress(box.names, box.is_free)) == [box.names[j] for j in box.free]
-
-
-@given(share=st.floats(0, 1))
-def test_its_radius_is_that_of_the_arm_at_rest(make, share, trunk):
-    z = share * trunk.length
-    assert make(trunk, 1e-6).radius(z) == trunk.profile.radius(z)
-
-
-def test_a_tip_map_is_its_own(make, trunk):
-    rod = as_tip_map(make(trunk, 1e-9))
-    assert as_tip_map(rod) is rod
-    assert as_tip_map(rod, 1e-3) is rod

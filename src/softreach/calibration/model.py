@@ -22,8 +22,7 @@ from softreach.calibration.free_numbers import FreeNumbers, Neighbors
 from softreach.calibration.measurements import Measurements
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.free import ArmRod, FreeRod
-from softreach.rod.loaded.pulled import LoadedTendons
-from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.rod import LoadedRod, LoadedTendons
 from softreach.rod.response import (
     NodeTables,
     RodState,

@@ -9,15 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.arm.bending import (
-    Extreme,
-    bending_at,
-    bending_stations,
-    has_exact_bending,
-    largest_bending,
-    sharpest_bending,
-    smallest_bending,
-)
+from softreach.arm import bending as exact
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipMap
@@ -39,7 +31,7 @@ class BendingRange(NamedTuple):
     """κ [1/m]."""
     gentlest: float
     """κ R2, R2 before activation [-]."""
-    sharpest: Extreme
+    sharpest: exact.Extreme
     """κ R2 [-], and where it is."""
     exact: bool
     """False of what a search found, which may miss more."""
@@ -54,12 +46,12 @@ def bending_over_bounds(arm: Manipulator) -> BendingRange:
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    stations = bending_stations(arm).ravel()
+    stations = exact.bending_stations(arm).ravel()
     radius = arm.profile.radius(stations)
-    if has_exact_bending(arm):
-        least, largest = smallest_bending(arm).value, largest_bending(arm).value
-        gentlest = float((bending_at(arm, stations)[0] * radius).min()) if least else 0.0
-        return BendingRange(least, largest, gentlest, sharpest_bending(arm), exact=True)
+    if exact.has_exact_bending(arm):
+        least, largest = exact.smallest_bending(arm).value, exact.largest_bending(arm).value
+        gentlest = float((exact.bending_at(arm, stations)[0] * radius).min()) if least else 0.0
+        return BendingRange(least, largest, gentlest, exact.sharpest_bending(arm), exact=True)
     tip_map = with_unstable(as_tip_map(arm, warn=False))
 
     def bending(gamma: Array) -> Array:
@@ -73,7 +65,7 @@ def bending_over_bounds(arm: Manipulator) -> BendingRange:
     gamma, value = worst_inputs(tip_map, ends, _OF_BENDING)
     least, largest, sharpest = np.where(np.isfinite(value), np.abs(value), 0.0).tolist()
     gentlest, _, relative = np.nan_to_num(bending(gamma) * radius)
-    place = Extreme(sharpest, float(stations[relative.argmax()]))
+    place = exact.Extreme(sharpest, float(stations[relative.argmax()]))
     return BendingRange(least, largest, float(gentlest.min()), place, exact=False)
 
 
@@ -82,15 +74,9 @@ def worst_inputs(
 ) -> tuple[Array, Array]:
     """The inputs within the bounds at which each of some measures is largest, by search.
 
-    Samples, corners and faces of the box, then the neighborhood of the worst: it proves nothing.
-
-    Args:
-        tip_map: The tip map.
-        measure: Inputs (n, inputs) -> values (n, k); NaN where there is no arm.
-        samples: Number of samples, a power of two, and half as many on faces.
-
-    Returns:
-        Inputs, shape (k, inputs), and values there, shape (k,); -inf where no arm was found.
+    Samples, a power of two, half as many on faces, corners, then the neighborhood of the worst: it
+    proves nothing. Measures of inputs (n, inputs) are (n, k), NaN where there is no arm; inputs are
+    returned as (k, inputs) with values (k,), -inf where no arm was found.
     """
     box = tip_map.box
 

@@ -224,7 +224,7 @@ class FreeRod(ArmRod):
 
     @lazy
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
-        steps = max(self._fineness, self.rule.fewest_for_frames)
+        steps = max(self._fineness, self.rule.fewest_steps())
         return self.rule.packed_stations(np.array([self.end]), steps)
 
 
@@ -245,10 +245,6 @@ def linear_strains(table: Tables, gamma: Array) -> tuple[Array, Array, Array]:
 
     Samples vary fastest in memory, so that all values at one station lie side by side. The sum runs
     over the bundles in their order, so that BLAS and its threads do not decide the rounding.
-
-    Args:
-        table: z and U, and the part of z in η.
-        gamma: Activations, shape (n, bundles).
 
     Returns:
         Curvature [1/m] in the directors, per length of η, shape (n, station, 3); ζ [-] and η [-],

@@ -41,10 +41,8 @@ class ActivationBox:
     @classmethod
     def between(cls, bounds: ArrayLike, names: Sequence[str]) -> ActivationBox:
         """The box of an array of bounds, shape (bundles, 2)."""
-        pairs = as_rows(
-            "bounds", bounds, 2, "(lower, upper) of each bundle, shape (bundles, 2)"
-        ).tolist()
-        return cls(tuple((low, high) for low, high in pairs), tuple(names))
+        pairs = as_rows("bounds", bounds, 2, "(lower, upper) of each bundle, shape (bundles, 2)")
+        return cls(tuple((low, high) for low, high in pairs.tolist()), tuple(names))
 
     @property
     def bundles(self) -> int:
@@ -94,12 +92,7 @@ class ActivationBox:
     def from_cube(self, cube: Array, out: Array | None = None) -> Array:
         """Activations of points of the unit cube that has an axis for every bundle.
 
-        Args:
-            cube: Points in [0, 1], shape (n, bundles).
-            out: Array to put them into; `cube` itself is allowed.
-
-        Returns:
-            Activations, shape (n, bundles), never outside the bounds.
+        They are never outside the bounds; shapes (n, bundles), and `out` may be `cube` itself.
         """
         gamma = np.multiply(cube, self.widths, out=out)
         gamma += self.low
@@ -111,21 +104,13 @@ class ActivationBox:
         return bool((self.low + self.widths > self.high).any())
 
     def from_free_cube(self, cube: Array) -> Array:
-        """Activations of points of the unit cube of the free bundles; the others stay fixed.
-
-        Args:
-            cube: Points in [0, 1], shape (n, dimension).
-        """
+        """Activations of points (n, dimension) of the unit cube of the free bundles, in [0, 1]."""
         every = np.zeros((len(cube), self.bundles))
         every[:, self.free] = cube
         return self.from_cube(every, out=every)
 
     def with_fixed(self, activations: Array) -> Array:
-        """Activations of all bundles from those of the free ones; the others stay fixed.
-
-        Args:
-            activations: Shape (n, dimension).
-        """
+        """Activations of all bundles from those of the free ones, shape (n, dimension)."""
         if self.dimension == self.bundles:
             return activations
         every = np.tile(self.low, (len(activations), 1))
@@ -197,16 +182,10 @@ class Inputs:
         driving = replace(self.driving, is_effective=True)
         return replace(self, own_box=_bounds(driving), driving=driving)
 
-    def only(self, columns: Sequence[int]) -> Inputs:
-        """Those of some columns of x; the others are fixed at their lower bounds."""
-        return replace(self, free=tuple(self.free[k] for k in columns))
-
     def measured(self, arm: Manipulator) -> Inputs:
         """The same in `activation_measures`."""
-        measures, names = activation_measures(arm), arm.input_names
-        return replace(
-            self, scale=tuple(float(measures[names.index(name)]) for name in self.own_box.names)
-        )
+        measures = dict(zip(arm.input_names, activation_measures(arm).tolist(), strict=True))
+        return replace(self, scale=tuple(measures[name] for name in self.own_box.names))
 
     def continued_from(self, activation: Array, frames: Array | None = None) -> Inputs:
         """Those of an arm in its posture at activations of the rod, see `TipMap.continued_from`."""

@@ -1,7 +1,6 @@
 """Forward kinematics: where the tip is, how it moves, what shape the arm takes.
 
-The arm is clamped at Z = 0 by its base, whose z is the tangent d3 there. Places are in the frame of
-the world by default.
+The base clamps the arm at Z = 0, its z is d3 there; places are in the world by default.
 """
 
 from __future__ import annotations
@@ -31,11 +30,7 @@ _LINES_TOGETHER = 256  # samples
 
 
 def tip_positions(
-    arm: Manipulator | TipMap,
-    activations: ArrayLike,
-    tol: float = 1e-6,
-    *,
-    frame: Frame = "world",
+    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
 ) -> Array:
     """Tip positions of many activations: theory (25), by sixth-order Magnus integration.
 
@@ -60,11 +55,7 @@ def tip_positions(
 
 
 def tip_jacobian(
-    arm: Manipulator | TipMap,
-    activations: ArrayLike,
-    tol: float = 1e-6,
-    *,
-    frame: Frame = "world",
+    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
 ) -> Array:
     """Spatial twist of the tip per unit of each activation: the exact derivative of the tip.
 
@@ -88,11 +79,7 @@ def tip_jacobian(
 
 
 def marker_positions(
-    arm: Manipulator | TipMap,
-    activations: ArrayLike,
-    tol: float = 1e-6,
-    *,
-    frame: Frame = "world",
+    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
 ) -> Array:
     """Places of the markers of an arm under many activations, such as those of a cloud.
 
@@ -110,8 +97,7 @@ def marker_positions(
         InvalidInput: As for `tip_positions`.
     """
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
-    gamma = tip_map.check_activations("activations", activations)
-    return _markers(tip_map, gamma)
+    return _markers(tip_map, tip_map.check_activations("activations", activations))
 
 
 def _markers(tip_map: TipMap, gamma: Array) -> Array:
@@ -128,16 +114,12 @@ def marker_sections(arm: Manipulator) -> Array:
 def marked(arm: Manipulator, z: Array, frames: Frames) -> Array:
     """r + x d1 + y d2 + z d3 of each marker [m], shape (n, marker, 3).
 
-    Args:
-        arm: The design.
-        z: Ascending stations that hold `marker_sections` [m].
-        frames: The arms there.
+    Of frames at ascending stations Z [m] that hold `marker_sections`.
     """
-    if not arm.markers:
-        return np.empty((len(frames.position), 0, 3))
     stations = [marker.station_at("station", arm.length) for marker in arm.markers]
-    section, offsets = np.searchsorted(z, stations), [marker.offset for marker in arm.markers]
-    turned = np.einsum("mk,nmkx->nmx", np.array(offsets), frames.directors[:, section])
+    offsets = np.reshape([marker.offset for marker in arm.markers], (-1, 3))
+    section = np.searchsorted(z, stations)
+    turned = np.einsum("mk,nmkx->nmx", offsets, frames.directors[:, section])
     return frames.position[:, section] + turned
 
 
@@ -190,12 +172,7 @@ def configuration(
 
 
 def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
-    """The arm before activation: straight from its base, directors along the axes of that.
-
-    Args:
-        arm: The design.
-        stations: Number of stations, evenly spaced in Z.
-    """
+    """The arm before activation: straight from its base, at so many stations even in Z."""
     z, lines = np.linspace(0.0, arm.length, stations), dict[str, Any]()
     if arm.bundles:
         nodes = len(quadrature(body_of(arm))[0])
@@ -248,11 +225,7 @@ def _lines(tip_map: ArmMap, gamma: Array, strains: Strains) -> dict[str, Array]:
 
 
 def stations_along(tip_map: TipMap, stations: int | ArrayLike) -> Array:
-    """Z [m] of stations given by their number or by themselves, ascending.
-
-    Args:
-        tip_map: The tip map.
-        stations: Number of stations, evenly spaced from base to tip, or their Z [m].
+    """Z [m] of stations given by their number, even from base to tip, or by themselves, ascending.
 
     Raises:
         InvalidInput: No such number or stations.

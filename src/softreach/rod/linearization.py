@@ -15,7 +15,6 @@ whose last part is at most ½ a² with a = ∫ |κ|, as Q turns only. W is linea
 with ζ, η and u at their largest in the activation box, or in the cell of it where γ + d lies.
 (The largest second derivative bounds it by three halves of the first part.)
 
-
 In a cell ζ and |u| are parts of what they are at most in the box, at every station no more than the
 largest part anywhere along the arm; so is η where it is ζ, and else it stays at its largest. All
 integrals are then those of the box times powers of the largest parts, and are computed once.
@@ -83,11 +82,8 @@ class Linearization:
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths
         self.longest = 1.0 + table.extension @ middle + self.stretch @ half
         self.has_forces = table.has_forces
-        self.rest_length_factor, self.largest_eta = self.stretch, self.longest
-        if self.has_forces:
-            self.rest_length_factor = np.abs(table.rest_length_factor)
-            self.largest_eta = 1.0 + table.rest_length_factor @ middle
-            self.largest_eta += self.rest_length_factor @ half
+        self.rest_length_factor = np.abs(table.rest_length_factor)
+        self.largest_eta = 1.0 + table.rest_length_factor @ middle + self.rest_length_factor @ half
         self.size = np.linalg.norm(self.curvature, axis=1)
         self.bending = np.linalg.norm(self.curvature @ middle, axis=1) + self.size @ half
         self._known: dict[bytes, _Terms] = {}
@@ -106,24 +102,20 @@ class Linearization:
         """The same for |dj| <= half_widths[j] around each center only, shape (n,)."""
         longest, bending = np.empty(len(centers)), np.empty(len(centers))
         offset = (1.0 + self.stretch @ half_widths) / self.longest
-        relative_strains(np.ascontiguousarray(centers), offset, *self._relative, longest, bending)
-        bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
+        inverse, *relative = self._relative
+        relative_strains(np.ascontiguousarray(centers), offset, *relative, longest, bending)
+        bending = np.sqrt(bending) + (self.size @ half_widths * inverse).max()
         longest, bending = np.minimum(longest, 1.0), np.minimum(bending, 1.0)
         square, terms = self._terms(half_widths)
         eta = 1.0 if self.has_forces else longest
         return square * np.asarray(terms.sum(longest, eta, bending))
 
     @lazy
-    def _bending_inverse(self) -> Array:
-        """1/bending at every station [m], 0 where nothing bends."""
-        return np.divide(1.0, self.bending, where=self.bending > 0, out=0 * self.bending)
-
-    @lazy
-    def _relative(self) -> tuple[Array, Array]:
-        """Extension and curvature of each bundle as parts of the largest ones."""
+    def _relative(self) -> tuple[Array, Array, Array]:
+        """1/bending [m], 0 without any, and parts of the largest ζ and u that each bundle makes."""
+        inverse = np.divide(1.0, self.bending, where=self.bending > 0, out=0 * self.bending)
         stretch = self.extension / self.longest[:, None]
-        curvature = self.curvature * self._bending_inverse[:, None, None]
-        return stretch, curvature
+        return inverse, stretch, self.curvature * inverse[:, None, None]
 
     def _terms(self, half_widths: Array) -> tuple[float, _Terms]:
         """The largest half width squared, and the terms for it at 1, known for each proportion."""
@@ -140,22 +132,22 @@ class Linearization:
         free, z = np.flatnonzero(half_widths > 0), self.stations
         if not len(free):
             return _Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+        def total(values: Array) -> float:
+            return float(_integrals(values, z)[..., -1].max())
+
         stretch, turned = self.stretch @ half_widths, self._turns(half_widths, free)
         d_eta = self.rest_length_factor @ half_widths
         first = _integrals(self.largest_eta * turned, z)
         second = _integrals(d_eta * self.bending, z)
-        most = turned.max(axis=0)
-        inner = self.longest * _integrals(2.0 * d_eta * most, z)
         # The square of a is convex in d, so that it is largest where all |dj| are.
         return _Terms(
-            turned_twice=float(_integrals(self.longest * first**2, z)[:, -1].max()),
-            turned_and_stretched=float(
-                _integrals(2.0 * self.longest * first * second, z)[:, -1].max()
-            ),
-            stretched_twice=float(_integrals(self.longest * second**2, z)[-1]),
-            turned=float(_integrals(2.0 * stretch * first.max(axis=0), z)[-1]),
-            stretched=float(_integrals(2.0 * stretch * second, z)[-1]),
-            mixed=float(_integrals(inner, z)[-1]),
+            turned_twice=total(self.longest * first**2),
+            turned_and_stretched=total(2.0 * self.longest * first * second),
+            stretched_twice=total(self.longest * second**2),
+            turned=total(2.0 * stretch * first.max(axis=0)),
+            stretched=total(2.0 * stretch * second),
+            mixed=total(self.longest * _integrals(2.0 * d_eta * turned.max(axis=0), z)),
         )
 
     def _turns(self, half_widths: Array, free: NDArray[np.intp]) -> Array:
@@ -171,13 +163,11 @@ class Linearization:
 def _with_rigid_end(table: Tables, end: float, reach: float) -> Tables:
     """Tables with a straight piece beyond the end that nothing deforms [m]."""
     z = np.concatenate([table.stations, [end, end + reach]])
-
-    def ending(values: Array) -> Array:
-        return np.concatenate([values, np.zeros_like(values[:2])])
-
-    extension = ending(table.extension)
-    resting = ending(table.rest_length_factor) if table.has_forces else extension
-    return Tables(z, extension, ending(table.curvature), resting)
+    parts = table.extension, table.curvature, table.rest_length_factor
+    extension, curvature, resting = (
+        np.concatenate([values, np.zeros_like(values[:2])]) for values in parts
+    )
+    return Tables(z, extension, curvature, resting if table.has_forces else extension)
 
 
 def _integrals(values: Array, z: Array) -> Array:

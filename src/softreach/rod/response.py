@@ -24,8 +24,7 @@ from softreach.support import parallel
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
-_TOGETHER = 64
-"""Samples to a task."""
+_TOGETHER = 64  # samples to a task
 
 
 class StepGrid(NamedTuple):
@@ -100,11 +99,8 @@ def step_grid(
 ) -> StepGrid:
     """Steps of an inner arm, none longer in S than so many even ones.
 
-    Args:
-        arm: The inner arm.
-        stations: Wanted Z [m], in any order.
-        steps: Even steps; a step should not turn the arm by much more than a third of a radian.
-        moving_ends: Whether actuators that end at the base or at the tip may come to end before.
+    A step should not turn the arm by much more than a third of a radian. Wanted stations Z [m] are
+    in any order; moving ends of actuators at the base or at the tip may come to end before.
     """
     s = arm.profile.slender_coordinate(_places(arm, stations, moving_ends))
     counts = np.ceil(np.diff(s) / arm.profile.slender_length * steps - 1e-9)
@@ -152,14 +148,8 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
 def dead_forces(arm: Manipulator, base: Base, z: Array, length: Array) -> tuple[Array, Array]:
     """Dead force n beyond the nodes, theory (60), and that of the payload in the frame of a base.
 
-    Args:
-        arm: The arm, wherever its own base is.
-        base: Pose of the base.
-        z: Z of the nodes [m], shape (step, 3).
-        length: dZ there [m], likewise.
-
-    Returns:
-        [N], shape (step, 3, 3) and (3,).
+    Z and dZ of the nodes [m] are (step, 3), the forces [N] (step, 3, 3) and (3,), wherever the base
+    of the arm itself is.
     """
     if arm.loads is None:
         return np.zeros((*z.shape, 3)), np.zeros(3)
@@ -221,18 +211,11 @@ def rod_state(rod: ArmRod, gamma: Array, table: NodeTables) -> RodState:
 
 
 def linear_response(
-    table: NodeTables,
-    state: RodState,
-    changes: list[NodeTables],
-    unit_loads: Array | None = None,
+    table: NodeTables, state: RodState, changes: list[NodeTables], unit_loads: Array | None = None
 ) -> Response:
-    """Movements of equilibria per unit of each activation and of each change of the tables.
+    """Movements of equilibria per unit of each activation, then of each change of the tables.
 
-    Args:
-        table: Tables of the inner arm at the nodes.
-        state: Its equilibria.
-        changes: Changes of the tables, one for each column after those of the activations.
-        unit_loads: M and N at the nodes whose work is wanted, shape (step, 3, 4, work).
+    The work of unit loads M and N at the nodes, shape (step, 3, 4, work), is computed, too.
     """
     n, bundles = state.gamma.shape
     if unit_loads is None:

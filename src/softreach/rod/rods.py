@@ -35,8 +35,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
 
-_OF_LENGTHS = 0.03
-"""Tolerance of shapes of which lengths are taken, over that of tips."""
+_OF_LENGTHS = 0.03  # tolerance of shapes of which lengths are taken, over that of tips
 
 
 @dataclass(frozen=True, repr=False)
@@ -127,9 +126,8 @@ class ArmMap(TipMap):
             inner = self.inputs.activations(gamma)
         room = out
         if not self.inputs.are_activations:  # derivatives along the activations of the rod
-            room = out._replace(
-                **{k: np.empty((*v.shape[:2], inner.shape[1])) for k, v in moved.items()}
-            )
+            along = {name: np.empty((*v.shape[:2], inner.shape[1])) for name, v in moved.items()}
+            room = out._replace(**along)
         if out.status is None and not is_whole:
             room = room._replace(status=np.empty(len(gamma), np.int8))
         inner, lost = self._known(inner)
@@ -193,8 +191,8 @@ class ArmMap(TipMap):
     def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held | None:
         held = self.rod.held(self.inputs.activations(gamma), sizes)
         if held is not None:
-            for places in (held.tips, held.end_tips):
-                self._place(TipOutputs(places))
+            self._place(TipOutputs(held.tips))
+            self._place(TipOutputs(held.end_tips))
         return held
 
     def farthest(self) -> float:
@@ -246,32 +244,22 @@ def as_tip_map(
     return made
 
 
+def refined(tip_map: TipMap, tol: float) -> TipMap:
+    """The tip map of the same arm to a smaller tolerance [L]; itself if its own is no larger."""
+    return tip_map if tip_map.tol <= check_tol(tol) else _to_tolerance(tip_map, tol)
+
+
+def coarsened(tip_map: TipMap, tol: float) -> TipMap:
+    """The tip map of the same arm to a larger tolerance [L]; itself if its own is no smaller."""
+    return tip_map if tip_map.tol >= check_tol(tol) else _to_tolerance(tip_map, tol)
+
+
 def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
     known = as_tip_map(tip_map)
     if not isinstance(known.rod, ArmRod):
         return tip_map
     inputs = _with_tensions(known.inputs, tol)
     return replace(known, rod=_known_rod(known.rod.arm, tol), inputs=inputs)
-
-
-def refined(tip_map: TipMap, tol: float) -> TipMap:
-    """The tip map of the same arm to a smaller tolerance; itself if its own is no larger.
-
-    Args:
-        tip_map: The tip map; one that is of no arm stays as it is.
-        tol: Largest tip error, in L.
-    """
-    return tip_map if tip_map.tol <= check_tol(tol) else _to_tolerance(tip_map, tol)
-
-
-def coarsened(tip_map: TipMap, tol: float) -> TipMap:
-    """The tip map of the same arm to a larger tolerance; itself if its own is no smaller.
-
-    Args:
-        tip_map: The tip map; one that is of no arm stays as it is.
-        tol: Largest tip error, in L.
-    """
-    return tip_map if tip_map.tol >= check_tol(tol) else _to_tolerance(tip_map, tol)
 
 
 def effective(tip_map: TipMap) -> TipMap:
@@ -291,7 +279,8 @@ def free_bundles(tip_map: TipMap) -> TipMap:
     if tip_map.box.dimension == tip_map.box.bundles:
         return tip_map
     known = as_tip_map(tip_map)
-    return replace(known, inputs=known.inputs.only(tip_map.box.free.tolist()))
+    free = tuple(known.inputs.free[k] for k in tip_map.box.free)
+    return replace(known, inputs=replace(known.inputs, free=free))
 
 
 def measured_bundles(tip_map: TipMap) -> TipMap:
@@ -332,11 +321,7 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
 
     Maps of neighboring designs in as many steps err by what is a smooth function of the design, so
     that differences between them do not see it; and none of them needs a search for its steps.
-
-    Args:
-        arm: The design.
-        steps: Along the arm, if nothing breaks it.
-        like: A tip map whose tolerance, frame and effective inputs it has.
+    Tolerance, frame and effective inputs are those of a map that it is like.
     """
     driving = as_tip_map(like).inputs.driving
     made = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
@@ -358,7 +343,7 @@ def _with_tensions(inputs: Inputs, tol: float) -> Inputs:
     driving = inputs.driving
     if driving is None or driving.arm.loads is None or driving.is_bundles:
         return inputs
-    from softreach.rod.loaded.pulled import LoadedTendons
+    from softreach.rod.loaded.rod import LoadedTendons
 
     # A tip moves by far more than the length by which a tendon near the axis is off.
     rod = _rod(inner_arm(driving.arm), max(_OF_LENGTHS * tol, SMALLEST_TOL))

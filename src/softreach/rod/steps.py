@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from softreach.arm.driving import cube_corners
 from softreach.arm.manipulator import Manipulator
@@ -28,8 +28,7 @@ Differences = Callable[[Array], Array]
 
 _SAFETY = 2.0
 _MOST_STEPS = 4096
-_FRAME_TURN = 1.0
-"""Rotation of one step [rad] up to which directors stay orthonormal to rounding."""
+_FRAME_TURN = 1.0  # [rad] of one step, up to which directors stay orthonormal to rounding
 _SHAPES = 512  # whole shapes held at once
 # The error of the steps grows with a high power of the bending, so that it is largest where many
 # bundles bend the arm the same way: at few corners of the box, which random samples miss.
@@ -38,8 +37,7 @@ _HEADINGS = 16
 _PROBED_STATIONS = 9
 _SEARCHED = 8  # corners from which larger errors are searched
 _ROUNDS = 24
-_FEW_BREAKS = 64
-"""Breakpoints at all of which steps end, however few the arm needs otherwise."""
+_FEW_BREAKS = 64  # at all of which steps end, however few the arm needs otherwise
 
 
 def tables_on(arm: Manipulator, *grids: Array) -> Iterator[Tables]:
@@ -67,44 +65,35 @@ class StepRule:
     def edges(self, steps: int, stations: Array | None = None) -> Array:
         """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones.
 
-        Args:
-            steps: Uniform steps along the whole arm, if nothing breaks it.
-            stations: Z [m] where steps end too, ascending; the last one then stands for the tip.
+        Steps end at ascending stations Z [m], too, the last of which then stands for the tip.
         """
         z = [0.0, *ends_of_steps(self.arm, steps), self.arm.length]
         if stations is not None:
             z = [*(mark for mark in z if mark < stations[-1]), *stations]
         return edges_between(self.arm.profile, np.unique(z), steps)
 
-    def nodes(self, edges: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
-
-        Args:
-            edges: Step boundaries S [-], ascending, shape (step + 1,).
+    def nodes(self, *edges: Array) -> tuple[Array, Array, Array, Array]:
+        """Tables at the Gauss nodes of the steps between ascending `edges` S [-] of any grids.
 
         Returns:
             Length of the step as each node sees it [m], shape (step, node); z [-] and its part in
             η [-], shape (step, node, bundle); U [1/m], shape (step, node, 3, bundle).
         """
-        edges = np.asarray(edges, float)
-        return self._nodes_of(edges[:-1], np.diff(edges))
-
-    def _nodes_of(self, starts: Array, widths: Array) -> tuple[Array, Array, Array, Array]:
+        starts, widths = np.concatenate([[each[:-1], np.diff(each)] for each in edges], axis=1)
         width = widths[:, None]
         z = self.arm.profile.station(starts[:, None] + width * np.array(magnus.NODES))
         (at,), measure = tables_on(self.arm, z), width * self.arm.profile.radius(z)  # dZ = R2 dS
         return measure, at.extension, at.rest_length_factor, at.curvature
 
-    def packed(self, edges: Array) -> Array:
+    def packed(self, *edges: Array) -> Array:
         """Packed tables of the steps between edges, read-only."""
-        return read_only(rod.pack(*self.nodes(edges)))
+        return read_only(rod.pack(*self.nodes(*edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
         """Packed tables of the steps, and of both halves of each, computed together."""
         edges = self.edges(steps)
-        both = edges, np.insert(edges, np.arange(1, len(edges)), 0.5 * (edges[:-1] + edges[1:]))
-        starts, widths = np.concatenate([[each[:-1], np.diff(each)] for each in both], axis=1)
-        packed = read_only(rod.pack(*self._nodes_of(starts, widths)))
+        halves = np.insert(edges, np.arange(1, len(edges)), 0.5 * (edges[:-1] + edges[1:]))
+        packed = self.packed(edges, halves)
         return packed[: len(edges) - 1], packed[len(edges) - 1 :]
 
     def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
@@ -121,9 +110,6 @@ class StepRule:
         by more than 2 rad. Halving is sharp at sixth order: it sees 63/64 of the error. The pilot
         holds corners, faces and the inside of the activation box, the corners that bend the arm
         most, and what a search for larger differences finds from there.
-
-        Args:
-            tol: Largest tip error, in L.
 
         Raises:
             InvalidInput: `tol` is not reached within 4,096 steps.
@@ -158,7 +144,7 @@ class StepRule:
     ) -> int | None:
         """The fewest steps whose differences on the pilot, and on what it leads to, are allowed."""
         allowed = tol * self.arm.length / _SAFETY
-        steps, pilot = max(least, self._fewest_steps(turn)), self.pilot
+        steps, pilot = max(least, self.fewest_steps(turn)), self.pilot
         while steps <= most:
             difference = halving(steps)
             errors = difference(pilot)
@@ -173,15 +159,13 @@ class StepRule:
             steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 6)))
         return None
 
-    def _fewest_steps(self, turn: float) -> int:
-        """Steps of which none turns by more than `turn`: |ω| = η |u| R2 dS at the pilot samples."""
+    def fewest_steps(self, turn: float = _FRAME_TURN) -> int:
+        """Steps of which none turns by more than `turn`: |ω| = η |u| R2 dS at the pilot samples.
+
+        By default directors stay orthonormal to rounding.
+        """
         steps = min(self._largest_turn / turn, 2.0 * _MOST_STEPS)  # infinite ones overflow
         return max(2, int(np.ceil(steps)))
-
-    @property
-    def fewest_for_frames(self) -> int:
-        """Steps short enough for directors to stay orthonormal to rounding."""
-        return self._fewest_steps(_FRAME_TURN)
 
     @lazy
     def _largest_turn(self) -> float:
@@ -201,13 +185,12 @@ class StepRule:
     def _shape_differences(self, steps: int) -> Differences:
         """Largest distances [m] along the centerlines with `steps` and with twice as many."""
         coarse, fine = self._halves(steps)
-        steps = len(coarse)
-        ends = np.arange(1, steps + 1)
+        ends = np.arange(1, len(coarse) + 1)
 
         def difference(gamma: Array) -> Array:
             errors = np.empty(len(gamma))
             for block in parallel.blocks(len(gamma), _SHAPES):
-                places = np.empty((2, len(errors[block]), steps, 3))
+                places = np.empty((2, len(errors[block]), len(ends), 3))
                 directors = np.empty((*places.shape[1:], 3))
                 frames.frames(coarse, ends, gamma[block], places[0], directors)
                 frames.frames(fine, 2 * ends, gamma[block], places[1], directors)
@@ -244,10 +227,7 @@ def enough_for_all_breaks(arm: Manipulator) -> int:
 def edges_between(profile: Profile, z: Array, steps: int) -> Array:
     """Step boundaries S [-] that hold marks, with no step longer than `steps` uniform ones.
 
-    Args:
-        profile: Of the arm.
-        z: Ascending Z of the marks [m], the first and the last of which are the ends.
-        steps: Uniform steps along the whole arm.
+    The first and the last of the marks, ascending Z [m], are the ends.
     """
     marks = profile.slender_coordinate(z)
     gaps = np.diff(marks)
@@ -259,13 +239,10 @@ def edges_between(profile: Profile, z: Array, steps: int) -> Array:
 
 
 def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
-    """Corners, points on faces and points inside the activation box.
+    """Corners, points on faces and points inside the activation box, shape (n, bundles).
 
     All corners where they are no more than 1,024; else as many at random, and those that bend most.
     Only the last depend on more of an arm than its bounds.
-
-    Returns:
-        Activations, shape (n, bundles).
     """
     m, rng = box.bundles, np.random.default_rng(0)
     corners = cube_corners(m, rng)

@@ -31,11 +31,8 @@ from softreach.support.quantity import columns
 
 _TEXTS = ("lacking", "validity", "warnings")
 _UNITS = {"helical_angles": "rad", "revolutions": "rad", "base_radius": "m", "tip_radius": "m"}
-_UNITS |= {
-    "breakpoints": "m",
-    "mass": "kg",
-    "stiffness": "(K0 [N], K1, K3 [N m²], at base and tip)",
-}
+_UNITS |= {"breakpoints": "m", "mass": "kg"}
+_UNITS |= {"stiffness": "(K0 [N], K1, K3 [N m²], at base and tip)"}
 
 
 @dataclass(frozen=True)
@@ -107,18 +104,17 @@ def describe(arm: Manipulator) -> DesignSummary:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
     check_extension(a_manipulator("arm", arm))
-    tip_radius = float(arm.profile.radius(arm.length))
-    body, bending = (arm.profile, arm.section), _bending(arm)
-    alone = list(_alone(arm))
+    base_radius, tip_radius = (float(arm.profile.radius(z)) for z in (0.0, arm.length))
+    body, bending, alone = (arm.profile, arm.section), _bending(arm), list(_alone(arm))
     bent = [(each.gentlest, each.sharpest.value) for each in map(bending_over_bounds, alone)]
     limits = (f"{part.default_name}: {part.validity}" for part in arm.actuators if part.validity)
     return DesignSummary(
         helical_angles=np.array([_angle_at_start(fiber, arm) for fiber in arm.fibers]),
         revolutions=np.array([fiber.revolution_on(*body) for fiber in arm.fibers]),
-        base_radius=float(arm.profile.radius(0.0)),
+        base_radius=base_radius,
         tip_radius=tip_radius,
         radius_ratio=arm.section.inner_ratio,
-        taper_ratio=float(arm.profile.radius(0.0)) / tip_radius,
+        taper_ratio=base_radius / tip_radius,
         extension=extension_range(arm),
         curvature=(bending.least * arm.length, bending.largest * arm.length),
         bundle_extension=np.array([extension_range(each) for each in alone]).reshape(-1, 2),
@@ -170,13 +166,8 @@ def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
 
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
-    return (
-        *scale_warnings(arm),
-        *_overlaps(arm),
-        *_chambers_outside(arm),
-        *_beyond_theory(arm),
-        *filter(None, [law_warning(arm)]),
-    )
+    of_theory = (*_beyond_theory(arm), *filter(None, [law_warning(arm)]))
+    return (*scale_warnings(arm), *_overlaps(arm), *_chambers_outside(arm), *of_theory)
 
 
 def _bending(arm: Manipulator) -> BendingRange:
@@ -184,8 +175,7 @@ def _bending(arm: Manipulator) -> BendingRange:
     try:
         return bending_over_bounds(arm)
     except InvalidInput:
-        unknown = float("nan")
-        return BendingRange(unknown, unknown, unknown, Extreme(unknown, 0.0), exact=False)
+        return BendingRange(np.nan, np.nan, np.nan, Extreme(np.nan, 0.0), exact=False)
 
 
 def _beyond_theory(arm: Manipulator) -> Iterator[str]:

@@ -83,22 +83,16 @@ class TipMap(ABC):
 
     @abstractmethod
     def fill(self, gamma: Array, out: TipOutputs) -> None:
-        """Put tips, and what else is wanted, into place, on the calling thread.
+        """Put tips, and what else is wanted, into place, at checked activations (n, bundles).
 
-        Whoever calls it from several threads calls `prepare` before.
-
-        Args:
-            gamma: Checked activations, shape (n, bundles).
-            out: Arrays to be filled.
+        It runs on the calling thread; whoever calls it from several calls `prepare` before.
         """
 
     def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
-        """Arms at stations along them; each equilibrium is found once.
+        """Arms at stations along them; each equilibrium, of (n, bundles), is found once.
 
-        Args:
-            activations: Shape (n, bundles).
-            framed: Z of centerline and directors [m], ascending; there may be none.
-            strained: Z of curvature and extension [m], likewise.
+        Centerline and directors are those at `framed` Z [m], curvature and extension those at
+        `strained` Z [m], both ascending; there may be none.
         """
         raise NotImplementedError
 
@@ -162,13 +156,10 @@ class TipMap(ABC):
         """Compute what every sample needs, once for all threads."""
 
     def continued_from(self, gamma: Array, frames: Array | None = None) -> TipMap:
-        """The map of an arm that is in its posture at γ (1, bundles), and moves straight from it.
+        """The map of an arm that is in its posture at γ (k, bundles), and moves straight from it.
 
-        Itself for arms without loads, which have one shape at every activation.
-
-        Args:
-            gamma: Shape (k, bundles); of several postures the arm moves from that of the nearest.
-            frames: Those of `held` at these activations, for other postures than its own.
+        Of several postures it moves from that of the nearest. They are its own, or those of `held`
+        with these frames. Itself for arms without loads, which have one shape at every activation.
         """
         return self
 
@@ -247,11 +238,9 @@ class TipMap(ABC):
         return np.inf
 
     def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
-        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,).
+        """The same [m] for |dj| <= half_widths[j] around each center (n, bundles), shape (n,).
 
-        Args:
-            centers: Activations of which no d leads out of the box, shape (n, bundles).
-            half_widths: Shape (bundles,).
+        No d leads out of the box.
         """
         return np.full(len(centers), self.linearization_error(half_widths))
 
@@ -259,11 +248,8 @@ class TipMap(ABC):
         """All postures that are held without a snap from rest; None where each γ has one alone.
 
         That is the part of all stable equilibria that is connected with the posture at rest, with
-        those that lean to either side.
-
-        Args:
-            gamma: Activations at the nodes of a grid in C order, shape (nodes, bundles).
-            sizes: Nodes along each axis of the grid.
+        those that lean to either side. γ (nodes, bundles) is that of the nodes of a grid of these
+        sizes, in C order.
         """
         return None
 
@@ -284,18 +270,16 @@ class TipMap(ABC):
         return self._filled(activations, "slopes")
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
-        """Tips [m] and the spatial twist of the tip frame per unit of each activation.
+        """Tips [m], shape (n, 3), and spatial twists of the tip frame per unit of each activation.
 
-        Returns:
-            Tips, shape (n, 3); (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
+        They are (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
         """
         return self._filled(activations, "twists")
 
     def tip_motions(self, activations: ArrayLike) -> TipMotions:
         """Positions and directions of the tips with their derivatives."""
-        tips, slopes, twists, directions = self._filled(
-            activations, "slopes", "twists", "directions"
-        )
+        filled = self._filled(activations, "slopes", "directions", "twists")
+        tips, slopes, directions, twists = filled
         return TipMotions(tips, slopes, directions, twists[:, 3:])
 
     def tip_directions(self, activations: ArrayLike) -> Array:
@@ -327,11 +311,7 @@ class TipMap(ABC):
         return self.arm.profile.radius(stations)
 
     def check_stations(self, stations: ArrayLike, *, ascending: bool = True) -> Array:
-        """The stations as a float array.
-
-        Args:
-            stations: Z [m], shape (station,).
-            ascending: Whether they must not fall.
+        """Stations Z [m], shape (station,), as a float array; they may fall if not `ascending`.
 
         Raises:
             InvalidInput: No such Z within [0, L].
@@ -344,8 +324,7 @@ class TipMap(ABC):
         return z
 
     def __repr__(self) -> str:
-        bundles = counted(self.box.bundles, "bundle")
-        size = f"L = {self.length:g} m, {bundles}"
+        size = f"L = {self.length:g} m, {counted(self.box.bundles, 'bundle')}"
         return f"<{type(self).__name__}: {size}, tip error up to {self.tol:g} L>"
 
 

@@ -17,21 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.geometry.sphere_maps import (
-    Roots,
-    icosphere,
-    is_axisymmetric,
-    pole_rings,
-    polished_roots,
-    sphere_roots,
-)
-from softreach.rod.kinematics import (
-    configuration,
-    marked,
-    marker_sections,
-    shape_dataset,
-    stations_along,
-)
+from softreach.geometry import sphere_maps
+from softreach.rod import kinematics
 from softreach.rod.loaded.postures import NEUTRAL, SYMMETRIC
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
@@ -91,17 +78,17 @@ class AllEquilibria:
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
         if self.solver is None:
-            return configuration(rod, gamma, stations)
-        z, inner = stations_along(rod, stations), rod.inputs.activations(gamma)
-        together = np.union1d(z, marker_sections(rod.arm))
+            return kinematics.configuration(rod, gamma, stations)
+        z, inner = kinematics.stations_along(rod, stations), rod.inputs.activations(gamma)
+        together = np.union1d(z, kinematics.marker_sections(rod.arm))
         shapes = self.solver.shapes_facing(inner, self.directions, together)[0]
-        frames = rod.placed(shapes.frames)
+        frames = rod.placed(Frames(*shapes[:2]))
         strains = self.solver.strains_under(inner, together, shapes)
-        places = marked(rod.arm, together, frames)
+        places = kinematics.marked(rod.arm, together, frames)
         rows = np.searchsorted(together, z)
         frames = Frames(*(values[:, rows] for values in frames))
         strains = Strains(*(values[:, rows] for values in strains))
-        return shape_dataset(rod, gamma, z, frames, strains, marker_position=places)
+        return kinematics.shape_dataset(rod, gamma, z, frames, strains, marker_position=places)
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `equilibrium` and `axis`."""
@@ -203,7 +190,7 @@ def equilibria(
     solver = Solver(loaded.tables.in_one_segment, loaded.unloaded_steps, rod.tol)
     solver = _resolving(solver, at)
     solver, roots = _accurate(solver, at, _search(solver, at, known))
-    return replace(_judged(rod, solver, at, roots, known), activation=gamma[0])
+    return _judged(rod, solver, gamma, at, roots, known)
 
 
 def _crossing(loads: Loads, direction: Array) -> list[str]:
@@ -244,23 +231,23 @@ def _single(
 def _search(solver: Solver, gamma: Array, known: Array) -> _Roots:
     """All of them, searched more finely if the degree is not 1; the known ones are tried first."""
     image, axis = solver.base_map(gamma), solver.tables.axes[0]
-    if is_axisymmetric(image, axis, SYMMETRIC):
-        rings = pole_rings(image, axis, known[0] if len(known) else axis)
+    if sphere_maps.is_axisymmetric(image, axis, SYMMETRIC):
+        rings = sphere_maps.pole_rings(image, axis, known[0] if len(known) else axis)
         directions = np.concatenate([axis[None], rings.points])
         is_ring = np.arange(len(directions)) > 0
         return _Roots(directions, np.append(1, rings.signs), is_ring, rings.complete)
     most, tries = _MOST_WALKED // solver.steps, list[_Roots]()
     for levels, caution in _SEARCHES:
-        roots, was_cut = sphere_roots(
+        roots, is_whole = sphere_maps.sphere_roots(
             image, axis, levels=levels, caution=caution, starts=known, most=most
         )
-        tries.append(_isolated(roots, complete=was_cut))
+        tries.append(_isolated(roots, complete=is_whole))
         if tries[-1].complete:
             break
     return tries[-1]
 
 
-def _isolated(roots: Roots, *, complete: bool) -> _Roots:
+def _isolated(roots: sphere_maps.Roots, *, complete: bool) -> _Roots:
     signs = np.sign(roots.determinants).astype(np.int8)
     complete = complete and int(signs.sum()) == 1
     return _Roots(roots.points, signs, np.zeros(len(signs), bool), complete)
@@ -268,7 +255,7 @@ def _isolated(roots: Roots, *, complete: bool) -> _Roots:
 
 def _resolving(solver: Solver, gamma: Array) -> Solver:
     """With steps halved until the whole map of directions is roughly right."""
-    points = icosphere(2)[0]
+    points = sphere_maps.icosphere(2)[0]
     while 2 * solver.steps <= _MOST_STEPS:
         finer = replace(solver, steps=2 * solver.steps)
         apart = solver.base_map(gamma)(points) - finer.base_map(gamma)(points)
@@ -284,7 +271,12 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
     most = max(_MOST_STEPS, 2 * enough_for_all_breaks(solver.tables.arm))
     while 2 * solver.steps <= most:
         finer = solver.judge()
-        again = _again(finer, gamma, roots)
+        if roots.is_ring.any():
+            again = _search(finer, gamma, roots.directions[1:])
+        else:
+            axis = finer.tables.axes[0]
+            polished = sphere_maps.polished_roots(finer.base_map(gamma), axis, roots.directions)
+            again = _isolated(polished, complete=roots.complete)
         if len(again.directions) != len(roots.directions):
             again = _search(finer, gamma, roots.directions)
         else:
@@ -296,13 +288,6 @@ def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roo
     return solver, roots
 
 
-def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
-    if roots.is_ring.any():
-        return _search(solver, gamma, roots.directions[1:])
-    polished = polished_roots(solver.base_map(gamma), solver.tables.axes[0], roots.directions)
-    return _isolated(polished, complete=roots.complete)
-
-
 def _tips(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Array, Array]:
     """Tips in the frame of the base, and margins."""
     many = np.repeat(gamma, len(roots.directions), axis=0)
@@ -312,9 +297,9 @@ def _tips(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Array, Array]:
 
 
 def _judged(
-    rod: ArmMap, solver: Solver, gamma: Array, roots: _Roots, known: Array
+    rod: ArmMap, solver: Solver, gamma: Array, at: Array, roots: _Roots, known: Array
 ) -> AllEquilibria:
-    tips, margin = _tips(solver, gamma, roots)
+    tips, margin = _tips(solver, at, roots)
     margin = np.where(roots.is_ring & (margin > -NEUTRAL), 0.0, margin)
     stable = (roots.signs > 0) & np.where(roots.is_ring, margin == 0.0, margin > 0.0)
     places = np.round(tips[:, ::-1] / rod.length, 6)  # part mirror images

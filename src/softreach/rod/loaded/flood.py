@@ -27,8 +27,7 @@ _SHORTEST = 2.0**-20  # of a path, below which its branch has ended
 _MOST_STEPS = 3000
 _SAME = 0.02  # [rad, L]
 _SMOOTH_FRAME, _SMOOTH_TIP = 0.12, 0.04  # second differences that need no proof [rad], [L]
-CUT = 1e6
-"""Roughness of cells that are cut."""
+CUT = 1e6  # roughness of cells that are cut
 PARTS = 64  # of a line, at the ends of which cuts are looked for
 
 
@@ -53,16 +52,11 @@ def follow(
     hangs: bool = True,
     shortest: float = _SHORTEST,
 ) -> Followed:
-    """Branches of stable equilibria along straight ways between activations, each by itself.
+    """Branches of stable equilibria along straight ways between activations (n, bundles).
 
-    Args:
-        solver: That of the arm.
-        begin: Activations, shape (n, bundles).
-        end: Others.
-        start: Equilibria at the beginning.
-        slope: Change of the frame along the way, if it is known, shape (n, component).
-        hangs: Whether the loads are on; if not, they are put on along the way.
-        shortest: Step, over the length of the way, below which a branch has ended.
+    Each starts by itself, with the change of its frame along the way (n, component) if that is
+    known. An arm that does not hang yet gets its loads along the way. A branch has ended where its
+    steps become the shortest, over the length of the way.
     """
     n, last = len(begin), start.of(np.arange(len(begin)))
     place, step = np.where(hangs & (begin == end).all(axis=1), 1.0, 0.0), np.ones(n)
@@ -120,15 +114,7 @@ class Flood:
         rest: Array,
         start: Equilibria,
     ) -> None:
-        """Flood the grid.
-
-        Args:
-            solver: That of the twin.
-            box: Bounds of the activations.
-            sizes: Nodes for every bundle.
-            rest: Activations at rest, shape (1, bundles).
-            start: The posture there.
-        """
+        """Flood a grid with so many nodes for every bundle, from a posture of the twin at rest."""
         self.solver, self.box, self.sizes, self.rest = solver, box, sizes, rest
         ends = zip(box.low, box.high, sizes, strict=True)
         axes = np.meshgrid(*(np.linspace(*end) for end in ends), indexing="ij")
@@ -223,10 +209,9 @@ class Flood:
         """The nearest nodes, and their postures."""
         last = np.array(self.sizes) - 1
         place = np.clip(np.round(self._in_cells(gamma)), 0, last)
-        node = np.ravel_multi_index(tuple(place.astype(int).T), self.sizes)
-        return self.box.low + place / np.maximum(last, 1) * self.box.widths, self.held.of(
-            np.atleast_1d(node)
-        )
+        node = np.atleast_1d(np.ravel_multi_index(tuple(place.astype(int).T), self.sizes))
+        at = self.box.low + place / np.maximum(last, 1) * self.box.widths
+        return at, self.held.of(node)
 
     def is_uncut(self, gamma: Array) -> Mask:
         """Mask of activations in cells whose edges are all on one branch."""
@@ -257,9 +242,9 @@ def neighbors(
     sizes: tuple[int, ...], nodes: Index, axis: Index, way: Index | int
 ) -> tuple[Index, Mask]:
     """Nodes of a grid one step down or up an axis, and mask of those that are in the grid."""
-    place = np.stack(np.unravel_index(nodes, sizes))
-    moved = place[axis, np.arange(len(nodes))] + way
-    place[axis, np.arange(len(nodes))] = moved
+    place, each = np.stack(np.unravel_index(nodes, sizes)), np.arange(len(nodes))
+    moved = place[axis, each] + way
+    place[axis, each] = moved
     inside = (moved >= 0) & (moved < np.array(sizes)[axis])
     return np.asarray(np.ravel_multi_index(tuple(place), sizes, mode="clip"), np.int64), inside
 
@@ -290,10 +275,7 @@ def are_same(some: Equilibria, others: Equilibria, length: float, within: float 
 def smooth_edges(frames: Array, tips: Array, axis: int) -> Mask:
     """Edges of a grid along an axis that go on as an edge beside them does.
 
-    Args:
-        frames: At the nodes, shape (*nodes, components); NaN where none is known.
-        tips: The same of the tips [L].
-        axis: The axis.
+    Frames (*nodes, components) and tips (*nodes, 3) [L] are NaN where none is known.
     """
     smooth = np.zeros(np.delete(tips[..., 0], -1, axis).shape, bool)
     if tips.shape[axis] < 3:

@@ -39,8 +39,7 @@ def held_over(
     """The postures of both sides over a grid, see `TipMap.held`."""
     grid = _Grid(postures.solver, gamma, sizes)
     grid.fill(postures, grid.has_arm)
-    is_doubled = grid.states[:, 1] >= 0
-    beside = grid.has_arm
+    is_doubled, beside = grid.states[:, 1] >= 0, grid.has_arm
     if postures.flood is not None and mirrored.flood is not None:
         beside = beside & postures.flood.differ(mirrored.flood, gamma)
     if beside.any():
@@ -93,10 +92,8 @@ class _Grid:
         links, ends = (np.concatenate([none, *pairs]) for pairs in (self.links, self.ends))
         end_gamma = np.concatenate([self.gamma[:0], *self.end_gamma])
         end_postures = joined([self.equilibria.of(slice(0)), *self.end_postures])
-        tips, end_tips = (
-            points(self.gamma[self.node], self.equilibria),
-            points(end_gamma, end_postures),
-        )
+        tips = points(self.gamma[self.node], self.equilibria)
+        end_tips = points(end_gamma, end_postures)
         return Held(self.node, tips, links, ends, end_tips, is_doubled, self.equilibria.frame)
 
     def _put(self, nodes: Index, equilibria: Equilibria) -> Index:

@@ -29,10 +29,8 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
 
-NEUTRAL = 1e-5
-"""What tolerances leave of the margin of a ring, which is 0."""
-SYMMETRIC = 1e-6
-"""Of the directions that the base of an axisymmetric arm would have to see [rad]."""
+NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
+SYMMETRIC = 1e-6  # [rad], of the directions that the base of an axisymmetric arm would have to see
 _AT_ONCE, _BY_LINE = BLOCK // 8, 32 * LANES  # samples per task
 _NODES = {1: 33, 2: 33, 3: 17}  # of the grid for each free bundle: at most a few thousand postures
 _TWIST = 1e-4  # [rad], of the twin over its length
@@ -52,17 +50,13 @@ _STRAIGHT = 1e-8  # [L], aside, of an arm that no activation leans to any side
 
 @dataclass(frozen=True, eq=False)
 class Postures:
-    """Postures of one arm, by lines from rest.
-
-    Args:
-        solver: That of the arm.
-        side: Sense of the twist that decides between mirror images, 1 or -1.
-        flood: Starts on a grid over the box of activations; None for those on lines alone.
-    """
+    """Postures of one arm, by lines from rest."""
 
     solver: Solver
     side: int = 1
+    """Sense of the twist that decides between mirror images, 1 or -1."""
     flood: Flood | None = None
+    """Starts on a grid over the box of activations; None for those on lines alone."""
 
     @lazy
     def box(self) -> ActivationBox:
@@ -85,17 +79,17 @@ class Postures:
     @lazy
     def rest(self) -> Equilibria:
         """The twin at rest, as it was hung; not found where nothing holds it there."""
-        return self._hung(self.rest_activation).last
+        return self._hung(self.rest_activation)
 
     @property
     def is_held_at_rest(self) -> bool:
         """True if the arm has a stable posture at rest."""
         return bool(self.rest.is_stable[0])
 
-    def _hung(self, gamma: Array) -> Followed:
-        """Loads put on the twin at fixed activations."""
+    def _hung(self, gamma: Array) -> Equilibria:
+        """The twin after its loads are put on at fixed activations."""
         start = self.twin.search(gamma, None, np.zeros(1))
-        return follow(self.twin, gamma, gamma, start, hangs=False)
+        return follow(self.twin, gamma, gamma, start, hangs=False).last
 
     def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
         """Postures at activations (n, bundles); where not found at once, by lines if wanted.
@@ -161,20 +155,12 @@ class Postures:
             self.solver.put(gamma, left, new.only(~new.is_stable | at_rest), equilibria)
 
     def followed(self, gamma: Array) -> Followed:
-        """Branches of the twin from nodes of the flood, or along lines from rest."""
-        return self._from_rest(gamma) if self.flood is None else self._flooded(self.flood, gamma)
+        """Branches of the twin from the nearest node of the flood, or along lines from rest.
 
-    def _from_rest(self, gamma: Array) -> Followed:
-        """Along lines from rest; where nothing holds the twin there, from beside it."""
-        if self.is_held_at_rest:
-            begin = np.repeat(self.rest_activation, len(gamma), axis=0)
-            start = self.rest.of(np.zeros(len(gamma), int))
-        else:
-            begin, start = self._leaning(gamma)
-        return follow(self.twin, begin, gamma, start)
-
-    def _flooded(self, flood: Flood, gamma: Array) -> Followed:
-        """In uncut cells from the nearest node, else from where the lines meet the first cut."""
+        In cut cells they begin where the lines from rest meet the first cut.
+        """
+        if (flood := self.flood) is None:
+            return self._from_rest(gamma)
         uncut = flood.is_uncut(gamma)
         begin, start = flood.nearest(gamma)
         slopes = flood.at(gamma)[0] - start.frame
@@ -190,6 +176,22 @@ class Postures:
             followed.last.put(lost, by_line.last)
         return followed
 
+    def _from_rest(self, gamma: Array) -> Followed:
+        """Along lines from rest; where nothing holds the twin there, from where it leans beside."""
+        rest = self.rest_activation
+        if self.is_held_at_rest:
+            begin = np.repeat(rest, len(gamma), axis=0)
+            return follow(self.twin, begin, gamma, self.rest.of(np.zeros(len(gamma), int)))
+        begin = rest + _FIRST_PARTS[0] * (gamma - rest)
+        if (ring := self._ring) is None:
+            return follow(self.twin, begin, gamma, self._hung(begin))
+        start = self._near_ring(*ring, begin)
+        for part in _FIRST_PARTS[1:]:
+            left = np.flatnonzero(~start.is_found)
+            begin[left] = rest + part * (gamma[left] - rest)
+            start.put(left, self._near_ring(*ring, begin[left]))
+        return follow(self.twin, begin, gamma, start)
+
     def _before_cuts(self, flood: Flood, gamma: Array) -> tuple[Array, Equilibria, Array]:
         """Where lines meet their first cut, else rest; postures there, and changes of frames."""
         rest, clear = self.rest_activation, flood.clear(gamma)[:, None]
@@ -204,19 +206,6 @@ class Postures:
         start.put(lost, self.rest.of(np.zeros(len(lost), int)))
         begin[lost], slopes[lost] = rest, 0.0
         return begin, start, slopes
-
-    def _leaning(self, gamma: Array) -> tuple[Array, Equilibria]:
-        """Places on lines where the twin leans that nothing holds at rest, and how it does."""
-        rest, ring = self.rest_activation, self._ring
-        begin = rest + _FIRST_PARTS[0] * (gamma - rest)
-        if ring is None:
-            return begin, self._hung(begin).last
-        start = self._near_ring(*ring, begin)
-        for part in _FIRST_PARTS[1:]:
-            left = np.flatnonzero(~start.is_found)
-            begin[left] = rest + part * (gamma[left] - rest)
-            start.put(left, self._near_ring(*ring, begin[left]))
-        return begin, start
 
     @lazy
     def _ring(self) -> tuple[Array, float] | None:

@@ -44,17 +44,14 @@ class TipResponse(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PushingTip:
-    """The tip of a rod that pushes along a direction, and on which as much pushes back.
-
-    Args:
-        rod: The rod with its other loads.
-        direction: Unit vector along which the tip pushes.
-        steps: Along the arm.
-    """
+    """The tip of a rod that pushes along a direction, and on which as much pushes back."""
 
     rod: LoadedRod
+    """The rod with its other loads."""
     direction: Array
+    """Unit vector along which the tip pushes."""
     steps: int
+    """Along the arm."""
 
     @lazy
     def _tables(self) -> LoadTables:
@@ -64,12 +61,9 @@ class PushingTip:
         return Solver(self._tables.under(force), steps, self.rod.tol)
 
     def respond(self, gamma: Array, force: float, near: TipResponse | None = None) -> TipResponse:
-        """The tip and its derivatives.
+        """The tip at activations (bundles,) that pushes by a force [N], and its derivatives.
 
-        Args:
-            gamma: Activations, shape (bundles,).
-            force: With which the tip pushes [N].
-            near: Response to begin with; None for the posture.
+        It is searched near another response, or is that of the posture.
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
         if near is None:

@@ -1,4 +1,4 @@
-"""The loaded rod: an arm under gravity, payload and forces, and the steps that it needs.
+"""The loaded rod: an arm under gravity, payload and forces, its steps, and tendons along it.
 
 Steps, theory (72): the pilot of the free rod is solved with n and with 2n steps; n is the smallest
 number, no smaller than the phase of the loads needs, whose largest difference, doubled for safety,
@@ -11,13 +11,16 @@ margin, and the few that differ more than tenfold what 99 % of all do.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.body import load_number
+from softreach.arm.number import fields_of
+from softreach.arm.tables import Works, quadrature
+from softreach.arm.tensions import LengthLaw, PulledTendons
 from softreach.rod.free import ArmRod, FreeRod, add_offset
 from softreach.rod.loaded.held import held_over
 from softreach.rod.loaded.postures import Postures
@@ -42,7 +45,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.lazy import lazy
 
 Differences = Callable[[Solver, Array, Equilibria], Array]
-"""Distances [m] between results of a solver and of its judge, near known equilibria."""
+"""Distances [m] between results of a solver and of its judge, near known equilibria, (n,)."""
 
 _BLOCK = BLOCK // 8  # samples per task
 _RESPONSE_STEPS = 48
@@ -55,6 +58,8 @@ _CRITICAL = 0.02
 _BULK, _OUTLYING = 0.99, 10.0
 _FEW = 64
 _STATIONS = 9
+_PIECES = 8  # of the arm, on which its strains are smooth
+_DIFFERENCE = 1e-4  # of the widest range, for derivatives of works
 
 
 @dataclass(frozen=True, repr=False)
@@ -125,10 +130,12 @@ class LoadedRod(ArmRod):
             solver = self._solver_of(steps)
             equilibria = solver.near(gamma, known)
             settled = equilibria.is_found & (np.abs(equilibria.margin) > _CRITICAL)
-            errors = _bulk(differences(solver, gamma[settled], equilibria.of(settled)))
+            errors = differences(solver, gamma[settled], equilibria.of(settled))
+            errors = errors[np.isfinite(errors)]
             if not len(errors):
                 return _UNJUDGED
-            error = float(errors.max())
+            most = _OUTLYING * np.quantile(errors, _BULK, method="lower")
+            error = float(errors[errors <= most].max())
             if error <= allowed:
                 return steps
             steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
@@ -219,9 +226,7 @@ class LoadedRod(ArmRod):
 
     @lazy
     def _node_tables(self) -> NodeTables:
-        z = np.array([self.end])
-        grid = step_grid(self.arm, z, max(_RESPONSE_STEPS, self.steps))
-        return node_tables(self.arm, z, grid)
+        return _tables_of_response(self, np.array([self.end]))
 
     def held(self, gamma: Array, sizes: tuple[int, ...]) -> Held:
         self.prepare()
@@ -267,14 +272,14 @@ class LoadedRod(ArmRod):
         z, at = np.asarray(framed, float), np.asarray(strained, float)
         known = self.equilibria(gamma)
         walked, status = self._walked(gamma, known, z)
-        frames = walked.frames
+        frames = walked[:2]
         if not np.array_equal(z, at):
             walked, status = self._walked(gamma, known._replace(status=status), at)
         return Shapes(*frames, *self._shape_solver.strains_under(gamma, at, walked), status)
 
     def with_moments(self, gamma: Array, z: Array) -> tuple[Frames, Array, Status]:
         walked, status = self._walked(gamma, self.equilibria(gamma), z)
-        return walked.frames, walked.moment, status
+        return Frames(*walked[:2]), walked.moment, status
 
     def _walked(self, gamma: Array, known: Equilibria, z: Array) -> tuple[LoadedShapes, Status]:
         """Shapes of known equilibria, undecided where steps that end at Z [m] do not find them."""
@@ -302,25 +307,93 @@ class _ContinuedRod(LoadedRod):
         return self.origin._shape_solver
 
 
-def _bulk(distances: Array) -> Array:
-    """Without those that are far larger than nearly all."""
-    known = distances[np.isfinite(distances)]
-    if not len(known):
-        return known
-    return known[known <= _OUTLYING * np.quantile(known, _BULK, method="lower")]
-
-
 def tip_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
     """Between tips."""
-    return _distances(known.tips, solver.judge().near(gamma, known).tips)
+    return np.linalg.norm(known.tips - solver.judge().near(gamma, known).tips, axis=1)
 
 
 def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
-    """Between centerlines, along the arm."""
-    stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
-    shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.judge())]
-    return _distances(*(shape.position for shape in shapes)).max(axis=1, initial=0.0)
+    """Between centerlines, the largest along the arm."""
+    z = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
+    here, there = (each.shapes(gamma, z, known).position for each in (solver, solver.judge()))
+    return np.linalg.norm(here - there, axis=2).max(axis=1, initial=0.0)
 
 
-def _distances(a: Array, b: Array) -> Array:
-    return np.linalg.norm(a - b, axis=-1)
+def _tables_of_response(rod: ArmRod, stations: Array) -> NodeTables:
+    grid = step_grid(rod.arm, stations, max(_RESPONSE_STEPS, rod.steps))
+    return node_tables(rod.arm, stations, grid)
+
+
+@dataclass(frozen=True)
+class LoadedTendons(PulledTendons):
+    """Works of tendons driven by length, or held by guides, on the strains of equilibria."""
+
+    law: LengthLaw = field(compare=False)
+    """That of the arm without loads."""
+    rod: ArmRod
+    """The map of the inner arm under loads, accurate enough for s."""
+
+    def works(self, inner: Array, which: Works) -> Array:
+        z, force, moment = self._known.get(which) or self._loads(which)
+        strains = self.rod.strains(inner, z)
+        turn = (strains.curvature * strains.extension[..., None]).reshape(len(inner), 1, -1)
+        # One product for each sample, so that none depends on those beside it.
+        work = np.matmul(strains.extension[:, None] - 1.0, force) + np.matmul(turn, moment)
+        return work[:, 0]
+
+    @lazy
+    def _known(self) -> dict[Works, tuple[Array, Array, Array]]:
+        return {}
+
+    def _loads(self, which: Works) -> tuple[Array, Array, Array]:
+        arm = self.law.arm
+        turns = [
+            abs(each.value_on("revolution", arm.profile, arm.section))
+            for each in arm.actuators
+            if "revolution" in fields_of(type(each))
+        ]
+        z, weights, _ = quadrature(arm, _PIECES + int(max(turns, default=0.0)))
+        force, moment = which.loads_at(z, weights)
+        self._known[which] = z, force, moment.reshape(3 * len(z), len(which.columns))
+        return self._known[which]
+
+    def continued_from(self, inner: Array, frames: Array | None = None) -> LoadedTendons:
+        """Those of the arm in its posture at activations of the inner arm, shape (k, bundles)."""
+        rod = self.rod.continued_from(inner, frames)
+        assert isinstance(rod, ArmRod)
+        return replace(self, rod=rod)
+
+    def work_slopes(self, inner: Array, each: list[Works]) -> list[Array]:
+        """Derivatives of works, (n, work, bundle) each; NaN where activations are."""
+        counts = [len(which.columns) for which in each]
+        slopes = np.full((len(inner), sum(counts), inner.shape[1]), np.nan)
+        known = ~np.isnan(inner).any(axis=1)
+        slopes[known] = self._slopes(inner[known], each)
+        return np.split(slopes, np.cumsum(counts)[:-1], axis=1)
+
+    def _slopes(self, inner: Array, each: list[Works]) -> Array:
+        """Exact where loads have a linear response, else by central differences."""
+        if self._table is not None:
+            z = self._table.stations
+            loads = [which.loads_at(z.ravel(), np.ones(z.size)) for which in each]
+            unit = [np.concatenate([moment, force[:, None]], axis=1) for force, moment in loads]
+            unit_loads = np.concatenate(unit, axis=2).reshape(*z.shape, 4, -1)
+            state = rod_state(self.rod, inner, self._table)
+            return linear_response(self._table, state, [], unit_loads).works
+        widths = _DIFFERENCE * self.rod.box.widths
+        slopes = np.zeros((len(inner), sum(len(which.columns) for which in each), len(widths)))
+        for k in np.flatnonzero(widths > 0):
+            ends = [inner.copy(), inner.copy()]
+            ends[0][:, k] -= widths[k]
+            ends[1][:, k] += widths[k]
+            s = [np.hstack([self.works(end, which) for which in each]) for end in ends]
+            slopes[..., k] = (s[1] - s[0]) / (2.0 * widths[k])
+        return slopes
+
+    @lazy
+    def _table(self) -> NodeTables | None:
+        """Tables for the linear response."""
+        try:
+            return _tables_of_response(self.rod, np.empty(0))
+        except InvalidLoads:  # that it does not know
+            return None

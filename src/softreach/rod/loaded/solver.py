@@ -16,7 +16,7 @@ from softreach.kernels.loaded.response import TRACE, respond
 from softreach.rod.free import linear_strains, per_length, tables_at
 from softreach.rod.loaded.tables import LoadTables, StepTables
 from softreach.rod.steps import enough_for_all_breaks
-from softreach.rod.tip_map import Frames, Status, Strains, TipStatus, has_tip
+from softreach.rod.tip_map import Status, Strains, TipStatus, has_tip
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy
@@ -78,25 +78,16 @@ class LoadedShapes(NamedTuple):
     force: Array
     """n [N] in the directors."""
 
-    @property
-    def frames(self) -> Frames:
-        """Centerlines and directors."""
-        return Frames(self.position, self.directors)
-
 
 @dataclass(frozen=True, eq=False)
 class Solver:
-    """Equilibria with a given number of steps.
-
-    Args:
-        tables: Of the arm and its loads.
-        steps: Least number of steps; no fewer than the phase of the loads needs.
-        tol: Largest tip error, in L, of which the search uses up a hundredth.
-    """
+    """Equilibria with a given number of steps."""
 
     tables: LoadTables
     steps: int
+    """Least number of steps; no fewer than the phase of the loads needs."""
     tol: float
+    """Largest tip error, in L, of which the search uses up a hundredth."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "steps", max(self.steps, self.tables.phase.fewest_steps))
@@ -111,12 +102,9 @@ class Solver:
         return Solver(self.tables, steps, self.tol)
 
     def search(self, gamma: Array, guesses: Array | None, shares: Array = ALL_LOADS) -> Equilibria:
-        """Searches under shares of the loads, from frames or from the unloaded arm.
+        """Searches at (n, bundles) under shares of the loads, (n,), or (1,) for all.
 
-        Args:
-            gamma: Activations, shape (n, bundles).
-            guesses: Frames as in `Equilibria`; None for those of the unloaded arm.
-            shares: Of the loads, shape (n,), or (1,) for all.
+        They begin from frames as in `Equilibria`, or from those of the unloaded arm.
         """
         limits = _WIDEST, _SMALL, max(_OF_TOL * self.tol, 1e-13)
         return self._shot(gamma, guesses, self._steps, limits, shares)
@@ -131,8 +119,7 @@ class Solver:
         walks: tuple[int, int] = _WALKS,
     ) -> Equilibria:
         """Searches on any steps; see `solve_directions`."""
-        tables = self.tables
-        size = tables.frame_size
+        tables, size = self.tables, self.tables.frame_size
         out = np.empty((len(gamma), 5 + size))
         solve = kernels.solve_directions if tables.one_direction else kernels.solve_frames
         given = np.zeros((0, size)) if guesses is None else np.ascontiguousarray(guesses)
@@ -242,20 +229,9 @@ class Solver:
         return seen.reshape(len(gamma), self.tables.frame_size)
 
     def respond(
-        self,
-        gamma: Array,
-        known: Equilibria,
-        *,
-        compliance: bool = False,
-        directors: bool = False,
+        self, gamma: Array, known: Equilibria, *, compliance: bool = False, directors: bool = False
     ) -> tuple[Array, Array, Array]:
-        """Derivatives of tips, theory (74); NaN where there is no equilibrium.
-
-        Args:
-            gamma: Activations (n, bundles).
-            known: Their equilibria, with these steps.
-            compliance: Whether ∂r/∂F is wanted.
-            directors: Whether the directors of the tips are.
+        """Derivatives of tips at equilibria with these steps, theory (74); NaN where there is none.
 
         Returns:
             (v, ω) per activation, shape (n, 6, bundles); ∂r/∂F [m/N], shape (n, 3, 3) or (0, 3, 3);
@@ -273,12 +249,9 @@ class Solver:
         return twists, yields, shapes.directors[:, 0]
 
     def shapes(self, gamma: Array, stations: Array, known: Equilibria) -> LoadedShapes:
-        """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
+        """Arms at ascending stations Z [m], if any; NaN where there is no equilibrium.
 
-        Args:
-            gamma: Activations (n, bundles).
-            stations: Ascending Z [m]; there may be none.
-            known: Their equilibria, with these steps or others.
+        The equilibria at activations (n, bundles) are known with these steps or others.
         """
         position, moment, force = np.empty((3, len(gamma), len(stations), 3))
         shapes = LoadedShapes(position, np.empty((*position.shape, 3)), moment, force)

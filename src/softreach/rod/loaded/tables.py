@@ -26,8 +26,7 @@ from softreach.support.lazy import lazy
 
 PHASE_OF_SEGMENT = 4.0  # [rad]
 MOST_SEGMENTS = 64
-SHOT_AT_ONCE = 20.0
-"""Phase up to which one segment is shot [rad]; e^20 roundings are 1e-7 rad."""
+SHOT_AT_ONCE = 20.0  # [rad] of phase, up to which one segment is shot: e^20 roundings are 1e-7 rad
 _MOST_PHASE = math.pi / 2.0
 _MOST_STEPS = 1 << 16
 _STATIONS = 65
@@ -49,11 +48,6 @@ class LoadPhase(NamedTuple):
     """Z from base to tip [m], shape (station,)."""
     along: Array
     """Phase from the base to there [rad], shape (station,)."""
-
-    def parted(self, count: int) -> Array:
-        """Z between so many parts of equal phase [m], from tip to base, shape (count - 1,)."""
-        wanted = self.along[-1] * (1.0 - np.arange(1, count) / count)
-        return np.interp(wanted, self.along, self.stations)
 
     @property
     def fewest_steps(self) -> int:
@@ -119,7 +113,8 @@ class LoadTables:
     def nodes(self) -> Array:
         """Z of the nodes between tip and base [m], even in phase, from tip to base."""
         segments = max(1, math.ceil(min(self.phase.entire / self.longest, MOST_SEGMENTS)))
-        return self.phase.parted(segments)
+        wanted = self.phase.along[-1] * (1.0 - np.arange(1, segments) / segments)
+        return np.interp(wanted, self.phase.along, self.phase.stations)
 
     @property
     def segments(self) -> int:
@@ -164,27 +159,21 @@ class LoadTables:
     def at_tip(self) -> Array:
         """Weight of the payload along the axes, its lever, force and moment that follow, (12,)."""
         loads = self.loads
-        weight = self.axes @ self._weight
+        weight = self.axes @ (loads.payload * np.array(loads.gravity))
         parts = weight, loads.payload_arm, loads.follower_force, loads.follower_moment
         return np.concatenate([np.array(part, float) for part in parts])
 
     @property
-    def _weight(self) -> Array:
-        """Of the payload [N]."""
-        return self.loads.payload * np.array(self.loads.gravity)
-
-    @property
-    def _at_tip(self) -> Array:
-        return self._weight + np.array(self.loads.tip_force)
+    def _tip_force(self) -> Array:
+        """Dead force on the tip with the weight of the payload [N]."""
+        return self.loads.payload * np.array(self.loads.gravity) + np.array(self.loads.tip_force)
 
     @property
     def _dead_forces(self) -> Array:
         """Along which dead forces act, shape (force, 3)."""
         loads, last = self.loads, [] if self.direction is None else [self.direction]
-        points = [load.force for load in loads.point_loads]
-        return np.array(
-            [loads.gravity, loads.force_per_length, self._at_tip, *points, *last], float
-        )
+        forces = [loads.gravity, loads.force_per_length, self._tip_force]
+        return np.array([*forces, *(load.force for load in loads.point_loads), *last], float)
 
     @lazy
     def phase(self) -> LoadPhase:
@@ -202,10 +191,8 @@ class LoadTables:
             force, softest = self._largest_force(z), np.maximum(bending, torsion)
             swing = force * (1.0 + force * axial) * softest + (0.5 * moment * softest) ** 2
             table = tables(arm, z)
-            longest, grown = (
-                1.0 + ends_over(part, arm.bounds).T
-                for part in (table.extension, table.rest_length_factor)
-            )
+            longest = 1.0 + ends_over(table.extension, arm.bounds).T
+            grown = 1.0 + ends_over(table.rest_length_factor, arm.bounds).T
             relative = grown[1] / longest[0] if table.has_forces else 1.0
             squeeze = float((force * axial * relative).max())
             rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
@@ -266,7 +253,7 @@ class LoadTables:
         pieces[:, 3::4, -1] += self.twist  # u3 at rest
         measure = width * profile.radius(inward)
         axial, bending, torsion = (c[..., None] for c in compliance(self.arm, inward))
-        force = self._forces(z) @ self.axes.T
+        force, moments = self._dead_loads(z)
         scalars = np.concatenate([bending, torsion - bending, axial, force], axis=-1)
         inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
         return StepTables(
@@ -274,31 +261,22 @@ class LoadTables:
             rest_frames.pack_lengths(measure, at.extension, at.rest_length_factor),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature),
-            self._moments(ends[:-1]),
+            moments,
             np.array([0, *inner, len(edges) - 1], np.int64),
         )
 
-    def _forces(self, z: Array) -> Array:
-        """Dead force n [N] at the nodes of steps, theory (60), (step, 5, 3)."""
+    def _dead_loads(self, z: Array) -> tuple[Array, Array]:
+        """Force [N] at nodes, theory (60), (step, 5, 3), moment at tip ends of steps, (step, 3)."""
         loads, length, order = self.loads, self.arm.length, z.ravel()
         half = 0.5 * (np.concatenate([[length], order[:-1]]) - order)
         mass = self._mass_per_length(order[:, None] + half[:, None] * (1.0 + _GAUSS))
         beyond = np.cumsum(half * (mass @ _WEIGHTS)).reshape(z.shape)
-        force = self._at_tip + beyond[..., None] * np.array(loads.gravity)
+        force = self._tip_force + beyond[..., None] * np.array(loads.gravity)
         force = force + (length - z)[..., None] * np.array(loads.force_per_length)
-        for load in loads.point_loads:
-            force[_step_inward(z[:, 0], load.station) :] += load.force
-        return force
-
-    def _moments(self, z: Array) -> Array:
         moments = np.zeros((len(z), 3))
-        moments[0] = self.axes @ np.array(self.loads.tip_moment)
-        for load in self.loads.point_loads:
-            step = _step_inward(z, load.station)
+        moments[0] = self.axes @ np.array(loads.tip_moment)
+        for load in loads.point_loads:  # on the base they act on no step
+            step = np.abs(z[:, 0] - load.station).argmin() if load.station > 0.0 else len(z)
+            force[step:] += load.force
             moments[step : step + 1] += self.axes @ np.array(load.moment)
-        return moments
-
-
-def _step_inward(ends: Array, station: float) -> int:
-    """The step whose tip end, of these, is the station; one past the last for the base."""
-    return int(np.argmin(np.abs(ends - station))) if station > 0.0 else len(ends)
+        return force @ self.axes.T, moments
