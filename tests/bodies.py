@@ -1,7 +1,5 @@
 """What arms are made of, for tests of loaded rods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Arms of every kind: random sections of layers, profiles and actuators, driven within reason."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Designs and oracles that the laws are tested with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

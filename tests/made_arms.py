@@ -1,7 +1,5 @@
 """An arm for each kind of actuator, and one in which they, rings and a bent profile meet."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from softreach.arm import (

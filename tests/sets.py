@@ -1,7 +1,5 @@
 """Reachable sets, asked for as solids, and whether a surface is closed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from softreach.arm import Manipulator, designs

@@ -3,8 +3,6 @@
 `theory (7)` or `theory (21) and (22)` cites equations, `[Blanes2000]` literature.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command line: what it prints, what it refuses, what its exit codes mean."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

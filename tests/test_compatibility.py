@@ -1,7 +1,5 @@
 """Files of released versions, in `tests/data/kept`, open as docs/compatibility.md says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

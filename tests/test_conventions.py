@@ -1,7 +1,5 @@
 """What the picture of conventions says is so, and it is the picture that the script draws."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tools.conventions import CHAMBER, DPI, FIBER, PICTURE, STRAIGHT, TENDON, WINDING, arm_with

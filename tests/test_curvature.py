@@ -1,7 +1,5 @@
 """Laws of curvature statistics: what streaming must not change, and what taper does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

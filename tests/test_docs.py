@@ -18,8 +18,6 @@ A fence in `README.md` or `docs/` is one of these, or the test fails:
 Where no `text` follows, Python and commands are executed with few samples.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import json

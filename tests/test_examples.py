@@ -1,7 +1,5 @@
 """Scripts of users run as they stand, from a wheel that is installed outside the clone."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Laws of exports: what a format's own reader finds is what was written, whole or not at all."""
 
-from __future__ import annotations
-
 import sys
 import zipfile
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """Laws of figures that turn in a browser: what the page holds is what was given to it."""
 
-from __future__ import annotations
-
 import base64
 import html
 import json

@@ -1,7 +1,5 @@
 """A figure that turns, in a browser: it is drawn, a drag turns it, and it asks nobody."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Volumes by what flows through the faces: maps of known volume, and when they are believed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

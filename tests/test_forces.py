@@ -1,7 +1,5 @@
 """Laws of the blocked force: what balances it, what ends it, and that none is larger."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 

@@ -4,8 +4,6 @@ ActiveFilaments.jl, by the theory's authors, integrates the same rod in Julia wi
 method. Its README, section "Computing an activated configuration", prints position and directors of
 one filament at Z = L/10 (https://github.com/LivingMatterLab/ActiveFilaments.jl, commit 0bf8286)."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Bundles held at one activation are no variables: the others are solved for as if alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

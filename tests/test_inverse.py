@@ -1,7 +1,5 @@
 """The inverse problem: every branch, nearest points, least change."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

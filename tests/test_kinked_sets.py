@@ -1,7 +1,5 @@
 """Sets of maps with kinks, by laws: drives with dead zones, tendons that go slack."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What loaded arms hold without a snap: sheets of postures, their shares and their surfaces."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Laws of pictures and files of arms of every kind: nothing is lost, everything has its size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Free memory: what a container leaves of its limit."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 import threading

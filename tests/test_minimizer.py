@@ -1,7 +1,5 @@
 """Minima inside bounds, and the gradients that lead there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.optimize import lsq_linear

@@ -1,7 +1,5 @@
 """The rules for public names: every name that a user may type obeys them."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import inspect

@@ -1,7 +1,5 @@
 """The boundary by the faces of the activation box: whole and sharp where a raster frays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Laws of the report: complete, continued where it stopped, whole in one file."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace

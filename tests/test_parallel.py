@@ -1,7 +1,5 @@
 """Tasks on threads: their order, how many there are, and what they raise."""
 
-from __future__ import annotations
-
 import threading
 import time
 from functools import partial

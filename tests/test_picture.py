@@ -1,7 +1,5 @@
 """Laws of the rasterizer: what is nearest shows, where the projection says, whatever the order."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

@@ -1,7 +1,5 @@
 """Regions that arms reach in one plane, by Green's theorem, by pixels and by hand."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Laws of pictures: what a color says, and that data lie where the axes say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

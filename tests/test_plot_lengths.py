@@ -1,7 +1,5 @@
 """One law for all figures: what an axis says it counts in is what it counts in, at L = 0.3 m."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from types import SimpleNamespace

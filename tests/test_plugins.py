@@ -1,7 +1,5 @@
 """Parts of one's own on the command line: imported when asked for, then like softreach's."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest

@@ -1,7 +1,5 @@
 """D̄ of real and of made-up clouds, and what is said of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

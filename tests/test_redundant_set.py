@@ -1,7 +1,5 @@
 """Reachable sets of four free bundles and more: volumes known otherwise, memory, refusals."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

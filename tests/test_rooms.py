@@ -1,7 +1,5 @@
 """Law of the rooms: imports go down (import-linter) and never round, inside rooms either."""
 
-from __future__ import annotations
-
 import grimp
 
 

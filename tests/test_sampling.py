@@ -1,7 +1,5 @@
 """Samplers: points of the unit cube that depend on their four arguments alone."""
 
-from __future__ import annotations
-
 import csv
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Laws of the tip's compliance: closed forms, differences of tips, and what its ellipsoids say."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

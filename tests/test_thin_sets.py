@@ -1,7 +1,5 @@
 """Thin shells, which slender tendon robots reach: volumes, corners, hulls, thickness."""
 
-from __future__ import annotations
-
 import itertools
 import json
 

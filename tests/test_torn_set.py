@@ -1,7 +1,5 @@
 """The reachable set of maps that are torn, or stable in a part of the box only."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Laws of tubes and ribbons: closed, outward, and of the volume that they should have."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

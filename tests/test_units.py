@@ -1,7 +1,5 @@
 """Units that a user chooses: what is shown, written and typed in mm is what it is in m."""
 
-from __future__ import annotations
-
 import math
 import re
 

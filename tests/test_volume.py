@@ -1,7 +1,5 @@
 """The public hulls: what they state, what they warn of, what they refuse."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Derivatives of the reachable volume: against differences, laws of scale, and what is refused."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The reachable set: known volumes, clouds inside it, and what is said of curves and surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

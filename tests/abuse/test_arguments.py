@@ -1,7 +1,5 @@
 """Arguments that no function is meant for: each converter and each public function refuses them."""
 
-from __future__ import annotations
-
 import inspect
 import math
 

@@ -1,7 +1,5 @@
 """Stores damaged in any file, any way: noticed, named in one line, mended by the same command."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

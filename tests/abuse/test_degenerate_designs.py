@@ -1,7 +1,5 @@
 """Designs at the edges of what an arm can be: numbers that mean something, or a clear refusal."""
 
-from __future__ import annotations
-
 import json
 import math
 

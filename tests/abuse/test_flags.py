@@ -1,7 +1,5 @@
 """Numbers and options that no command can use: each is refused in one line, before any work."""
 
-from __future__ import annotations
-
 import typing
 
 import pytest

@@ -1,7 +1,5 @@
 """A signal ends a command at any moment: in one line, with its exit code, and nothing half-done."""
 
-from __future__ import annotations
-
 import os
 import pty
 import random

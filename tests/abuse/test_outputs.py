@@ -1,7 +1,5 @@
 """Outputs appear whole or not at all, and replace nothing unasked; both before any work."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

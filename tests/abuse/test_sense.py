@@ -1,7 +1,5 @@
 """Numbers, names, labels and files that mean nothing: refused where they enter, in one line."""
 
-from __future__ import annotations
-
 import zipfile
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Spaces of designs and metrics as nobody should ask for them: refused in one line."""
 
-from __future__ import annotations
-
 import pytest
 
 import softreach as sr

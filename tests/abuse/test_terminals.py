@@ -1,7 +1,5 @@
 """Whatever a terminal can show, and whether or not there is one, a command says what it has to."""
 
-from __future__ import annotations
-
 import io
 import os
 import subprocess

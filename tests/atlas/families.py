@@ -1,7 +1,5 @@
 """Small families of designs and what is built of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Scripts that build an atlas in processes of their own, to be killed."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import textwrap

@@ -1,7 +1,5 @@
 """Whoever computes an atlas, threads, processes or a cluster, the numbers are the same."""
 
-from __future__ import annotations
-
 import os
 import signal
 import textwrap

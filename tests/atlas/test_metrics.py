@@ -1,7 +1,5 @@
 """Metrics of an atlas: what they say of the paper's designs, and how they scale."""
 
-from __future__ import annotations
-
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """An atlas that is read: its clouds, designs, best designs, and its figures."""
 
-from __future__ import annotations
-
 import json
 import pickle
 import re

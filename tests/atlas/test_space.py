@@ -1,7 +1,5 @@
 """The designs of a space: every combination, lists, samples, and how they are written."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

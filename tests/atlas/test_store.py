@@ -1,7 +1,5 @@
 """The store of an atlas: begun by several at once, killed, elsewhere, damaged."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import shutil
