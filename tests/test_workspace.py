@@ -21,7 +21,6 @@ from tests.sets import is_closed, solid, trunk_at
 
 @pytest.fixture(scope="module")
 def best(trunk: Manipulator) -> ReachableSet:
-    """The paper's best design."""
     return solid(trunk)
 
 
