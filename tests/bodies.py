@@ -1,7 +1,5 @@
 """What arms are made of, for tests of loaded rods."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
@@ -52,13 +50,11 @@ def of_body(arm: Manipulator, body: Measured, loads: Loads) -> Manipulator:
 
 
 def straight(body: Measured, loads: Loads, steps=32) -> Solver:
-    """The solver of a straight passive rod of 1 m."""
     arm = designs.minimal_trunk(taper=0.0).with_bounds(np.zeros((3, 2)))
     return Solver(LoadTables(arm=of_body(arm, body, loads)), steps, 1e-10)
 
 
 def by_lines(solver: Solver, gamma: np.ndarray) -> Equilibria:
-    """Postures found along lines from rest alone."""
     equilibria = solver.empty(len(gamma))
     Postures(solver).by_line(gamma, np.arange(len(gamma)), equilibria)
     return equilibria
@@ -68,17 +64,10 @@ def oracle_rod(arm: Manipulator, gamma, loads: Loads) -> tuple[rod.Rod, rod.Load
     """An activated arm and its loads as the oracles take them."""
     breaks = tuple(arm.breakpoints)
     at = _polynomials(lambda z: _sections(arm, gamma, z), sorted({0.0, *breaks, arm.length}))
-    return rod.Rod(
-        length=arm.length,
-        axial=lambda z: at(z)[0],
-        bending=lambda z: at(z)[1],
-        torsion=lambda z: at(z)[2],
-        mass=lambda z: at(z)[3],
-        stretch=lambda z: at(z)[4],
-        rest_length_factor=lambda z: at(z)[5],
-        curvature=lambda z: at(z)[6:],
-        breaks=breaks,
-    ), rod.Loads(
+    names = "axial", "bending", "torsion", "mass", "stretch", "rest_length_factor"
+    along = {name: (lambda z, k=k: at(z)[k]) for k, name in enumerate(names)}
+    along["curvature"] = lambda z: at(z)[6:]
+    return rod.Rod(length=arm.length, breaks=breaks, **along), rod.Loads(
         gravity=loads.gravity,
         payload=loads.payload,
         lever=loads.payload_arm,
@@ -99,18 +88,20 @@ def _sections(arm: Manipulator, gamma, z):
     table, yields = tables(arm, z), compliance(arm, z)
     stiff = [1.0 / np.maximum(one, 1e-300) for one in yields]
     stretch, eta = 1.0 + table.extension @ gamma, 1.0 + table.rest_length_factor @ gamma
-    bend = table.curvature @ gamma
     mass = np.zeros(len(z))
     if any(arm.loads.gravity):
         mass = arm.section.mass_per_length_at(arm.profile, z)
-    return np.column_stack([*stiff, mass, stretch, eta, bend])
+    return np.column_stack([*stiff, mass, stretch, eta, table.curvature @ gamma])
 
 
 def _polynomials(values: Callable, ends: list[float]) -> Callable:
     """Smooth functions of Z as fast polynomials between ends, exact but for rounding."""
     orders = np.arange(_DEGREE + 1)
     pieces = [(0.5 * (a + b), 0.5 * (b - a)) for a, b in pairwise(ends)]
-    coefficients = [_coefficients(values, *piece) for piece in pieces]
+    coefficients = [
+        chebyshev.chebinterpolate(lambda x, m=middle, h=half: values(m + h * x), _DEGREE)
+        for middle, half in pieces
+    ]
 
     @lru_cache(maxsize=8)
     def at(z: float):
@@ -122,11 +113,5 @@ def _polynomials(values: Callable, ends: list[float]) -> Callable:
     return at
 
 
-def _coefficients(values: Callable, middle: float, half: float):
-    """Of Chebyshev polynomials."""
-    return chebyshev.chebinterpolate(lambda x: values(middle + half * x), _DEGREE)
-
-
 def posture_shapes(solver, gamma, stations):
-    """Shapes of the postures of activations."""
     return solver.shapes(gamma, stations, Postures(solver).find(gamma))

@@ -1,7 +1,5 @@
 """An actuator of a kind that the library does not know: a cable parallel to the axis."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Shared fixtures, and what is said of tests that were skipped."""
 
-from __future__ import annotations
-
 import gc
 import json
 import os

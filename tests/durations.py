@@ -5,8 +5,6 @@ function with its slowest fixture; the slowest of its cases counts. `pytest --re
 what is slow only where those before it are left out, as it is the first to use something.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Arms of every kind: random sections of layers, profiles and actuators, driven within reason."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -82,7 +80,6 @@ def stations(draw: st.DrawFn) -> tuple[float, ...]:
 
 
 def values_at(places: tuple[float, ...], low: float, high: float) -> st.SearchStrategy:
-    """One number for each of the places."""
     return st.tuples(*[number(low, high, allow_subnormal=False) for _ in places])
 
 
@@ -138,7 +135,8 @@ def actuators(draw: st.DrawFn, section: Section, kind: type[Actuator] | None = N
             activation_bounds=(0.0, 1.0),
             **common,
         )
-    common |= {"extent": draw(number(0.05, 0.9)), "ring": draw(_rings(section))}
+    rings = [*(ring.name for ring in section.rings), *range(len(section.rings))]
+    common |= {"extent": draw(number(0.05, 0.9)), "ring": draw(st.sampled_from(rings))}
     if kind is RadialMuscle:
         return RadialMuscle(**common)
     if kind is ObliqueMuscle:
@@ -148,23 +146,15 @@ def actuators(draw: st.DrawFn, section: Section, kind: type[Actuator] | None = N
     return FiberArchitecture(**{winding: turn}, **common)
 
 
-def _rings(section: Section) -> st.SearchStrategy:
-    names = [ring.name for ring in section.rings]
-    return st.sampled_from([*names, *range(len(names))])
-
-
 @st.composite
 def _tendons(draw: st.DrawFn, common: dict) -> Tendon:
+    turn = {"revolution": draw(number(-3, 3))}
     if draw(st.booleans()):
-        turn = {"revolution": draw(number(-3, 3))}
-    else:
         places = draw(stations())
-        turn = {
-            "routing": Samples(stations_over_length=places, values=draw(values_at(places, -2, 2)))
-        }
-    return Tendon(
-        distance_ratio=draw(number(0.1, 1.0)), activation_bounds=(0.0, 1.0), **turn, **common
-    )
+        values = draw(values_at(places, -2, 2))
+        turn = {"routing": Samples(stations_over_length=places, values=values)}
+    distance = draw(number(0.1, 1.0))
+    return Tendon(distance_ratio=distance, activation_bounds=(0.0, 1.0), **turn, **common)
 
 
 def fibers_and_a_tendon() -> Manipulator:

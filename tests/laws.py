@@ -1,10 +1,9 @@
 """Designs and oracles that the laws are tested with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -14,8 +13,14 @@ from softreach.arm.base import POINTS, Base
 from softreach.arm.driving import Driving
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
+from softreach.inverse import Solutions
 
 Array = NDArray[np.float64]
+
+
+def large(*cases: object) -> list:
+    """Cases of a parameter that only `make test-all` has."""
+    return [pytest.param(case, marks=pytest.mark.large) for case in cases]
 
 
 def arm_of(*fibers: FiberArchitecture, **changes: object) -> Manipulator:
@@ -90,9 +95,16 @@ def integrated_tip(arm: Manipulator, gamma: Array) -> Array:
 
 
 def in_box(arm: Manipulator, n: int, seed: int = 1) -> Array:
-    """Random activations within the bounds."""
     cube = np.random.default_rng(seed).random((n, arm.bundles))
     return arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
+
+
+def miss_of_original(solutions: Solutions, gamma: Array) -> Array:
+    """Distance from each original activation to the nearest of those found for its tip."""
+    target = np.repeat(np.arange(len(solutions)), solutions.counts)
+    nearest = np.full(len(solutions), np.inf)
+    np.minimum.at(nearest, target, np.abs(solutions.activations - gamma[target]).max(axis=1))
+    return nearest
 
 
 def differences(f: Callable[[Array], Array], gamma: Array, step: float = 1e-3) -> Array:
@@ -105,7 +117,6 @@ def differences(f: Callable[[Array], Array], gamma: Array, step: float = 1e-3) -
 
 
 def rotvec(angles):
-    """SciPy's rotation by a rotation vector [rad]."""
     from scipy.spatial.transform import Rotation
 
     return Rotation.from_rotvec(angles)

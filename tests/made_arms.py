@@ -1,7 +1,5 @@
 """An arm for each kind of actuator, and one in which they, rings and a bent profile meet."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from softreach.arm import (
@@ -46,32 +44,19 @@ def mixed_arm():
     angle = Samples(stations_over_length=(0, 0.5, 1), values=(0.2, 0.6, 0.1))
     distance = Samples(stations_over_length=(0, 0.5, 1), values=(0.03, 0.012, 0.006))
     routing = Samples(stations_over_length=(0, 0.4, 1), values=(0, 1, 0))
+    right = FiberArchitecture(name="right", ring="skin", helical_angle=angle, extent=0.7)
+    right = right.replace(end_over_length=0.62)
+    other_end = {"start_over_length": 0.21, "end_over_length": 1.0}
+    channel = Chamber(distance_ratio=0.28, radius_ratio=0.12, activation_bounds=(0, 2e4))
     actuators = (
-        FiberArchitecture(
-            name="right", ring="skin", helical_angle=angle, extent=0.7, end_over_length=0.62
-        ),
-        FiberArchitecture(
-            name="left",
-            ring="skin",
-            revolution=-2.0,
-            extent=0.7,
-            offset=0.9,
-            start_over_length=0.21,
-        ),
+        right,
+        right.replace(name="left", revolution=-2.0, offset=0.9, **other_end),
         ObliqueMuscle(name="oblique", ring="inner", helical_angle=-0.5, extent=1.1, offset=2.5),
         RadialMuscle(name="radial", ring="middle", extent=1.0, offset=3.2),
         Tendon(
             name="cable", distance=distance, routing=routing, offset=5.0, activation_bounds=(0, 2)
         ),
-        Chamber(
-            name="channel",
-            distance_ratio=0.28,
-            radius_ratio=0.12,
-            offset=4.7,
-            start_over_length=0.1,
-            end_over_length=0.8,
-            activation_bounds=(0, 2e4),
-        ),
+        channel.replace(name="channel", offset=4.7, start_over_length=0.1, end_over_length=0.8),
     )
     return Manipulator(
         profile=PiecewiseTaper(
@@ -86,9 +71,8 @@ def _tendon_arm():
     """A thin backbone with two segments, and tendons on disks."""
     distal = Tendon(name="distal", distance=0.01, bundles=3, activation_bounds=(0, 0.1))
     proximal = distal.replace(name="proximal", offset=np.pi / 3, end_over_length=0.5)
-    return one_ring_arm(
-        distal, proximal, radius=0.001, rings=(Ring(inner_ratio=0, material=STIFF),)
-    )
+    rings = (Ring(inner_ratio=0, material=STIFF),)
+    return one_ring_arm(distal, proximal, radius=0.001, rings=rings)
 
 
 MADE_ARMS = {

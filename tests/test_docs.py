@@ -18,8 +18,6 @@ A fence in `README.md` or `docs/` is one of these, or the test fails:
 Where no `text` follows, Python and commands are executed with few samples.
 """
 
-from __future__ import annotations
-
 import ast
 import io
 import json
@@ -107,10 +105,16 @@ def test_every_notebook_runs_and_is_stored_without_outputs(notebook, tmp_path, m
 
 
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
-def test_every_fence_is_declared(page):
-    languages = {"python", "bash", "toml", "text", "bibtex", "julia"}
-    found = [match[2].strip() for match in FENCE.finditer(page.read_text(encoding="utf-8"))]
-    assert set(found) <= languages
+def test_fences_are_declared_pictures_exist_and_rows_of_tables_have_a_cell_for_each_head(page):
+    heads, text = 0, page.read_text(encoding="utf-8")
+    languages = {match[2].strip() for match in FENCE.finditer(text)}
+    assert languages <= {"python", "bash", "toml", "text", "bibtex", "julia"}
+    for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
+        assert picture.startswith(address()) or (page.parent / picture).is_file(), picture
+    for line in re.sub(r"(?ms)^```.*?^```", "", text).splitlines():
+        cells = len(re.findall(r"(?<!\\)\|", line)) if line.startswith("|") else 0
+        assert not heads or not cells or cells == heads, line
+        heads = cells
 
 
 def test_every_figure_has_words():
@@ -121,31 +125,14 @@ def test_every_figure_has_words():
 
 
 def test_the_navigation_and_the_pages_are_the_same():
-    named = re.findall(
-        r"(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE
-    )
+    named = re.findall(r"(?m)(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
     assert sorted(named) == [page.name for page in sorted((ROOT / "docs").rglob("*.md"))]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=on_page)
-def test_every_row_of_a_table_has_as_many_cells_as_it_has_heads(page):
-    heads, text = 0, re.sub(r"(?ms)^```.*?^```", "", page.read_text(encoding="utf-8"))
-    for line in text.splitlines():
-        cells = len(re.findall(r"(?<!\\)\|", line)) if line.startswith("|") else 0
-        assert not heads or not cells or cells == heads, line
-        heads = cells
-
-
-@pytest.mark.parametrize("page", PAGES, ids=on_page)
-def test_every_picture_on_a_page_exists(page):
-    for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
-        if not picture.startswith(address()):
-            assert (page.parent / picture).is_file(), picture
-
-
-def test_links_of_the_readme_hold_on_a_package_index():
+def test_the_readme_is_short_and_its_links_hold_on_a_package_index():
     """They are absolute, begin with the address of pyproject.toml, and lead to what exists."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(readme.splitlines()) < 200
     links = re.findall(r"\]\(([^)]+)\)", readme)
     own = [link.removeprefix(address()) for link in links if link.startswith(address())]
     assert len(own) > 10
@@ -155,16 +142,9 @@ def test_links_of_the_readme_hold_on_a_package_index():
 
 
 def test_another_address_is_written_wherever_the_present_one_stands():
-    hosts = [
-        path
-        for path in ROOT.glob("*")
-        if path.is_file() and address() in path.read_text("utf-8", errors="ignore")
-    ]
+    files = (path for path in ROOT.glob("*") if path.is_file())
+    hosts = (path for path in files if address() in path.read_text("utf-8", errors="ignore"))
     assert {path.name for path in hosts} == {*SPELLED_OUT}
-
-
-def test_the_readme_is_short():
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) < 200
 
 
 @pytest.mark.parametrize("picture", sorted((ROOT / "docs").rglob("*.png")), ids=on_page)
@@ -181,7 +161,6 @@ def is_left_out(example):
 
 
 def run_python(example):
-    """Execute a fence and keep what it prints."""
     if is_left_out(example):
         return
     named = FILE.match(example.parsed)
@@ -198,13 +177,11 @@ def run_python(example):
         PythonEvaluator()(example)
 
 
-def is_compared(example):
-    """Whether a text fence says what this one prints."""
+def is_compared(example):  # with the text fence after it
     return example.document.text[example.region.end :].lstrip().startswith("```text")
 
 
 def run_commands(example):
-    """Execute the lines that begin with softreach."""
     if is_left_out(example):
         return
     small = not is_compared(example)
@@ -242,33 +219,22 @@ def _few(arguments):
 
 
 def read_design(example):
-    """Read a fence as a design file, and keep it as one for the commands that follow.
-
-    One of requirements is `needs.toml` to them.
-    """
-    if "[[reach]]" in example.parsed or "[search]" in example.parsed:
-        sr.Requirements.from_toml(example.parsed)
-        Path("needs.toml").write_text(example.parsed, encoding="utf-8")
-        example.namespace["_printed"] = None
-        return
-    sr.Manipulator.from_toml(example.parsed)
-    Path("trunk.toml").write_text(example.parsed, encoding="utf-8")
+    """Read a fence as a file, and keep it for the commands that follow."""
+    needs = "[[reach]]" in example.parsed or "[search]" in example.parsed
+    (sr.Requirements if needs else sr.Manipulator).from_toml(example.parsed)
+    Path("needs.toml" if needs else "trunk.toml").write_text(example.parsed, encoding="utf-8")
     example.namespace["_printed"] = None
 
 
 def compare_output(example):
-    """Hold a text fence against what was printed last."""
     printed = example.namespace.pop("_printed", None)
     assert printed is not None, f"line {example.line}: no executed fence before this output"
     if printed == LONG:
         return
     # Compilation is announced on the first run only, progress on slow machines only.
     passing = ("softreach: compiling", "so far")
-    found = [
-        line
-        for line in printed.splitlines()
-        if not (line.startswith(passing) or line.endswith(passing))
-    ]
+    lines = (line for line in printed.splitlines() if not line.startswith(passing))
+    found = [line for line in lines if not line.endswith(passing)]
     wanted = example.parsed.splitlines()
     assert len(found) == len(wanted), f"line {example.line}: printed {found}"
     for one, other in zip(wanted, found, strict=True):
@@ -276,12 +242,10 @@ def compare_output(example):
 
 
 def same_line(wanted, found):
-    """Whether two lines agree word by word."""
     head, cut, _ = wanted.partition("...")
     want, have = _words(head), _words(found)
-    return (len(have) >= len(want) if cut else len(have) == len(want)) and all(
-        map(_same, want, have)
-    )
+    enough = len(have) >= len(want) if cut else len(have) == len(want)
+    return enough and all(map(_same, want, have))
 
 
 def _words(line):
@@ -303,3 +267,43 @@ def printed_into(example):
     with redirect_stdout(text), redirect_stderr(text):
         yield
     example.namespace["_printed"] = text.getvalue()
+
+
+# What the code cites, `theory (7)`, `theory (21) and (22)` or `[Blanes2000]`, can be looked up
+
+NAMES = ("theory.md", "theory-loads.md", "references.md")
+*SECTIONS, REFERENCES = ((ROOT / "docs" / name).read_text(encoding="utf-8") for name in NAMES)
+THEORY = "".join(SECTIONS)
+EQUATIONS = r"[Tt]heory\s+(\(\d+\)(?:(?:,| and| to)\s+\(\d+\))*)"
+KEY = r"\[([A-Z][A-Za-z]+(?:19|20)\d\d)\]"
+
+
+def texts():
+    for folder in ("src", "docs", "design", "tests", "benchmarks"):
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.suffix in (".py", ".md") and path != Path(__file__):
+                # a citation may be broken over two lines of a comment
+                yield path, re.sub(r"\n\s*#? ?", " ", path.read_text(encoding="utf-8"))
+
+
+def test_every_equation_has_a_number_of_its_own():
+    numbers = re.findall(r"\\tag\{(\d+)\}", THEORY)
+    assert len(numbers) == len(set(numbers))
+    assert THEORY.count("\n$$\n") == 2 * len(numbers)
+
+
+def test_what_is_cited_is_in_the_theory_or_the_references():
+    equations = set(re.findall(r"\\tag\{(\d+)\}", THEORY))
+    literature = set(re.findall(r"^### (\w+)$", REFERENCES, re.MULTILINE))
+    for known, cites, part, citing in (
+        (equations, EQUATIONS, r"\d+", {"magnus.py", "dexterity.py"}),
+        (literature, KEY, r"\w+", {"theory.md", "magnus.py"}),
+    ):
+        cited = {
+            (path.name, one)
+            for path, text in texts()
+            for group in re.findall(cites, text)
+            for one in re.findall(part, group)
+        }
+        assert {name for name, _ in cited} >= citing
+        assert [entry for entry in sorted(cited) if entry[1] not in known] == []

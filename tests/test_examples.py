@@ -1,6 +1,4 @@
-"""Scripts of users run as they stand, from a wheel that is installed outside the clone."""
-
-from __future__ import annotations
+"""Scripts of users run from a wheel outside the clone; pictures of the docs are what they say."""
 
 import os
 import re
@@ -10,15 +8,18 @@ import sys
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
+from tools import conventions
+from tools.conventions import arm_with
 from tools.gallery import PAGE, PICTURES, measured, page, rows_of
 
-import softreach
-from softreach.arm import designs
+import softreach as sr
+from softreach.arm import ObliqueMuscle, RadialMuscle, designs
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "examples"
-SOURCE = Path(softreach.__file__).parent
+SOURCE = Path(sr.__file__).parent
 
 
 @pytest.fixture(scope="session")
@@ -42,9 +43,8 @@ def installed(tmp_path_factory):
 
 
 def printed_by(environment, folder, *command):
-    done = subprocess.run(
-        [*map(str, command)], cwd=folder, env=environment, capture_output=True, text=True
-    )
+    words = [*map(str, command)]
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -56,9 +56,8 @@ def test_the_wheel_is_what_runs(installed, tmp_path):
 
 @pytest.mark.large
 def test_my_tendon_arm(installed, tmp_path):
-    text = printed_by(
-        installed, tmp_path, "bash", EXAMPLES / "tendon_arm.sh", EXAMPLES / "tendon_arm.toml"
-    )
+    script, design = EXAMPLES / "tendon_arm.sh", EXAMPLES / "tendon_arm.toml"
+    text = printed_by(installed, tmp_path, "bash", script, design)
     assert "target (60, 40, -270) mm: reached" in text
     written = {"slices.png", "reachable.html", "reachable.stl", "payload.png"}
     written |= {"cloud.zarr", "cloud.png", "cloud.csv"}
@@ -116,3 +115,48 @@ def test_every_design_has_a_small_picture():
     sizes = {path.stem: path.stat().st_size for path in PICTURES.glob("*.png")}
     assert sorted(sizes) == sorted(designs.__all__)
     assert max(sizes.values()) < 150_000
+
+
+# What the picture of conventions says is so, and it is the picture that the script draws
+
+
+@pytest.mark.parametrize("words", conventions.STRAIGHT)
+def test_straight_actuators_bend_the_way_the_picture_says(words):
+    actuator, activation = conventions.STRAIGHT[words]
+    (tip,) = sr.tip_positions(arm_with(actuator), [[activation]])
+    away = "away" in words
+    assert (tip[0] < -0.1) if away else (tip[0] > 0.1)
+    assert tip[1] == pytest.approx(0, abs=1e-9)
+    extension = sr.configuration(arm_with(actuator), [activation]).extension
+    assert (extension > 1).all() == away
+
+
+def test_positive_angles_turn_from_d1_to_d2_seen_from_the_tip():
+    quarter = conventions.FIBER.replace(offset=np.pi / 2)
+    (tip,) = sr.tip_positions(arm_with(quarter), [[-0.05]])
+    assert tip[1] > 0.01
+    outline = arm_with(conventions.WINDING).outline([0.0, 1.0])
+    assert outline.center[1] - outline.center[0] == pytest.approx(conventions.WINDING.revolution)
+
+
+@pytest.mark.parametrize(
+    ("actuator", "activation", "sign"),
+    [
+        (conventions.WINDING, -0.1, -1),
+        (ObliqueMuscle(helical_angle=0.4, extent=2 * np.pi), -0.1, -1),
+        (conventions.TENDON.replace(revolution=3.0), 10.0, -1),
+        (RadialMuscle(extent=2 * np.pi), -0.1, 0),
+        (conventions.CHAMBER, 1e4, 0),
+    ],
+)
+def test_what_is_right_handed_and_contracts_turns_the_tip_clockwise(actuator, activation, sign):
+    twist = sr.configuration(arm_with(actuator), [activation]).sel(component="u3").curvature
+    np.testing.assert_array_equal(np.sign(np.round(twist, 9)), sign)
+
+
+def test_the_picture_in_the_documentation_is_the_one_that_is_drawn(tmp_path):
+    plt = pytest.importorskip("matplotlib.pyplot")
+    conventions.conventions_figure().savefig(tmp_path / "new.png", dpi=conventions.DPI)
+    old, new = plt.imread(conventions.PICTURE), plt.imread(tmp_path / "new.png")
+    assert old.shape == new.shape, "run python -m tools.conventions"
+    assert np.abs(old - new).mean() < 0.01, "run python -m tools.conventions"

@@ -1,7 +1,5 @@
 """A figure that turns, in a browser: it is drawn, a drag turns it, and it asks nobody."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np
@@ -9,12 +7,12 @@ import pytest
 
 import softreach as sr
 from softreach.plot import plot_3d, save_figure
+from tests.browser import heard
 
 pytest.importorskip("matplotlib.pyplot")
 
 
-def colored(image: np.ndarray) -> int:
-    """Pixels that are neither white nor gray."""
+def colored(image: np.ndarray) -> int:  # pixels
     return int((np.ptp(image, axis=-1) > 0.2).sum())
 
 
@@ -24,12 +22,9 @@ def test_a_page_is_drawn_and_turns_and_zooms_without_a_network(trunk, browser, t
     shape = sr.configuration(trunk, [-1.0, 0.0, -0.4], stations=31)
     figure = plot_3d([sr.compute_cloud(trunk, n=5000), shape], unit="mm", caption="A trunk")
     save_figure(figure, tmp_path / "trunk.html")
-    trouble, requests = [], []
     context = browser.new_context(viewport={"width": 640, "height": 520}, offline=True)
     page = context.new_page()
-    page.on("console", lambda message: trouble.append(message.text))
-    page.on("pageerror", lambda error: trouble.append(str(error)))
-    page.on("request", lambda request: requests.append(request.url))
+    trouble, requests = heard(page)
     space = page.locator("#space")
 
     def drawn(settings: str) -> np.ndarray:

@@ -1,9 +1,7 @@
 """Laws of the blocked force: what balances it, what ends it, and that none is larger."""
 
-from __future__ import annotations
-
-import json
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -33,28 +31,20 @@ UP, SIDE = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 
 
 def under(arm, force, tol=1e-8):
-    """The tip map of the arm with one more force on the tip."""
     loads = arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
     return as_tip_map(arm.replace(loads=loads.replace(tip_force=tuple(force))), tol)
 
 
 @cache
 def blocked(arm, direction, first):
-    """The blocked force of the places of the starts from one on."""
     return blocked_force(arm, None, direction, start=START[first:])
 
 
 @pytest.mark.parametrize(
     ("arm", "direction", "first"),
     [  # the growth from the first start ends where the shape is singular, and takes longest
-        (FREE, UP, 1),
-        (FREE, SIDE, 1),
-        (LOADED, UP, 1),
-        (LOADED, SIDE, 1),
-        pytest.param(LOADED, SIDE, 0, marks=pytest.mark.large),
-        pytest.param(FREE, UP, 0, marks=pytest.mark.large),
-        pytest.param(FREE, SIDE, 0, marks=pytest.mark.large),
-        pytest.param(LOADED, UP, 0, marks=pytest.mark.large),
+        pytest.param(arm, direction, first, marks=() if first else pytest.mark.large)
+        for arm, direction, first in product((FREE, LOADED), (UP, SIDE), (1, 0))
     ],
 )
 def test_the_force_balances_the_tip_at_its_place(arm, direction, first):
@@ -113,7 +103,6 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
     d, width, rod = np.array(direction), np.ptp(arm.bounds, axis=1), as_tip_map(arm)
 
     def gap(x):
-        """The tip of the posture, with twice the steps."""
         acting = tuple(np.array(arm.loads.tip_force) - x[-1] * force * d)
         tables = LoadTables(arm=arm.replace(loads=arm.loads.replace(tip_force=acting)))
         gamma = arm.bounds[:, 0] + x[:-1] * width
@@ -132,9 +121,7 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
     return found.x[-1] * force if np.linalg.norm(gap(found.x)) < 1e-6 else 0.0
 
 
-@pytest.mark.parametrize(
-    ("arm", "start"), [(LOADED, START[1:]), (MANY, MANY_START)], ids=["three", "four"]
-)
+@pytest.mark.parametrize(("arm", "start"), [(LOADED, START[1:]), (MANY, MANY_START)])
 def test_no_optimizer_finds_a_larger_force(arm, start):
     found = blocked_force(arm, None, SIDE, start=start)
     assert found.settles.values[0]
@@ -246,16 +233,15 @@ def test_the_figure_has_the_shares_and_the_largest_payload(curve):
         assert list(point) in line.tolist()
 
 
-def test_the_command_says_the_largest_payload(capsys):
-    command = "payload lce_arm --gravity up --payloads 1g,2g --share 0.85"
-    assert run([*command.split(), "--accuracy", "0.02", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_the_command_says_the_largest_payload(capsys, printed):
+    command = "payload lce_arm --gravity up --payloads 1g,2g --share 0.85 --accuracy 0.02"
+    found = printed(*command.split())
     assert found["largest_payload_kg"] == pytest.approx(0.0015, abs=2e-4)
     assert found["payload_kg"] == [0.0, 0.001, 0.002]
     assert found["share"][0] == 1.0
     assert 0 < found["share_error"][1] < 0.05
-    rough = ["--gravity", "up", "--payloads", "1g", "--accuracy", "0.1"]
-    assert run(["payload", "lce_arm", "--payload", "3g", *rough]) == 0
+    own = "payload lce_arm --payload 3g --gravity up --payloads 1g --accuracy 0.1"
+    assert run(own.split()) == 0
     assert "take the place of the design's own payload, 0.003 kg" in capsys.readouterr().out
     assert run(["payload", "lce_arm"]) == 2
     assert "this design has no loads; add --gravity down" in capsys.readouterr().err

@@ -4,16 +4,15 @@ ActiveFilaments.jl, by the theory's authors, integrates the same rod in Julia wi
 method. Its README, section "Computing an activated configuration", prints position and directors of
 one filament at Z = L/10 (https://github.com/LivingMatterLab/ActiveFilaments.jl, commit 0bf8286)."""
 
-from __future__ import annotations
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import softreach as sr
-from softreach.arm import (
-    designs,
-)
-from softreach.atlas import DesignSpace, atlas_cloud
+from softreach.arm import designs
+from softreach.atlas import DesignSpace, atlas_cloud, atlas_status, open_atlas
 from softreach.exchange import activefilaments
 from softreach.export import export_arm
 from softreach.plot import plot_slab
@@ -65,11 +64,9 @@ def test_a_slab_goes_through_the_base_unless_it_is_said_where(hanging):
 
 
 def test_an_atlas_holds_the_box_in_the_world_and_the_reach_from_the_base(trunk, hanging):
-    found = {}
-    for name, arm in (("up", trunk), ("down", hanging)):
-        space = DesignSpace.grid(arm, taper=[0.02])
-        found[name] = sr.build_atlas(space, {}, n=2_000, metrics=["extent"]).isel(taper=0)
-    up, down = found["up"], found["down"]
+    spaces = (DesignSpace.grid(arm, taper=[0.02]) for arm in (trunk, hanging))
+    options = {"n": 2_000, "metrics": ["extent"]}
+    up, down = (sr.build_atlas(space, {}, **options).isel(taper=0) for space in spaces)
     assert float(down.z_max) == pytest.approx(2.0 - float(up.z_min))
     assert float(down.y_min) == pytest.approx(0.2 - float(up.y_max))
     for name in ("reach_height", "reach_radius"):
@@ -88,3 +85,37 @@ def test_the_base_may_vary_over_an_atlas(hanging):
 def test_a_posed_arm_is_no_filament_of_the_other_program(hanging, tmp_path):
     with pytest.raises(InvalidInput, match=r"base = points down.*upright at the origin"):
         activefilaments.write_design(hanging, tmp_path / "arm.jl")
+
+
+# Files of released versions open as docs/compatibility.md says
+
+
+KEPT = Path(__file__).parent / "data" / "kept"
+
+
+@pytest.fixture
+def arm():
+    return sr.Manipulator.load(KEPT / "trunk-0.1.0.toml")
+
+
+def test_a_kept_design_is_the_one_that_was_written(arm):
+    expected = sr.designs.minimal_trunk(revolution=np.radians(108), taper=np.radians(2))
+    there, here = (sr.tip_positions(each, [-1.0, -0.5, 0.0]) for each in (arm, expected))
+    np.testing.assert_allclose(there, here, rtol=0, atol=1e-12)
+
+
+def test_a_kept_cloud_has_the_tips_of_its_samples(arm):
+    cloud = sr.open_cloud(KEPT / "cloud-0.1.0.zarr")
+    assert cloud.attrs["softreach_version"] == "0.1.0"
+    tips = sr.tip_positions(arm, cloud.activation.values)
+    np.testing.assert_allclose(cloud.tip, tips, rtol=0, atol=1e-6)
+    by_xarray = xr.open_zarr(KEPT / "cloud-0.1.0.zarr", consolidated=False)
+    np.testing.assert_array_equal(by_xarray.tip, cloud.tip)
+
+
+def test_a_kept_atlas_has_its_metrics(arm):
+    store = KEPT / "atlas-0.1.0.zarr"
+    assert atlas_status(store).done == 2
+    reached = sr.reachable_set(arm)
+    volume = open_atlas(store).exact_volume.sel(taper=np.radians(2), method="nearest")
+    assert abs(float(volume) - reached.volume) < 2 * reached.volume_error

@@ -1,7 +1,5 @@
 """Bundles held at one activation are no variables: the others are solved for as if alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -11,13 +9,12 @@ from softreach.inverse import Status, prepared_map, solve_inverse
 from softreach.inverse.path import track_path
 from softreach.rod import as_tip_map, configuration, free_bundles, tip_positions
 from softreach.support.errors import InvalidInput
-from tests.laws import in_box
+from tests.laws import in_box, large, miss_of_original
 
 FINE = 1e-9  # arms with and without a bundle have steps of their own, each within this
 
 
 def holding(arm: Manipulator, held: dict[int, float]) -> Manipulator:
-    """A copy with some bundles held."""
     bounds = np.array(arm.bounds)
     for bundle, value in held.items():
         bounds[bundle] = value
@@ -25,7 +22,6 @@ def holding(arm: Manipulator, held: dict[int, float]) -> Manipulator:
 
 
 def without(arm: Manipulator, bundle: int) -> Manipulator:
-    """A copy without an architecture of one bundle."""
     return arm.replace(actuators=(*arm.actuators[:bundle], *arm.actuators[bundle + 1 :]))
 
 
@@ -43,16 +39,7 @@ def test_results_name_the_bundles_that_their_tip_map_has():
     assert path.bundle.values.tolist() == names
 
 
-def five_bundles() -> Manipulator:
-    return designs.redundant_trunk().split("longitudinal 1", 2)
-
-
-def apart(activations: np.ndarray, offsets: np.ndarray, gamma: np.ndarray) -> np.ndarray:
-    """Distance from each activation (t, m) to the nearest of the solutions for its target."""
-    target = np.repeat(np.arange(len(gamma)), np.diff(offsets))
-    nearest = np.full(len(gamma), np.inf)
-    np.minimum.at(nearest, target, np.abs(activations - gamma[target]).max(axis=1))
-    return nearest
+FIVE = designs.redundant_trunk().split("longitudinal 1", 2)
 
 
 @pytest.mark.parametrize("bundle", range(4))
@@ -78,9 +65,7 @@ def test_the_tip_map_of_the_free_bundles_is_that_of_all_on_a_face_of_the_box(bun
     assert free_bundles(part) is part
 
 
-@pytest.mark.parametrize(
-    "bundle", [0, *(pytest.param(k, marks=pytest.mark.large) for k in (1, 2, 3))]
-)
+@pytest.mark.parametrize("bundle", [0, *large(1, 2, 3)])
 def test_one_of_four_bundles_held_at_rest_leaves_every_solution_of_the_arm_without_it(bundle):
     four = designs.redundant_trunk(np.radians(36), np.radians(3))
     held, three = holding(four, {bundle: 0.0}), without(four, bundle)
@@ -100,9 +85,7 @@ def test_one_of_four_bundles_held_at_rest_leaves_every_solution_of_the_arm_witho
     assert np.allclose(found.gaps, expected.gaps, atol=1e-7)
 
 
-@pytest.mark.parametrize(
-    "bundle", [1, *(pytest.param(k, marks=pytest.mark.large) for k in (0, 2, 3))]
-)
+@pytest.mark.parametrize("bundle", [1, *large(0, 2, 3)])
 def test_every_activation_is_found_with_one_of_four_bundles_held_anywhere(bundle):
     arm = holding(designs.redundant_trunk(np.radians(36), np.radians(3)), {bundle: -0.45})
     gamma = in_box(arm, 1000)
@@ -110,28 +93,25 @@ def test_every_activation_is_found_with_one_of_four_bundles_held_anywhere(bundle
     found = solve_inverse(arm, targets)
     assert (found.statuses == Status.REACHED).all()
     assert (found.activations[:, bundle] == -0.45).all()
-    assert apart(found.activations, found.offsets, gamma).max() < 1e-6
+    assert miss_of_original(found, gamma).max() < 1e-6
     finer = solve_inverse(prepared_map(arm, cells=48), targets)
     assert (found.counts != finer.counts).mean() < 2e-3
 
 
-@pytest.mark.parametrize(
-    "pair", [(1, 3), *(pytest.param(p, marks=pytest.mark.large) for p in ((0, 1), (3, 4)))]
-)
+@pytest.mark.parametrize("pair", [(1, 3), *large((0, 1), (3, 4))])
 def test_five_bundles_with_two_held_are_a_problem_of_three(pair):
-    arm = holding(five_bundles(), dict(zip(pair, (-0.2, -0.9), strict=True)))
+    arm = holding(FIVE, dict(zip(pair, (-0.2, -0.9), strict=True)))
     gamma = in_box(arm, 200)
     found = solve_inverse(arm, tip_positions(arm, gamma))
     assert (found.statuses == Status.REACHED).all()
-    assert apart(found.activations, found.offsets, gamma).max() < 1e-6
+    assert miss_of_original(found, gamma).max() < 1e-6
     assert found.residuals.max() < 1e-10
     slopes = np.delete(as_tip_map(arm).tips_and_slopes(found.activations)[1], pair, axis=2)
     assert np.allclose(found.conditions, np.linalg.cond(slopes), rtol=1e-3)
 
 
 def test_five_bundles_with_one_held_at_rest_change_as_little_as_four():
-    five = five_bundles()
-    held, four = holding(five, {2: 0.0}), without(five, 2)
+    held, four = holding(FIVE, {2: 0.0}), without(FIVE, 2)
     targets = tip_positions(four, in_box(four, 5), tol=FINE)
     near = np.array([-0.8, -0.2, -1.0, -0.5])
     found = solve_inverse(held, targets, near=np.insert(near, 2, -7.0), family=2, tol=FINE)

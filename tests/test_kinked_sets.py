@@ -1,7 +1,5 @@
 """Sets of maps with kinks, by laws: drives with dead zones, tendons that go slack."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np
@@ -11,12 +9,10 @@ from softreach.arm import (
     Chamber,
     Drive,
     FiberArchitecture,
-    LinearTaper,
     Loads,
     Manipulator,
     Material,
     Ring,
-    Section,
     Tendon,
 )
 from softreach.arm.actuators import LengthTendon
@@ -24,53 +20,35 @@ from softreach.arm.loads import PointLoad
 from softreach.rod.rods import as_tip_map, effective, free_bundles, measured_bundles
 from softreach.workspace import reachable_set, volume_gradient
 from softreach.workspace.sheets import _zero
+from tests.made_arms import one_ring_arm
 
 RUBBER = Material(young_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+RINGS = (Ring(inner_ratio=0.5, material=RUBBER),)
 CHAMBER = Chamber(name="ch", distance=0.0, radius=0.003, activation_bounds=(0.0, 3e5))
 
 
 def arm_of(*actuators, **changes) -> Manipulator:
-    return Manipulator(
-        profile=LinearTaper(length=0.3, outer_radius=0.01),
-        section=Section(rings=(Ring(inner_ratio=0.5, material=RUBBER),)),
-        actuators=actuators,
-        **changes,
-    )
-
-
-def tendons(count: int = 4, bounds=(0.0, 5.0)) -> list[Tendon]:
-    angle = 2.0 * np.pi / count
-    return [
-        Tendon(name=f"t{k}", distance=0.008, offset=k * angle, activation_bounds=bounds)
-        for k in range(count)
-    ]
+    return one_ring_arm(*actuators, radius=0.01, rings=RINGS).replace(**changes)
 
 
 def driven(bounds, dead_zone=0.0, offset=0.0, pairs=2, chamber=True) -> Manipulator:
     """Antagonistic pairs of tendons, and a chamber that lengthens the arm."""
-    some = tendons()
-    used = some if pairs == 2 else [some[0], some[2]]
-    low, high = np.broadcast_to(bounds, (2, 2)).T
+    tendon = Tendon(distance=0.008, activation_bounds=(0.0, 5.0))
+    places = range(0, 4, 3 - pairs)
+    used = (tendon.replace(name=f"t{k}", offset=k * np.pi / 2) for k in places)
+    ends = np.broadcast_to(bounds, (2, 2))
+    acts = {"gain": 2.0, "dead_zone": dead_zone, "offset": offset}
     drives = tuple(
-        Drive.antagonists(
-            name, f"t{k}", f"t{k + 2}", bounds=(low[k], high[k]), gain=2.0, dead_zone=dead_zone,
-            offset=offset,
-        )
+        Drive.antagonists(name, f"t{k}", f"t{k + 2}", bounds=tuple(ends[k]), **acts)
         for k, name in enumerate("xy"[:pairs])
-    )  # fmt: skip
+    )
     return arm_of(*used, *([CHAMBER] if chamber else []), drives=drives)
 
 
 def by_length(count: int, bounds, **numbers) -> Manipulator:
-    return arm_of(
-        *(
-            LengthTendon(
-                name=f"l{k}", distance=0.008, offset=2.0 * np.pi * k / count,
-                activation_bounds=bounds, **numbers,
-            )
-            for k in range(count)
-        )
-    )  # fmt: skip
+    tendon = LengthTendon(distance=0.008, activation_bounds=bounds, **numbers)
+    turn = 2.0 * np.pi / count
+    return arm_of(*(tendon.replace(name=f"l{k}", offset=k * turn) for k in range(count)))
 
 
 @pytest.mark.parametrize("zone", [0.05, 0.3])
@@ -154,9 +132,7 @@ def test_a_tip_map_knows_whether_it_is_smooth_through_every_wrapper():
     beyond = effective(kinked)
     inputs = beyond.inputs.driving.with_dead_zones(np.array([[0.4, -0.3, 1e5], [0.0, 0.0, 0.0]]))
     np.testing.assert_allclose(inputs, [[0.5, -0.4, 1e5], [0.0, 0.0, 0.0]])
-    np.testing.assert_allclose(
-        kinked.tips(inputs), effective(kinked).tips([[0.4, -0.3, 1e5], [0] * 3])
-    )
+    np.testing.assert_allclose(kinked.tips(inputs), beyond.tips([[0.4, -0.3, 1e5], [0] * 3]))
 
 
 def test_sheets_are_cut_in_the_middle_where_nothing_tells_a_zero():
@@ -183,7 +159,6 @@ def test_a_fiber_given_by_its_angle_may_lie_beside_a_tendon_by_length_under_load
     bounds = {"extent": 0.5, "activation_bounds": (-0.1, 0.0)}
     straight = FiberArchitecture(helical_angle=0.0, **bounds)
     turned = FiberArchitecture(revolution=0.0, **bounds)
-    one, other = (
-        as_tip_map(loaded(0.14, each)).tips([[0.02, 0, 0, -0.05]]) for each in (straight, turned)
-    )
+    rods = (as_tip_map(loaded(0.14, each)) for each in (straight, turned))
+    one, other = (rod.tips([[0.02, 0, 0, -0.05]]) for rod in rods)
     np.testing.assert_allclose(one, other, atol=1e-9)

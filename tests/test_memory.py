@@ -1,7 +1,5 @@
 """Free memory: what a container leaves of its limit."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 import threading
@@ -27,7 +25,6 @@ LIMITED = {
 
 @pytest.fixture
 def container(tmp_path, monkeypatch):
-    """Make the system say that it is a container with these files."""
     monkeypatch.setattr(memory, "_CONTROL_GROUP", tmp_path)
     monkeypatch.setattr(memory, "_system", lambda: 1e6)
 
@@ -38,21 +35,22 @@ def container(tmp_path, monkeypatch):
     return of
 
 
-def test_files_that_a_container_keeps_only_to_read_count_as_free(container):
-    container(LIMITED)
-    assert memory.free_memory() == 8000 - 7000 + 5000
+UNLIMITED = LIMITED | {"memory.max": "max"}
 
 
-@pytest.mark.parametrize("files", [{}, LIMITED | {"memory.max": "max"}], ids=["none", "no limit"])
-def test_without_a_limit_the_system_says_what_is_free(container, files):
+@pytest.mark.parametrize(
+    ("files", "free"), [(LIMITED, 8000 - 7000 + 5000), ({}, 1e6), (UNLIMITED, 1e6)]
+)
+def test_files_kept_only_to_read_are_free_and_without_a_limit_the_system_says(
+    container, files, free
+):
     container(files)
-    assert memory.free_memory() == 1e6
+    assert memory.free_memory() == free
 
 
 def test_a_cloud_for_which_there_is_no_memory_is_refused():
-    with pytest.raises(
-        sr.errors.NotPossible, match=r"^n = 10.*of memory, of which .* GB are free$"
-    ):
+    said = r"^n = 10.*of memory, of which .* GB are free$"
+    with pytest.raises(sr.errors.NotPossible, match=said):
         sr.compute_cloud(sr.designs.minimal_trunk(), 10**12)
 
 
@@ -79,23 +77,13 @@ def test_memory_that_was_freed_is_returned_to_the_system():
 # Warnings name the line of whoever called softreach, and are silenced on one thread only
 
 
-def too_soft() -> sr.Manipulator:
-    return rubber(sr.designs.minimal_trunk(), sr.Loads(gravity=(0.0, 0.0, -9.81)), young=3e4)
-
-
-def sparse_hull() -> None:
-    cloud = sr.compute_cloud(sr.designs.minimal_trunk(), 500)
-    sr.concave_hull(cloud.tip.values, alpha=0.01)
-
-
-CAUSES = {"loads": lambda: as_tip_map(too_soft()), "hull": sparse_hull}
-
-
-@pytest.mark.parametrize("cause", CAUSES.values(), ids=CAUSES.keys())
-def test_a_warning_names_the_line_of_the_caller(cause):
-    with pytest.warns(SoftreachWarning) as caught:
-        cause()
-    assert {warning.filename for warning in caught} == {__file__}
+def test_a_warning_names_the_line_of_the_caller(trunk):
+    tips = sr.compute_cloud(trunk, 500).tip.values
+    soft = rubber(trunk, sr.Loads(gravity=(0.0, 0.0, -9.81)), young=3e4)
+    for cause in (lambda: as_tip_map(soft), lambda: sr.concave_hull(tips, alpha=0.01)):
+        with pytest.warns(SoftreachWarning) as caught:
+            cause()
+        assert {warning.filename for warning in caught} == {__file__}
 
 
 def test_what_one_thread_silences_another_still_says():
@@ -121,8 +109,6 @@ def test_what_one_thread_silences_another_still_says():
 def test_sobol_points_in_blocks_are_those_of_one_draw_without_a_warning():
     from scipy.stats import qmc
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        points = sample_cube("sobol", 64, 3, 5)
+    points = sample_cube("sobol", 64, 3, 5)  # warnings are errors here
     expected = qmc.Sobol(3, scramble=True, rng=np.random.default_rng(5)).random(64)
     np.testing.assert_array_equal(points, expected)

@@ -1,6 +1,6 @@
 """Minima inside bounds, and the gradients that lead there."""
 
-from __future__ import annotations
+from functools import partial
 
 import numpy as np
 import pytest
@@ -42,9 +42,8 @@ def test_searches_do_not_depend_on_each_other():
     start = np.random.default_rng(0).random((12, 2))
     together, _ = minimize(evaluate, start, unit_box(2))
     for i in (0, 5, 11):
-        alone, _ = minimize(
-            lambda which, gamma, i=i: evaluate(which + i, gamma), start[[i]], unit_box(2)
-        )
+        of_one = partial(lambda i, which, gamma: evaluate(which + i, gamma), i)
+        alone, _ = minimize(of_one, start[[i]], unit_box(2))
         assert np.array_equal(alone[0], together[i])
 
 

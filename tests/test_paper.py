@@ -1,7 +1,5 @@
 """Laws of the report: complete, continued where it stopped, whole in one file."""
 
-from __future__ import annotations
-
 import json
 import re
 from dataclasses import replace
@@ -20,8 +18,8 @@ from softreach.paper.reproduce import CLAIMS
 from softreach.paper.sections import redundancy, sweep
 from softreach.paper.sections.model import printed_deltas
 from softreach.paper.sections.sweep import shapes
-from softreach.plot import atlas, axes, style
 from softreach.support.errors import InvalidInput
+from tests.browser import heard
 
 TINY = replace(
     QUICK,
@@ -41,8 +39,6 @@ def folder(tmp_path_factory):
     out = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(reproduce, "QUICK", TINY)
-        for module in (style, axes, atlas):  # pictures are small
-            patch.setattr(module, "DPI", 60)
         assert run(["paper", "--out", str(out), "--quick"]) == 0
     return out
 
@@ -220,11 +216,8 @@ def test_an_interrupted_report_keeps_its_finished_parts(tmp_path, small, monkeyp
 
 def test_the_report_opens_offline_without_a_missing_picture_and_prints(folder, browser, tmp_path):
     report, printed_pdf = folder / "quick" / "report.html", tmp_path / "report.pdf"
-    trouble, requests = [], []
     page = browser.new_page()
-    page.on("console", lambda message: trouble.append(message.text))
-    page.on("pageerror", lambda error: trouble.append(str(error)))
-    page.on("request", lambda request: requests.append(request.url))
+    trouble, requests = heard(page)
     page.goto(report.as_uri())
     widths = page.evaluate("[...document.images].map(image => image.naturalWidth)")
     overflow = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")

@@ -1,7 +1,5 @@
 """Tasks on threads: their order, how many there are, and what they raise."""
 
-from __future__ import annotations
-
 import threading
 import time
 from functools import partial
@@ -51,14 +49,11 @@ def test_what_a_task_raises_arrives_in_its_place():
         next(results)
 
 
-def test_what_is_done_meanwhile_is_done_once_and_asked_for_later():
+def test_what_is_done_meanwhile_is_done_once_and_raises_where_it_is_asked_for():
     calls = []
     with parallel.meanwhile(lambda: calls.append(1) or "found") as found:
         assert found() == found() == "found"
     assert calls == [1]
-
-
-def test_what_is_done_meanwhile_raises_where_it_is_asked_for():
     with parallel.meanwhile(lambda: 1 / 0) as found, pytest.raises(ZeroDivisionError):
         found()
 
@@ -104,19 +99,14 @@ def test_a_task_that_is_given_up_is_no_failure_of_its_own():
     assert seen == []
 
 
-def test_work_that_is_undivided_stays_on_its_thread():
-    where = []
-    with parallel.undivided():
-        parallel.run([lambda: where.append(threading.get_ident())] * 5)
-    assert where == [threading.get_ident()] * 5
-
-
-def test_other_threads_divide_their_work_meanwhile(threads):
-    tasks = [lambda: where.append(threading.get_ident())] * 5
+def test_work_that_is_undivided_stays_on_its_thread_while_others_divide_theirs():
     where: list[int] = []
+    tasks = [lambda: where.append(threading.get_ident())] * 5
     with parallel.undivided():
+        parallel.run(tasks)
         other = threading.Thread(target=parallel.run, args=(tasks,))
         other.start()
         other.join()
-    assert threading.get_ident() not in where
-    assert len(where) == 5
+    assert where[:5] == [threading.get_ident()] * 5
+    assert threading.get_ident() not in where[5:]
+    assert len(where) == 10

@@ -1,7 +1,5 @@
 """Laws of the rasterizer: what is nearest shows, where the projection says, whatever the order."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re
@@ -75,7 +73,8 @@ class TestPoints:
     @pytest.mark.parametrize("view", ["top", "oblique", (0.3, -1.0)])
     def test_points_in_space_are_seen_from_the_view(self, rng, view):
         points, colors = rng.uniform(-0.5, 0.5, (500, 3)), rng.integers(0, 256, (500, 3))
-        buffer, frame = ZBuffer(Extent(-1.0, 1.0, -1.0, 1.0), 30), Extent(-1.0, 1.0, -1.0, 1.0)
+        frame = Extent(-1.0, 1.0, -1.0, 1.0)
+        buffer = ZBuffer(frame, 30)
         buffer.draw_points(points, colors, 1.5, view=view)
         seen = image(project(points, view), colors, 1.5, 30, 2, frame)
         np.testing.assert_array_equal(buffer.rgba(), seen)
@@ -136,8 +135,7 @@ class TestTriangles:
         assert drawn[90, 80, :3].tolist() == list(RED)
 
     def test_slivers_and_missing_corners_are_harmless(self):
-        edge_on = [[0.1, 0.1, 0], [0.9, 0.9, 0], [0.5, 0.5, 1]]
-        point = [[0.5, 0.5, 0]] * 3
+        edge_on, point = [[0.1, 0.1, 0], [0.9, 0.9, 0], [0.5, 0.5, 1]], [[0.5, 0.5, 0]] * 3
         missing = [[0.5, 0.5, np.nan], [1, 0, 0], [0, 1, 0]]
         drawn = self.draw([edge_on, point, missing], np.full((3, 3, 3), 255), 50)
         assert np.count_nonzero(drawn[..., 3]) <= 100
@@ -190,7 +188,6 @@ def test_light_falls_alike_on_both_sides(rng):
 
 
 def pixels_of(png: bytes) -> np.ndarray:
-    """The image in a PNG file, RGBA from 0 to 255, as another reader finds it."""
     plt = pytest.importorskip("matplotlib.pyplot")
     return np.rint(255 * plt.imread(io.BytesIO(png)))
 
@@ -236,8 +233,10 @@ class TestThumbnails:
         assert "<img" not in flat._repr_html_()
 
 
-def test_twelve_bundles_have_colors_that_are_told_apart():
+def test_twelve_bundles_have_colors_that_are_told_apart_and_four_a_lightness_of_their_own():
     """Differences of 2 are just seen side by side (CIEDE2000)."""
+    light = sorted(float(np.dot(bundle_color(k), [0.21, 0.72, 0.07])) for k in range(4))
+    assert min(np.diff(light)) > 0.02
     color = pytest.importorskip("skimage.color")
     lab = color.rgb2lab(np.array([[bundle_color(k) for k in range(12)]]))[0]
     apart = color.deltaE_ciede2000(lab[:, None], lab[None])

@@ -1,51 +1,34 @@
 """Regions that arms reach in one plane, by Green's theorem, by pixels and by hand."""
 
-from __future__ import annotations
-
-import json
 import math
 
 import numpy as np
 import pytest
 
-from softreach.arm import (
-    Chamber,
-    LinearTaper,
-    Manipulator,
-    Material,
-    Ring,
-    Section,
-    Tendon,
-    designs,
-)
+from softreach.arm import Chamber, Manipulator, Material, Ring, Tendon, designs
 from softreach.arm.actuators import LengthTendon
 from softreach.atlas.metrics import chosen_metrics
-from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import flat_areas, unreachability
 from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
 from softreach.rod.rods import as_tip_map
 from softreach.workspace import ReachableSet, reachable_set
+from tests.made_arms import one_ring_arm
+from tests.sets import tips_of_faces
 
 SOFT = Material(young_modulus=2e5, poisson_ratio=0.45)
 
 
 def planar(*, pairs: int = 2, chamber: bool = False, **base) -> Manipulator:
     """Tendons on both sides in one plane, for each of the segments."""
-    tendons = [
-        Tendon(
-            name=f"{side} {k}", distance=0.018, offset=angle, end_over_length=(k + 1) / pairs,
-            activation_bounds=(0.0, 8.0 / (k + 1)),
-        )
-        for k in range(pairs)
-        for side, angle in (("right", 0.4), ("left", 0.4 + math.pi))
-    ]  # fmt: skip
+    tendons = []
+    for k in range(pairs):
+        ends = {"end_over_length": (k + 1) / pairs, "activation_bounds": (0.0, 8.0 / (k + 1))}
+        right = Tendon(name=f"right {k}", distance=0.018, offset=0.4, **ends)
+        tendons += [right, right.replace(name=f"left {k}", offset=0.4 + math.pi)]
     axial = [Chamber(name="c", distance=0.0, radius=0.004, activation_bounds=(0.0, 2e4))]
-    arm = Manipulator(
-        profile=LinearTaper(length=0.2, outer_radius=0.02),
-        section=Section(rings=(Ring(inner_ratio=0.0, material=SOFT),)),
-        actuators=tuple(tendons + axial * chamber),
-    )
+    rings = (Ring(inner_ratio=0.0, material=SOFT),)
+    arm = one_ring_arm(*tendons, *axial * chamber, length=0.2, rings=rings)
     return arm.replace(base=arm.base.replace(**base)) if base else arm
 
 
@@ -57,12 +40,7 @@ def region() -> ReachableSet:
 
 
 def test_four_bundles_reach_as_much_as_pixels_count(region):
-    rod = region.tip_map
-    rng = np.random.default_rng(0)
-    cube = rng.random((500_000, 4))
-    bound = rng.random(cube.shape) < 0.4
-    cube[bound] = rng.integers(0, 2, int(bound.sum()))
-    tips = rod.tips(rod.box.from_cube(cube))
+    tips = tips_of_faces(region.tip_map, 500_000, seed=0, at_bound=0.4)
     flat = tips @ np.array([[math.cos(0.4), 0.0], [math.sin(0.4), 0.0], [0.0, 1.0]])
     counts = []
     for pixels in (100, 200):  # those touched count in full, which the limit takes off
@@ -95,10 +73,9 @@ def test_two_bundles_have_the_area_that_green_tells():
     found = reachable_set(arm)
     assert found.outline is not None
     rod, edge = as_tip_map(arm), np.linspace(0.0, 1.0, 4001)
-    around = np.concatenate([
-        np.stack([edge, 0 * edge], 1), np.stack([1 + 0 * edge, edge], 1),
-        np.stack([edge[::-1], 1 + 0 * edge], 1), np.stack([0 * edge, edge[::-1]], 1),
-    ])  # fmt: skip
+    low, high, back = 0 * edge, 1 + 0 * edge, edge[::-1]
+    sides = ((edge, low), (high, edge), (back, high), (low, back))
+    around = np.concatenate([np.stack(side, 1) for side in sides])
     x, y, z = rod.tips(rod.box.from_free_cube(around)).T
     s = x * math.cos(0.4) + y * math.sin(0.4)
     green = 0.5 * abs(float((s[:-1] * z[1:] - s[1:] * z[:-1]).sum()))
@@ -111,8 +88,7 @@ def test_any_number_of_bundles_leaves_an_area_wherever_the_base_points(pairs, ch
     bases = {}, {"points": "-x", "turn": 0.3, "position": (1.0, 2.0, 3.0)}
     arms = [planar(pairs=pairs, chamber=chamber, **base) for base in bases]
     upright, leaning = (reachable_set(arm, accuracy=0.02) for arm in arms)
-    assert upright.outline is not None
-    assert leaning.outline is not None
+    assert None not in (upright.outline, leaning.outline)
     error = upright.area_error + leaning.area_error
     assert abs(upright.area - leaning.area) < error < 0.04 * upright.area
     assert 0.0 < upright.unreachability < 1.0
@@ -120,9 +96,8 @@ def test_any_number_of_bundles_leaves_an_area_wherever_the_base_points(pairs, ch
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_tendons_on_the_axis_reach_a_line_without_a_share(count):
-    axial = [LengthTendon(name=f"t{k}", distance_ratio=0.0, activation_bounds=(0.0, 0.01))
-             for k in range(count)]  # fmt: skip
-    text = repr(reachable_set(planar().replace(actuators=tuple(axial))))
+    axial = LengthTendon(name="t", distance_ratio=0.0, activation_bounds=(0.0, 0.01), bundles=count)
+    text = repr(reachable_set(planar().replace(actuators=(axial,))))
     assert "in one line" in text
     assert "nan" not in text
 
@@ -133,43 +108,31 @@ def test_a_sheet_in_space_is_no_plane():
 
 def test_clouds_in_a_plane_have_areas():
     square = np.random.default_rng(0).random((20_000, 2)) @ [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0]]
-    areas = flat_areas(square + 5.0, 0.05)
-    assert areas is not None
-    area, convex = areas
+    area, convex = flat_areas(square + 5.0, 0.05)
     assert area == pytest.approx(1.0, abs=0.01)
     assert area < convex < 1.0
     assert unreachability(square, 0.05) == pytest.approx(1.0 - area / convex)
     assert flat_areas(np.random.default_rng(0).random((100, 3)), 0.1) is None
     line = np.outer(np.linspace(0, 1, 50), [1.0, 2.0, 3.0])
     assert flat_areas(line, 0.1) == (0.0, 0.0)
-    plane = plane_of(square, 1e-9)
-    assert plane is not None
-    assert plane.sides[2] < 1e-12
+    assert plane_of(square, 1e-9).sides[2] < 1e-12
     ring = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.0]], float)
     assert alpha_area(ring, 0.6) == pytest.approx(1.0)
     assert alpha_area(ring, 0.4) == 0.0
 
 
-def printed_json(capsys, *arguments):
-    assert run([*map(str, arguments), "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_every_command_that_gives_a_volume_gives_the_area(tmp_path, region, capsys):
-    region.arm.save(path := tmp_path / "planar.toml")
-    mesh = tmp_path / "region.stl"
-    shown = printed_json(capsys, "reach", path, "--out", mesh)
-    assert mesh.stat().st_size > 1000
+def test_every_command_that_gives_a_volume_gives_the_area(folder, region, printed):
+    region.arm.save("planar.toml")
+    shown = printed("reach", "planar.toml", "--out", "region.stl")
+    assert (folder / "region.stl").stat().st_size > 1000
     assert shown["unreachability"] == pytest.approx(region.unreachability)
     assert region.area == pytest.approx(shown["area_m2"])
-    shown = printed_json(capsys, "volume", path, "--n", 4096, "--alpha", "10mm")
+    shown = printed("volume", "planar.toml", "--n", "4096", "--alpha", "10mm")
     assert 0.0 < shown["unreachability"] < 1.0
     assert shown["area_in_one_plane_m2"] < shown["convex_area_m2"]
     known = {metric.name: metric for metric in chosen_metrics(["exact", "concave", "convex"])}
     assert known["exact_area"].compute(region) == region.area
     assert known["exact_unreachability"].compute(region) == region.unreachability
     tips = compute_cloud(region.arm, n=4096).tip.values
-    areas = flat_areas(tips, 0.01)
-    assert areas is not None
-    assert known["area"].compute(tips, 0.01) == areas[0]
+    assert known["area"].compute(tips, 0.01) == flat_areas(tips, 0.01)[0]
     assert math.isnan(known["area"].compute(np.random.default_rng(0).random((9, 3)), 0.01))

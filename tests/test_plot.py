@@ -1,30 +1,13 @@
 """Laws of pictures: what a color says, and that data lie where the axes say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 import softreach as sr
+from softreach import plot
 from softreach.arm import designs
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.redundancy import activation_distance
-from softreach.plot import (
-    DesignPanel,
-    plot_arm,
-    plot_cloud,
-    plot_cross_section,
-    plot_designs,
-    plot_distance,
-    plot_distance_histograms,
-    plot_opposite_sides,
-    plot_redundancy,
-    plot_slab,
-    plot_slice,
-    plot_views,
-    plot_volume_curve,
-    save_figure,
-)
 from softreach.plot.atlas import evenly
 from softreach.plot.coloring import BundleKey, ScalarKey, color_samples
 from softreach.support.errors import InvalidInput
@@ -69,10 +52,6 @@ class TestColors:
         full, rest = activation_colors(gamma).astype(int)
         assert full.max() == 255
         assert not rest.any()
-
-    def test_bundles_have_colors_of_different_lightness(self):
-        light = sorted(float(np.dot(bundle_color(k), [0.21, 0.72, 0.07])) for k in range(4))
-        assert min(np.diff(light)) > 0.02
 
     def test_a_bundle_goes_by_name_or_index_from_zero_up(self, cloud):
         by_name, by_index = color_samples(cloud, "longitudinal"), color_samples(cloud, 2)
@@ -134,12 +113,10 @@ class TestColors:
         assert color_samples(cloud, height).key == ScalarKey("height [m]", *ends)
 
     def test_unknown_bundles_and_lengths_are_refused(self, cloud):
-        with pytest.raises(InvalidInput, match="left, right, longitudinal"):
-            color_samples(cloud, "middle")
-        with pytest.raises(InvalidInput, match="index"):
-            color_samples(cloud, 3)
-        with pytest.raises(InvalidInput, match="2000"):
-            color_samples(cloud, np.zeros(7))
+        wrong = ("middle", "left, right, longitudinal"), (3, "index"), (np.zeros(7), "2000")
+        for color, said in wrong:
+            with pytest.raises(InvalidInput, match=said):
+                color_samples(cloud, color)
 
 
 class TestFigures:
@@ -148,7 +125,7 @@ class TestFigures:
         """One far sample is found again where the axes say it is."""
         one = cloud.isel(sample=[int(cloud.tip.values[:, 0].argmax())])
         box = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
-        ax = plot_cloud(one, view=view, box=box, size=1.0)
+        ax = plot.plot_cloud(one, view=view, box=box, size=1.0)
         drawn = ax.images[0]
         rows, columns, _ = drawn.get_array().shape
         (row,), (column,) = np.nonzero(drawn.get_array()[..., 3])
@@ -162,11 +139,11 @@ class TestFigures:
 
     def test_views_of_a_thin_arm_fit_a_page(self, trunk):
         thin = trunk.with_bounds([(0, 0)] * 3)
-        width, height = plot_views(sr.compute_cloud(thin, 10), thin).get_size_inches()
+        width, height = plot.plot_views(sr.compute_cloud(thin, 10), thin).get_size_inches()
         assert height < 1.5 * width
 
     def test_orthogonal_views_share_one_scale(self, trunk, cloud, bent):
-        front, side, top, _ = plot_views(cloud, trunk, bent).axes
+        front, side, top, _ = plot.plot_views(cloud, trunk, bent).axes
         scales = []
         for ax in (front, side, top):
             inches = ax.get_position().size * ax.figure.get_size_inches()
@@ -177,16 +154,16 @@ class TestFigures:
 
     def test_axes_of_the_caller_are_used_and_grow(self, trunk, cloud, bent):
         _, mine = plt.subplots()
-        assert plot_arm(trunk, ax=mine) is mine
+        assert plot.plot_arm(trunk, ax=mine) is mine
         narrow = mine.get_xlim()
-        assert plot_cloud(cloud, ax=mine) is mine
+        assert plot.plot_cloud(cloud, ax=mine) is mine
         wide = mine.get_xlim()
-        plot_arm(trunk, bent, ax=mine)
+        plot.plot_arm(trunk, bent, ax=mine)
         assert np.ptp(wide) > np.ptp(narrow)
         assert mine.get_xlim() == wide
 
     def test_an_arm_shows_its_fibers_and_body(self, trunk):
-        drawn = plot_arm(trunk, view="back").images[0].get_array()
+        drawn = plot.plot_arm(trunk, view="back").images[0].get_array()
         solid = drawn[drawn[..., 3] == 255][:, :3].astype(int)
         assert (solid[:, 0] > 1.5 * solid[:, 1:].max(axis=1)).any()  # red on the back
         assert (solid[:, 1] > 1.5 * solid[:, [0, 2]].max(axis=1)).any()  # green
@@ -194,19 +171,19 @@ class TestFigures:
 
     def test_several_configurations_are_drawn_together(self, trunk):
         several = sr.configuration(trunk, [[-1.2, 0, 0], [0, -1.2, 0]], stations=21)
-        ax = plot_arm(trunk, several, rest=False)
+        ax = plot.plot_arm(trunk, several, rest=False)
         low, high = ax.get_xlim()
         assert low == pytest.approx(-high, rel=0.02)  # mirror images
 
     @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
     def test_figures_are_saved_small_and_whole(self, suffix, trunk, cloud, bent, tmp_path):
-        figure = plot_views(cloud, trunk, bent, color=2)
-        save_figure(figure, tmp_path / f"views.{suffix}")
+        figure = plot.plot_views(cloud, trunk, bent, color=2)
+        plot.save_figure(figure, tmp_path / f"views.{suffix}")
         assert [p.name for p in tmp_path.iterdir()] == [f"views.{suffix}"]
         assert 10_000 < (tmp_path / f"views.{suffix}").stat().st_size < 2_000_000
 
     def test_text_stays_text_over_a_raster_image(self, cloud, tmp_path):
-        save_figure(plot_cloud(cloud).figure, tmp_path / "cloud.svg")
+        plot.save_figure(plot.plot_cloud(cloud).figure, tmp_path / "cloud.svg")
         drawing = (tmp_path / "cloud.svg").read_text()
         assert "x / L</text>" in drawing
         assert drawing.count("<image") == 1
@@ -218,12 +195,12 @@ LONG = "outer oblique left, after the second calibration"
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda arm, _: plot_arm(arm, view="oblique", unit="mm"),
-        lambda arm, _: plot_arm(arm, view="front", unit="mm"),
-        lambda arm, _: plot_designs([DesignPanel(LONG, arm), DesignPanel(LONG, arm)]),
-        lambda arm, _: plot_designs([DesignPanel("one", arm, "oblique")]),
-        lambda arm, cloud: plot_views(cloud, arm, unit="mm"),
-        lambda _, cloud: plot_opposite_sides(dict.fromkeys([LONG, "b", "c"], cloud), unit="mm"),
+        lambda arm, _: plot.plot_arm(arm, view="oblique", unit="mm"),
+        lambda arm, _: plot.plot_arm(arm, view="front", unit="mm"),
+        lambda arm, _: plot.plot_designs([plot.DesignPanel(LONG, arm)] * 2),
+        lambda arm, _: plot.plot_designs([plot.DesignPanel("one", arm, "oblique")]),
+        lambda arm, cloud: plot.plot_views(cloud, arm, unit="mm"),
+        lambda _, cloud: plot.plot_opposite_sides({n: cloud for n in (LONG, "b", "c")}, unit="mm"),
     ],
     ids=["oblique", "front", "names", "panel", "views", "sides"],
 )
@@ -246,16 +223,14 @@ def test_no_label_is_cut_of_slim_arms_many_bundles_and_long_names(draw):
 
 
 def sectors(ax):
-    from matplotlib.patches import Wedge
-
-    wedges = [patch for patch in ax.patches if isinstance(patch, Wedge)]
+    wedges = [patch for patch in ax.patches if type(patch).__name__ == "Wedge"]
     return [wedge for wedge in wedges if not wedge.get_hatch()]  # not what sectors share
 
 
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
 def test_sectors_stand_where_the_bundles_are_at_that_station(share):
     arm = designs.redundant_trunk(length=2.0)
-    ax = plot_cross_section(arm, share * arm.length)
+    ax = plot.plot_cross_section(arm, share * arm.length)
     angles = np.degrees(arm.outline(share * arm.length).center[0])
     assert len(sectors(ax)) == arm.bundles
     for k, wedge in enumerate(sectors(ax)):
@@ -268,22 +243,22 @@ def test_sectors_stand_where_the_bundles_are_at_that_station(share):
 
 def test_a_plane_through_the_origin_is_at_zero_without_a_sign(trunk):
     grid = sr.reachable_set(trunk, accuracy=0.1).grid
-    assert plot_slice(grid, at=-1e-12).get_title() == "y = 0 L"
+    assert plot.plot_slice(grid, at=-1e-12).get_title() == "y = 0 L"
 
 
 def test_a_notebook_keeps_no_figure_that_its_cell_shows(trunk, cloud, monkeypatch):
     plt.close("all")
     monkeypatch.setattr(plt, "get_backend", lambda: "module://matplotlib_inline.backend_inline")
-    plot_views(cloud, trunk)
+    plot.plot_views(cloud, trunk)
     assert plt.get_fignums() == []
-    plot_slab(cloud)  # its axes show nothing by themselves
+    plot.plot_slab(cloud)  # its axes show nothing by themselves
     assert len(plt.get_fignums()) == 1
 
 
 def test_designs_and_their_sections_share_one_scale():
     arms = {"minimal": designs.minimal_trunk(), "redundant": designs.redundant_trunk()}
-    panels = [DesignPanel(name, arm) for name, arm in arms.items()]
-    figure = plot_designs(panels, stations_over_length=(0.0, 0.5))
+    panels = [plot.DesignPanel(name, arm) for name, arm in arms.items()]
+    figure = plot.plot_designs(panels, stations_over_length=(0.0, 0.5))
     arms, base, middle = np.array(figure.axes).reshape(3, 2)
     assert [ax.get_title() for ax in arms] == ["minimal", "redundant"]
     assert len({(*ax.get_xlim(), *ax.get_ylim()) for ax in arms}) == 1
@@ -302,35 +277,32 @@ def drawn():
 
 def image_colors(ax) -> set[tuple[int, ...]]:
     rgba = np.asarray(ax.images[0].get_array())
-    return {tuple(int(c) for c in rgb) for rgb in rgba[rgba[..., 3] == 255][:, :3]}
-
-
-def shown_pixels(ax) -> int:
-    return int(np.count_nonzero(np.asarray(ax.images[0].get_array())[..., 3]))
+    return {tuple(rgb) for rgb in rgba[rgba[..., 3] == 255][:, :3].tolist()}
 
 
 def test_a_slice_shows_the_slab_and_states_it(drawn):
-    ax = plot_slab(drawn[0], view="side", thickness=0.1, color=3)
+    ax = plot.plot_slab(drawn[0], view="side", thickness=0.1, color=3)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("y / L", "z / L")
     assert "|x| ≤ 0.05 L" in [text.get_text() for text in ax.texts]
-    whole = plot_slab(drawn[0], view="side", thickness=10.0, size=1.0, key=False)
-    thin = plot_slab(drawn[0], view="side", thickness=0.01, size=1.0, key=False)
-    assert 0 < shown_pixels(thin) < 0.2 * shown_pixels(whole)
+    options = {"view": "side", "size": 1.0, "key": False}
+    slabs = (plot.plot_slab(drawn[0], thickness=thickness, **options) for thickness in (0.01, 10.0))
+    thin, whole = (np.count_nonzero(ax.images[0].get_array()[..., 3]) for ax in slabs)
+    assert 0 < thin < 0.2 * whole
 
 
 def test_isolated_points_are_gray_and_never_hide_others(drawn):
     cloud, distance = drawn
-    colors = image_colors(plot_distance(cloud, distance, key=False))
+    colors = image_colors(plot.plot_distance(cloud, distance, key=False))
     assert (190, 190, 190) in colors
     # one known point behind an isolated one
     pair = made_up([[0.0, 0.1, 0.0], [0.0, -0.1, 0.0], [0.5, 0.0, 0.5]])
     values = distance[:3].copy(data=[1.0, np.nan, 1.0]).assign_coords(sample=[0, 1, 2])
-    assert (190, 190, 190) not in image_colors(plot_distance(pair, values, key=False))
+    assert (190, 190, 190) not in image_colors(plot.plot_distance(pair, values, key=False))
 
 
 def test_histograms_share_their_scale_and_count_every_point(drawn):
     _, distance = drawn
-    figure = plot_distance_histograms({"some": distance[:500], "all": distance})
+    figure = plot.plot_distance_histograms({"some": distance[:500], "all": distance})
     some, every = figure.axes
     assert (some.get_title(), every.get_title()) == ("some", "all")
     assert some.get_xlim() == every.get_xlim()
@@ -341,7 +313,7 @@ def test_histograms_share_their_scale_and_count_every_point(drawn):
 def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
     cloud, distance = drawn
     small = cloud.assign(tip=cloud.tip.copy(data=0.5 * cloud.tip.values))
-    figure = plot_redundancy({"a": cloud, "b": small}, {"a": distance, "b": 0.5 * distance})
+    figure = plot.plot_redundancy({"a": cloud, "b": small}, {"a": distance, "b": 0.5 * distance})
     panels = np.reshape([ax for ax in figure.axes if ax.images], (2, 4))
     assert [ax.get_xlabel() for ax in panels[1]] == ["x / L", "x / L", "y / L", "x / L"]
     assert [ax.get_ylabel() for ax in panels[:, 0]] == ["a\nz / L", "b\nz / L"]
@@ -360,18 +332,18 @@ def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
 def test_what_cannot_be_drawn_is_refused(drawn, trunk):
     cloud, distance = drawn
     with pytest.raises(InvalidInput, match="finite point"):
-        plot_cloud(cloud.isel(sample=slice(0)))
+        plot.plot_cloud(cloud.isel(sample=slice(0)))
     with pytest.raises(InvalidInput, match=r"z = 1.5: must be within \[0, 1\] m"):
-        plot_cross_section(trunk, 1.5)
+        plot.plot_cross_section(trunk, 1.5)
     with pytest.raises(InvalidInput, match=r"a = \(3,\): must be volumes of \(2,\) radii"):
-        plot_volume_curve({"a": [1, 2, 3]}, [0.1, 0.2])
+        plot.plot_volume_curve({"a": [1, 2, 3]}, [0.1, 0.2])
     with pytest.raises(InvalidInput, match="two dimensions"):
-        plot_cloud(cloud, ax=plt.figure().add_subplot(projection="3d"))
+        plot.plot_cloud(cloud, ax=plt.figure().add_subplot(projection="3d"))
     with pytest.raises(InvalidInput, match="view = oblique"):
-        plot_slab(cloud, view="oblique")
+        plot.plot_slab(cloud, view="oblique")
     with pytest.raises(InvalidInput, match=r"thickness = -1\.0: must be a finite number > 0 m"):
-        plot_slab(cloud, thickness=-1.0)
+        plot.plot_slab(cloud, thickness=-1.0)
     with pytest.raises(InvalidInput, match="distances = none"):
-        plot_distance_histograms({})
+        plot.plot_distance_histograms({})
     with pytest.raises(InvalidInput, match=r"distances = \['b'\]: must be of the clouds"):
-        plot_redundancy({"a": cloud}, {"b": distance})
+        plot.plot_redundancy({"a": cloud}, {"b": distance})

@@ -1,7 +1,5 @@
 """One law for all figures: what an axis says it counts in is what it counts in, at L = 0.3 m."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -27,15 +25,14 @@ Shown = tuple[str, object, object]
 
 def si(label: str, numbers: object) -> np.ndarray:
     """Numbers on an axis in powers of m, as its label says: "x / L", "V [m³]", "0.1 L", "κL"."""
-    if label == "":
-        return np.asarray(numbers, float)
+    numbers = np.asarray(numbers, float)
     if label in ("κL", "u₃L"):
-        return np.asarray(numbers, float) / LENGTH
-    if "[1/m]" in label:
-        return np.asarray(numbers, float)
+        return numbers / LENGTH
+    if label == "" or "[1/m]" in label:
+        return numbers
     said = re.search(r"(/ L|\[m|\d L$|\d m$)(³?)", label)
     assert said, f"{label!r} does not say what it counts in"
-    return np.asarray(numbers, float) * (LENGTH if "L" in said[1] else 1.0) ** (3 if said[2] else 1)
+    return numbers * (LENGTH if "L" in said[1] else 1.0) ** (3 if said[2] else 1)
 
 
 def ends(values: object) -> tuple[float, float]:
@@ -164,11 +161,9 @@ def plot_hull(of):
 
 
 def plot_volume_curve(of):
-    alphas = np.geomspace(0.03, 0.3, 5)
+    alphas, convex = np.geomspace(0.03, 0.3, 5), of.hull.volume
     volumes = sr.volume.volume_curve(of.cloud.tip, alphas)
-    convex = of.hull.volume
-    curves = {"one": volumes}
-    ax = plot.plot_volume_curve(curves, alphas, length=of.length, convex=convex)
+    ax = plot.plot_volume_curve({"one": volumes}, alphas, length=of.length, convex=convex)
     yield ax.get_xlabel(), ends(ax.lines[0].get_xdata()), alphas
     yield ax.get_ylabel(), ends(ax.lines[0].get_ydata()), volumes
     yield ax.get_ylabel(), (0, ax.lines[1].get_ydata()[0]), (0, convex)
@@ -213,10 +208,8 @@ def plot_compliance(of):
 
 
 def plot_equilibria(of):
-    every = sr.equilibria(of.arm, [0.0, 0.0, 0.0])
-    ax = plot.plot_equilibria(every, view="side")
-    base = of.rest[:, 2].min()
-    yield "z / L", ax.get_ylim(), [base, of.rest[:, 2].max()]
+    ax = plot.plot_equilibria(sr.equilibria(of.arm, [0.0, 0.0, 0.0]), view="side")
+    yield "z / L", ax.get_ylim(), of.rest[:, 2]
 
 
 def plot_cross_section(of):
@@ -316,7 +309,6 @@ def check(shown: Iterator[Shown]) -> None:
 
 
 def texts() -> list[str]:
-    """All that is written in all open figures."""
     from matplotlib.text import Text
 
     figures = map(plt.figure, plt.get_fignums())
@@ -355,13 +347,16 @@ def test_data_in_meters_do_not_go_over_data_in_lengths(everything):
     assert ax.get_xlabel() == "x / L"
 
 
-def test_rows_take_no_mixture(everything, ignorant):
+def test_rows_take_no_mixture_of_lengths_and_stations(everything, ignorant):
     both = {"a": everything.cloud, "b": ignorant.cloud}
     distances = dict.fromkeys(both, everything.distance)
     with pytest.raises(InvalidInput, match="some with and some without"):
         plot.plot_redundancy(both, distances)
     with pytest.raises(InvalidInput, match="some with and some without"):
         plot.plot_views(ignorant.cloud, everything.arm)
+    other = sr.curvature.curvature_statistics(everything.cloud, [0.1, 0.2])
+    with pytest.raises(InvalidInput, match="stations"):
+        plot.plot_curvature({"a": everything.curvature, "b": other})
 
 
 def test_boxes_and_points_of_another_shape_are_refused(everything):
@@ -385,16 +380,10 @@ def test_slices_go_through_the_middle_of_the_set_unless_a_place_is_given(everyth
         plot.plot_slices(away, at=(0.0, 0.0, 0.0))
 
 
-def test_stations_of_two_designs_stand_at_the_same_places(everything):
-    other = sr.curvature.curvature_statistics(everything.cloud, [0.1, 0.2])
-    with pytest.raises(InvalidInput, match="stations"):
-        plot.plot_curvature({"a": everything.curvature, "b": other})
-
-
 def test_a_single_row_of_designs_is_drawn_as_cells_and_an_empty_atlas_stays_white(everything):
     row = everything.atlas.isel(length=[0])
     (cells,) = plot.plot_metric_map(row, "reach_height").collections
     np.testing.assert_allclose(np.ravel(cells.get_array()), row.reach_height[0] / LENGTH)
     nothing = everything.atlas.assign(reach_height=np.nan * everything.atlas.reach_height)
-    ax = plot.plot_metric_map(nothing, "reach_height")
-    assert ax.collections[0].get_array().mask.all()
+    (cells,) = plot.plot_metric_map(nothing, "reach_height").collections
+    assert cells.get_array().mask.all()

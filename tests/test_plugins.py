@@ -1,7 +1,5 @@
 """Parts of one's own on the command line: imported when asked for, then like softreach's."""
 
-from __future__ import annotations
-
 import sys
 
 import pytest
@@ -42,7 +40,6 @@ def lowest(tips):
 
 
 def designed(kind: str) -> str:
-    """A design file of two fibers and an actuator of this kind."""
     trunk = designs.minimal_trunk()
     text = trunk.replace(actuators=trunk.actuators[:2]).to_toml()
     wire = f'kind = "{kind}"\nname = "wire"\nplace = [0.03, 0.04]\nactivation_bounds = [0, 1e-4]'
@@ -105,22 +102,15 @@ def test_a_module_that_fails_is_refused_with_its_line(text, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["", "..own", "own_nowhere.py", "colorsys.py"])
-def test_what_is_no_module_or_has_the_name_of_another_is_refused(
-    name, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "colorsys.py").write_text("raise AssertionError")
-    words = ["list", "designs", "--import", name]
-    assert "import = " in refusal_of(words, capsys, tmp_path)
+def test_what_is_no_module_or_has_the_name_of_another_is_refused(name, folder, capsys):
+    (folder / "colorsys.py").write_text("raise AssertionError")
+    assert "import = " in refusal_of(["list", "designs", "--import", name], capsys, folder)
 
 
-def test_an_unknown_kind_or_metric_imports_nothing_and_says_what_does(
-    tmp_path, monkeypatch, capsys
-):
-    (tmp_path / "OwnUnheard.py").write_text("raise AssertionError")
-    (tmp_path / "arm.toml").write_text(designed("OwnUnheard"))
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.chdir(tmp_path)
+def test_an_unknown_kind_or_metric_imports_nothing_and_says_what_does(folder, monkeypatch, capsys):
+    (folder / "OwnUnheard.py").write_text("raise AssertionError")
+    (folder / "arm.toml").write_text(designed("OwnUnheard"))
+    monkeypatch.syspath_prepend(folder)
     vary = ["--vary", "taper_deg=0,1", "--metrics", "OwnUnheard"]
     for words in (["design", "arm.toml"], ["atlas", "build", "a.zarr", *vary]):
         assert run(words) == 2

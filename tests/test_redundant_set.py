@@ -1,9 +1,5 @@
 """Reachable sets of four free bundles and more: volumes known otherwise, memory, refusals."""
 
-from __future__ import annotations
-
-import math
-
 import numpy as np
 import pytest
 
@@ -14,49 +10,32 @@ from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.cells import smallest_memory
-from tests.sets import is_closed, solid
+from tests.laws import arm_of, large
+from tests.sets import is_closed, solid, tips_of_faces
 
 
-def family(revolution: float, extent: float, offset: float, bundles: int) -> FiberArchitecture:
-    """Equidistant bundles, in degrees."""
-    angles = np.radians([revolution, extent, offset])
-    return FiberArchitecture(
-        revolution=angles[0], extent=angles[1], offset=angles[2], bundles=bundles
+def equidistant(*fibers: tuple[float, float, float, int], **changes) -> Manipulator:
+    """Fibers by their revolution, extent and offset in degrees, and their number of bundles."""
+    made = (
+        FiberArchitecture(
+            **dict(zip(("revolution", "extent", "offset"), np.radians(angles), strict=True)),
+            bundles=bundles,
+        )
+        for *angles, bundles in fibers
     )
+    fields = {"inner_radius": 0.03, "poisson_ratio": 0.4, "activation_bounds": (-1.2, 0.1)}
+    return arm_of(*made, outer_radius=0.06, taper=np.radians(1), **fields | changes)
 
 
-def arm_of(
-    *fibers: FiberArchitecture, inner_radius: float, poisson_ratio: float, bounds: object
-) -> Manipulator:
-    return Manipulator.tapered(
-        length=1.0,
-        outer_radius=0.06,
-        inner_radius=inner_radius,
-        taper=math.radians(1),
-        poisson_ratio=poisson_ratio,
-        actuators=fibers,
-        activation_bounds=bounds,
-    )
-
-
-def five_bundles() -> Manipulator:
-    fibers = family(0, 50, 90, 3), family(-90, 30, 20, 2)
-    return arm_of(*fibers, inner_radius=0.05, poisson_ratio=0.5, bounds=(-1.2, 0.0))
-
-
-def six_bundles() -> Manipulator:
-    fibers = family(90, 40, 90, 3), family(-90, 40, 30, 3)
-    return arm_of(*fibers, inner_radius=0.03, poisson_ratio=0.4, bounds=(-1.2, 0.1))
-
-
-def twelve_bundles() -> Manipulator:
-    fibers = [family(turn, 25, 20 * i, 3) for i, turn in enumerate((90, -90, 0, 45))]
-    return arm_of(*fibers, inner_radius=0.03, poisson_ratio=0.4, bounds=(-1.2, 0.1))
+OTHER = {"inner_radius": 0.05, "poisson_ratio": 0.5, "activation_bounds": (-1.2, 0.0)}
+FIVE = equidistant((0, 50, 90, 3), (-90, 30, 20, 2), **OTHER)
+SIX = equidistant((90, 40, 90, 3), (-90, 40, 30, 3))
+TWELVE = equidistant(*((turn, 25, 20 * i, 3) for i, turn in enumerate((90, -90, 0, 45))))
 
 
 @pytest.fixture(scope="module")
 def five() -> ReachableSet:
-    return solid(five_bundles(), accuracy=1e-2)
+    return solid(FIVE, accuracy=1e-2)
 
 
 def test_five_bundles_reach_what_monte_carlo_says(five):
@@ -77,26 +56,16 @@ def test_random_places_are_inside_as_often_as_the_volume_says(five):
 
 
 def test_tips_of_faces_of_every_dimension_are_inside_to_a_part_of_a_cell(five):
-    rng = np.random.default_rng(1)
-    cube = rng.random((20_000, 5))
-    bound = rng.random((20_000, 5)) < 0.5
-    cube[bound] = rng.integers(0, 2, int(bound.sum()))
-    tips = five.tip_map.tips(five.tip_map.box.from_cube(cube))
+    tips = tips_of_faces(five.tip_map, 20_000, seed=1)
     outside = five.image.distance(tips) / five.grid.attrs["cell"]
     assert (outside > 1e-2).mean() < 2e-3
     assert outside.max() < 1
 
 
-@pytest.mark.parametrize(
-    ("design", "accuracy"),
-    [
-        (six_bundles, 1e-2),
-        (twelve_bundles, 5e-2),
-        pytest.param(five_bundles, 3e-3, marks=pytest.mark.large),
-    ],
-)
-def test_many_bundles_keep_the_accuracy_asked(design, accuracy):
-    found = solid(design(), accuracy=accuracy, memory=5e8)
+@pytest.mark.parametrize("case", [(SIX, 1e-2), (TWELVE, 5e-2), *large((FIVE, 3e-3))])
+def test_many_bundles_keep_the_accuracy_asked(case):
+    arm, accuracy = case
+    found = solid(arm, accuracy=accuracy, memory=5e8)
     assert 0 < found.volume_error <= accuracy * found.volume
     assert found.volume < found.convex_volume + found.convex_volume_error
 

@@ -1,7 +1,5 @@
 """Samplers: points of the unit cube that depend on their four arguments alone."""
 
-from __future__ import annotations
-
 import csv
 import subprocess
 import sys
@@ -13,7 +11,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import Loads, designs
-from softreach.cloud.clouds import compute_cloud, open_cloud, save_cloud
+from softreach.cloud.clouds import compute_cloud, design_of, open_cloud, save_cloud
 from softreach.cloud.curvature import curvature_statistics
 from softreach.cloud.dexterity import dexterity, solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
@@ -160,9 +158,7 @@ print(size, tracemalloc.get_traced_memory()[1])
 """
 
 
-def test_making_and_keeping_a_large_cloud_takes_little_more_memory_than_the_cloud(
-    tmp_path, monkeypatch
-):
+def test_making_and_keeping_a_cloud_takes_little_more_memory_than_it(tmp_path, monkeypatch):
     monkeypatch.setenv("SOFTREACH_NUM_THREADS", "1")
     # A process of its own: here, threads of other tests' servers would be counted, too.
     command = [sys.executable, "-c", _PEAKS, str(tmp_path / "cloud.zarr")]
@@ -180,13 +176,17 @@ LOADS = Loads(gravity=(9.81, 0.0, 0.0), payload=0.005)  # under which a few samp
 
 
 @pytest.fixture(scope="module")
-def lossy():
+def loaded():
+    return compute_cloud(designs.lce_arm().replace(loads=LOADS), SAMPLES)
+
+
+@pytest.fixture(scope="module")
+def lossy(loaded):
     """A cloud whose first samples are unstable, or without an equilibrium."""
-    lossy = compute_cloud(designs.lce_arm().replace(loads=LOADS), SAMPLES)
-    tip, status = lossy.tip.values.copy(), lossy.status.values.copy()
+    tip, status = loaded.tip.values.copy(), loaded.status.values.copy()
     status[:40], status[40:60] = 1, 2
     tip[:40], tip[40:60] = 10.0, np.nan  # far away, so that none can be counted unseen
-    return lossy.assign(tip=lossy.tip.copy(data=tip)).assign_coords(status=("sample", status))
+    return loaded.assign(tip=loaded.tip.copy(data=tip)).assign_coords(status=("sample", status))
 
 
 def kept(lossy):
@@ -217,42 +217,36 @@ def test_neighbors_are_stable_tips(lossy):
     assert some.values[1] == found.values[1000]
 
 
-def test_summaries_of_redundancy_leave_out_what_is_not_stable(lossy):
+def test_summaries_of_redundancy_and_densities_leave_out_what_is_not_stable(lossy):
     whole = redundancy_summary(lossy, activation_distance(lossy, 0.01))
     part = redundancy_summary(kept(lossy), activation_distance(kept(lossy), 0.01))
     assert whole == part
-
-
-def test_densities_count_stable_tips(lossy):
     found = tip_density(lossy)
     stable = int((lossy.status == 0).sum())
     assert float(found.density.sum()) * found.attrs["cell"] ** 3 == pytest.approx(stable)
 
 
-def test_dexterity_is_nan_where_the_arm_cannot_be(lossy):
-    arm = designs.lce_arm().replace(loads=LOADS)
-    plain = compute_cloud(arm, SAMPLES)
-    found = dexterity(plain)
-    lost = plain.status.values != 0
+def test_dexterity_is_nan_where_the_arm_cannot_be(loaded):
+    arm, found = designs.lce_arm().replace(loads=LOADS), dexterity(loaded)
+    lost = loaded.status.values != 0
     assert lost.any()
     assert np.array_equal(np.isnan(found.manipulability.values), lost)
     assert np.array_equal(found.orientation.values == 0, lost)
-    _, slope = as_tip_map(arm).tips_and_slopes(plain.activation.values[:50])
+    _, slope = as_tip_map(arm).tips_and_slopes(loaded.activation.values[:50])
     expected = np.abs(np.linalg.det(slope))
     good = ~lost[:50]
     assert np.allclose(found.manipulability.values[:50][good], expected[good], rtol=1e-9)
-    measure = solution_measure(plain)
+    measure = solution_measure(loaded)
     volume = float(np.prod(np.ptp(arm.bounds, axis=1)))
     total = float(measure.solution_measure.sum()) * measure.attrs["cell"] ** 3
     mean = float(np.nansum(found.manipulability.values)) / SAMPLES
     assert total == pytest.approx(volume * mean)
 
 
-def test_strains_are_those_of_stable_equilibria():
-    lossy = compute_cloud(designs.lce_arm().replace(loads=LOADS), SAMPLES)
-    lost = int((lossy.status != 0).sum())
+def test_strains_are_those_of_stable_equilibria(loaded):
+    lost = int((loaded.status != 0).sum())
     assert lost > 0
-    assert curvature_statistics(lossy, [0.09]).samples == SAMPLES - lost
+    assert curvature_statistics(loaded, [0.09]).samples == SAMPLES - lost
 
 
 def test_exports_and_stores_keep_the_status(lossy, tmp_path):
@@ -285,15 +279,12 @@ def test_unstable_samples_have_a_color_of_their_own_and_a_key(lossy, color):
 
 def test_a_cloud_of_free_bundles_is_that_of_the_arm():
     arm = designs.lce_arm()
-    low, high = arm.bounds.T
-    held = arm.with_bounds([(low[0], high[0]), (low[1], high[1]), (low[2], low[2])])
+    held = arm.with_bounds([*arm.bounds[:2], arm.bounds[2, [0, 0]]])
     part, whole = compute_cloud(free_bundles(as_tip_map(held)), 50), compute_cloud(held, 50)
     assert np.array_equal(part.activation.values, whole.activation.values)
     assert np.array_equal(part.tip.values, whole.tip.values)
 
 
-def test_a_configuration_says_whether_it_is_stable():
-    arm = designs.lce_arm().replace(loads=LOADS)
-    lossy = compute_cloud(arm, SAMPLES)
-    shapes = configuration(arm, lossy.activation.values[:200])
-    assert np.array_equal(shapes.status.values, lossy.status.values[:200])
+def test_a_configuration_says_whether_it_is_stable(loaded):
+    shapes = configuration(design_of(loaded), loaded.activation.values[:200])
+    assert np.array_equal(shapes.status.values, loaded.status.values[:200])

@@ -1,7 +1,5 @@
 """Laws of the tip's compliance: closed forms, differences of tips, and what its ellipsoids say."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -15,6 +13,7 @@ from softreach.arm import Loads, Manipulator, designs
 from softreach.arm.actuators import Chamber
 from softreach.arm.body import load_number
 from softreach.arm.parameters import changed, find_parameters
+from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.dexterity import dexterity, solution_measure
 from softreach.inverse import solve_inverse
@@ -29,7 +28,7 @@ from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarni
 from softreach.workspace import reachable_set
 from softreach.workspace.tip_derivatives import TipDerivatives, shifts_along
 from tests.bodies import rubber
-from tests.laws import arms, differences
+from tests.laws import arms, differences, large
 
 TRUNK = sr.designs.minimal_trunk()
 GAMMA = np.array([[-1.2, -0.3, -0.8], [-0.2, -1.5, 0.0], [0.0, 0.0, -0.4]])
@@ -44,39 +43,24 @@ LOADS = {
     "moments": Loads(gravity=SIDE, tip_moment=(0.2, 0.3, -0.4), follower_moment=(0.1, 0.2, 0.1)),
 }
 CONSERVATIVE = {"none", "gravity", "payload with a lever", "forces in several directions"}
-of_loads = pytest.mark.parametrize("name", LOADS)
-WITHIN_OTHERS = {
-    "gravity",
-    "forces in several directions",
-    "force that follows",
-}  # kinds of load that others have too
+WITHIN_OTHERS = "gravity", "forces in several directions", "force that follows"
+ALONE = "payload with a lever", "moments"  # kinds of load that no other case has
 
 
 def forced(loads, force):
-    """The loads with a force more on the tip."""
     loads = loads or Loads(gravity=(0.0, 0.0, 0.0))
     return loads.replace(tip_force=tuple(np.add(loads.tip_force, force)))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.large] if name in WITHIN_OTHERS else [])
-        for name in LOADS
-    ],
-)
+@pytest.mark.parametrize("name", ["none", *ALONE, *large(*WITHIN_OTHERS)])
 def test_compliance_is_the_difference_of_tips_by_a_small_force(name):
     found, force = tip_compliance(rubber(TRUNK, LOADS[name]), GAMMA, tol=1e-9), (6e-3, -5e-3, 7e-3)
-    there, back = (
-        sr.tip_positions(
-            rubber(TRUNK, forced(LOADS[name], np.multiply(sign, force))), GAMMA, tol=1e-9
-        )
-        for sign in (1, -1)
-    )
+    loads = (forced(LOADS[name], np.multiply(sign, force)) for sign in (1, -1))
+    there, back = (sr.tip_positions(rubber(TRUNK, each), GAMMA, tol=1e-9) for each in loads)
     np.testing.assert_allclose(found @ force, (there - back) / 2, atol=2e-8)
 
 
-@of_loads
+@pytest.mark.parametrize("name", LOADS)
 def test_compliance_is_symmetric_just_where_loads_have_a_potential(name):
     found = tip_compliance(rubber(TRUNK, LOADS[name]), GAMMA, tol=1e-9)
     apart = np.abs(found - np.swapaxes(found, 1, 2)).max()
@@ -109,12 +93,9 @@ def test_an_arm_without_loads_yields_as_one_under_loads_of_zero():
     np.testing.assert_array_equal(of_map, tip_compliance(zero, GAMMA))
 
 
-def test_an_arm_without_modulus_is_refused_by_the_name_of_the_material():
+def test_an_arm_without_modulus_and_a_map_of_other_activations_are_refused():
     with pytest.raises(InvalidDesign, match=r"^rings\[0\].material.young_modulus: must be given"):
         tip_compliance(TRUNK, GAMMA)
-
-
-def test_a_map_of_other_activations_than_the_arm_has_is_refused():
     held = rubber(TRUNK, None).with_bounds([(-1.0, 0.0), (0.0, 0.0), (-1.0, 0.0)])
     with pytest.raises(InvalidInput, match="tip map that it has"):
         tip_compliance(free_bundles(FreeRod(held)), [[0.0, 0.0]])
@@ -185,12 +166,10 @@ def test_the_ellipse_drawn_is_the_outline_of_where_forces_move_the_tip():
         plot.plot_compliance(arm, shapes, np.repeat(found, 2, axis=0))
 
 
-def test_the_command_line_colors_a_cloud_by_compliance(tmp_path):
-    from softreach.cli.app import run
-
-    out = tmp_path / "soft.png"
-    assert run(["show", "lce_arm", "--n", "500", "--color", "compliance", "--out", str(out)]) == 0
-    assert out.stat().st_size > 10_000
+def test_the_command_line_colors_a_cloud_by_compliance(folder):
+    asked = "show lce_arm --n 500 --color compliance --out soft.png"
+    assert run(asked.split()) == 0
+    assert (folder / "soft.png").stat().st_size > 10_000
 
 
 # Dexterity of clouds
@@ -252,11 +231,6 @@ def test_manipulability_and_families_have_the_units_of_their_inputs(trunk):
     assert units(mixed) == ["m3/mixed", "mixed"]
     fewer = robot.replace(actuators=(replace(tendons, bundles=1), mixed.actuators[1]))
     assert units(fewer) == ["m2/(N Pa)"]
-
-
-def test_only_a_cloud_has_dexterity(trunk):
-    with pytest.raises(InvalidInput, match="cloud"):
-        dexterity(compute_cloud(trunk, n=10).drop_vars("tip"))
 
 
 def position_slope(arm, gamma):
@@ -327,6 +301,8 @@ def test_measures_of_many_clouds_scatter_by_their_standard_error(trunk):
 
 
 def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
+    with pytest.raises(InvalidInput, match="cloud"):
+        dexterity(compute_cloud(trunk, n=10).drop_vars("tip"))
     for sampler, n in (("boundary", 100), ("grid", 125)):
         with pytest.raises(InvalidInput, match=f"sampler = {sampler}: must be one of uniform"):
             solution_measure(compute_cloud(trunk, n=n, sampler=sampler))
@@ -385,8 +361,7 @@ def test_by_a_bound_the_tip_moves_as_its_activation_does():
     rod, cube = as_tip_map(arm, 1e-9), places(arm)
     found = derivatives(arm, ("left.lower", "right.upper"), 1e-9).at(cube)
     slopes = rod.tips_and_slopes(rod.box.from_free_cube(cube))[1]
-    names = [actuator.name for actuator in arm.actuators]
-    left, right = names.index("left"), names.index("right")
+    left, right = map(arm.bundle_names.index, ("left", "right"))
     expected = [
         (1 - cube[:, left, None]) * slopes[:, :, left],
         cube[:, right, None] * slopes[:, :, right],
@@ -406,22 +381,13 @@ def test_all_actuators_turned_turn_the_tip_about_the_axis():
 # The arm at rest under its loads
 
 
-SIDEWAYS = (9.81, 0.0, 0.0)
-
-
-def cylinder(loads: sr.Loads) -> sr.Manipulator:
-    return rubber(sr.designs.minimal_trunk(taper=0.0), loads)
-
-
 def at_load_number(number: float, direction: tuple[float, float, float]) -> sr.Manipulator:
-    """The cylinder under as much gravity as gives this load number."""
-    x, y, z = direction
-    size = number / load_number(cylinder(sr.Loads(gravity=(1.0, 0.0, 0.0))))
-    return cylinder(sr.Loads(gravity=(size * x, size * y, size * z)))
+    """A cylinder under as much gravity as gives this load number."""
+    unit = rubber(sr.designs.minimal_trunk(taper=0.0), sr.Loads(gravity=(1.0, 0.0, 0.0)))
+    return unit.replace(loads=sr.Loads(gravity=number / load_number(unit) * np.array(direction)))
 
 
 def test_a_light_arm_held_sideways_sags_by_w_l4_over_8_ei():
-    """4 Λ/8 of its length."""
     found = rest(at_load_number(1e-3, (1, 0, 0)))
     assert found.status == TipStatus.STABLE
     assert found.sag_over_length == pytest.approx(4e-3 / 8, rel=1e-3)
@@ -436,7 +402,7 @@ def test_an_upright_cylinder_at_rest_is_stable_up_to_the_load_of_greenhill(share
 
 
 def test_it_is_where_the_tip_map_puts_the_tip_without_activation():
-    arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=SIDEWAYS, payload=0.002))
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=SIDE, payload=0.002))
     found = rest(arm)
     np.testing.assert_array_equal(found.activation, 0.0)
     np.testing.assert_allclose(
@@ -446,18 +412,13 @@ def test_it_is_where_the_tip_map_puts_the_tip_without_activation():
     assert found.sag == pytest.approx(math.dist(found.tip, free), rel=1e-9)
 
 
-def test_where_zero_is_out_of_bounds_the_nearest_activation_is_rest():
-    arm = sr.designs.lce_arm().replace(loads=sr.Loads())
-    bounds = arm.bounds.copy()
-    bounds[0] = -3.0, -1.0
-    found = rest(arm.with_bounds(bounds))
-    np.testing.assert_array_equal(found.activation, [-1.0, 0.0, 0.0])
-    assert found.status == TipStatus.STABLE
-
-
-def test_an_arm_without_loads_is_refused(trunk):
+def test_where_zero_is_out_of_bounds_the_nearest_activation_is_rest_of_arms_with_loads(trunk):
     with pytest.raises(sr.InvalidInput, match="loads = None: must be given"):
         rest(trunk)
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads())
+    found = rest(arm.with_bounds([(-3.0, -1.0), *arm.bounds[1:]]))
+    np.testing.assert_array_equal(found.activation, [-1.0, 0.0, 0.0])
+    assert found.status == TipStatus.STABLE
 
 
 def test_a_tip_map_beyond_the_verified_loads_warns_and_one_within_does_not():

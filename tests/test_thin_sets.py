@@ -1,9 +1,6 @@
 """Thin shells, which slender tendon robots reach: volumes, corners, hulls, thickness."""
 
-from __future__ import annotations
-
 import itertools
-import json
 
 import numpy as np
 import pytest
@@ -26,17 +23,16 @@ from softreach.rod.rods import as_tip_map
 from softreach.support.errors import NotPossible
 from softreach.workspace import ReachableSet, reachable_set, volume_gradient
 from softreach.workspace.cells import cells_of
-from tests.sets import is_closed, solid
+from tests.sets import is_closed, solid, tips_of_faces
+from tests.test_kinked_sets import arm_of
 
 
 def two_segments() -> Manipulator:
     """Six tendons on a thin backbone of nitinol: a shell of two millimeters."""
     niti = Material(young_modulus=60e9, poisson_ratio=0.33, density=6450.0)
-    near = Tendon(
-        name="prox", bundles=3, distance=0.007, offset=np.radians(90), end="mid",
-        activation_bounds=(0, 40),
-    )  # fmt: skip
-    far = near.replace(name="dist", offset=np.radians(150), end=None)
+    far = Tendon(name="dist", bundles=3, distance=0.007, activation_bounds=(0, 40))
+    far = far.replace(offset=np.radians(150))
+    near = far.replace(name="prox", offset=np.radians(90), end="mid")
     return Manipulator(
         profile=LinearTaper(length=0.2, outer_radius=0.001),
         section=Section(rings=(Ring(inner_ratio=0.0, material=niti),)),
@@ -71,11 +67,7 @@ def test_the_mesh_of_a_shell_holds_all_corners_and_is_closed(shell):
 
 
 def test_a_shell_contains_its_own_tips(shell):
-    rng = np.random.default_rng(0)
-    cube = rng.random((3000, 6))
-    bound = rng.random(cube.shape) < 0.5
-    cube[bound] = rng.integers(0, 2, int(bound.sum()))
-    tips = shell.tip_map.tips(shell.tip_map.box.from_free_cube(cube))
+    tips = tips_of_faces(shell.tip_map, 3000, seed=0)
     assert shell.contains(tips).mean() > 0.997
     assert not shell.contains(tips + [0.5, 0.0, 0.0]).any()
 
@@ -95,19 +87,12 @@ def test_derivatives_of_a_shell_are_those_of_differences():
 
 @pytest.mark.large
 def test_four_tendons_under_a_payload_reach_a_quarter_more_than_lines_of_sight_say():
-    rubber = Material(young_modulus=1e6, poisson_ratio=0.5, density=1000.0)
     tendon = Tendon(name="t", bundles=4, distance=0.008, activation_bounds=(0.0, 3.0))
-    arm = Manipulator(
-        profile=LinearTaper(length=0.3, outer_radius=0.01),
-        section=Section(rings=(Ring(inner_ratio=0.5, material=rubber),)),
-        actuators=(tendon,),
-        loads=Loads(payload=0.005),
-    )
-    found = reachable_set(arm, accuracy=0.05)
+    found = reachable_set(arm_of(tendon, loads=Loads(payload=0.005)), accuracy=0.05)
     assert abs(found.volume - 1.083e-3) < found.volume_error < 0.05 * found.volume
 
 
-def test_a_sheet_of_microns_has_a_thickness_and_leads_with_it(capsys):
+def test_a_sheet_of_microns_has_a_thickness_and_leads_with_it(printed):
     robot = designs.three_tendon_robot()
     found = solid(robot)
     assert found.shell is not None
@@ -117,9 +102,7 @@ def test_a_sheet_of_microns_has_a_thickness_and_leads_with_it(capsys):
     assert repr(found).startswith("ReachableSet: a shell of area 0.0572653 ")
     assert float(found.to_dataset().shell_thickness) == thickness.value
     assert solid(designs.minimal_trunk(), accuracy=0.1).shell is None
-    assert run(["reach", "three_tendon_robot", "--json"]) == 0
-    shown = json.loads(capsys.readouterr().out)
-    assert next(iter(shown)).startswith("shell_area")
+    assert next(iter(printed("reach", "three_tendon_robot"))).startswith("shell_area")
     # the wrap of the same set, which knows nothing of its faces, pushes tips to both sides
     wrap = cells_of(as_tip_map(robot), 0.2 / 24).wrap
     assert wrap.volume_of_tips.value == pytest.approx(found.volume, rel=5e-3)

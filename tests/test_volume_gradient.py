@@ -1,22 +1,11 @@
 """Derivatives of the reachable volume: against differences, laws of scale, and what is refused."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
 import pytest
 
-from softreach.arm import (
-    LinearTaper,
-    Loads,
-    Manipulator,
-    Material,
-    Ring,
-    Section,
-    Tendon,
-    designs,
-)
+from softreach.arm import Loads, Manipulator, Material, Ring, Tendon, designs
 from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -27,7 +16,10 @@ from softreach.workspace.reach import rasterized_set
 from softreach.workspace.tip_derivatives import TipDerivatives
 from tests.bodies import rubber
 from tests.cable import Cable
-from tests.test_redundant_set import five_bundles
+from tests.laws import large
+from tests.made_arms import one_ring_arm
+from tests.sets import trunk_at
+from tests.test_redundant_set import FIVE
 
 NARROW = designs.minimal_trunk().with_bounds((-0.9, -0.3))
 NAMES = ("taper", "revolution", "left.offset", "rings[0].inner_ratio", "lower", "right.upper")
@@ -35,7 +27,6 @@ NAMES = ("taper", "revolution", "left.offset", "rings[0].inner_ratio", "lower", 
 
 @pytest.fixture(scope="module")
 def narrow() -> VolumeGradient:
-    """Derivatives where the map is one to one."""
     return volume_gradient(NARROW, NAMES)
 
 
@@ -49,9 +40,7 @@ def difference(arm: Manipulator, steps: dict[str, float], volume) -> float:
     return (at(-2) - 8 * at(-1) + 8 * at(1) - at(2)) / 12
 
 
-@pytest.mark.parametrize(
-    "names", [NAMES, *(pytest.param((name,), marks=pytest.mark.large) for name in NAMES)], ids=str
-)
+@pytest.mark.parametrize("names", [NAMES, *large(*((name,) for name in NAMES))], ids=str)
 def test_where_the_flux_holds_it_is_exact_to_a_millionth(narrow, names):
     """By each parameter, or along a direction in which all change the volume alike."""
 
@@ -99,11 +88,10 @@ def test_a_longer_and_thicker_arm_reaches_as_the_cube_of_its_size():
 
 def uneven(**shared: tuple[float, ...]) -> Manipulator:
     """The narrow arm with a value of its own for each fiber."""
-    names = [fiber.name for fiber in NARROW.fibers]
     values = {
-        f"{name}.{field}": value
+        f"{fiber.name}.{field}": value
         for field, own in shared.items()
-        for name, value in zip(names, own, strict=False)
+        for fiber, value in zip(NARROW.fibers, own, strict=False)
     }
     return changed(NARROW, values)
 
@@ -122,11 +110,7 @@ SHARED = {
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=[pytest.mark.large] if name in ("upper", "extent") else [])
-        for name in SHARED
-    ],
+    "name", ["lower", "revolution", "poisson_ratio", *large("upper", "extent")]
 )
 def test_the_derivative_by_what_parts_share_is_the_sum_of_theirs(name):
     """Revolutions grow in their own sense."""
@@ -156,7 +140,7 @@ def test_the_signed_volume_grows_at_a_bound_by_what_the_face_sweeps():
     assert signed_volume(rod).value * swept > 0
 
 
-@pytest.mark.parametrize("name", [pytest.param("revolution", marks=pytest.mark.large), "lower"])
+@pytest.mark.parametrize("name", ["lower", *large("revolution")])
 def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
     arm = designs.minimal_trunk(np.radians(75), np.radians(3))
     found = volume_gradient(arm, name)
@@ -187,11 +171,7 @@ def test_the_derivative_by_a_field_of_an_own_actuator_is_that_of_the_same_tendon
 
     def driven_by(actuator):
         others = (Tendon(distance=r, offset=2.1 * k, activation_bounds=bounds) for k in (1, 2))
-        return Manipulator(
-            profile=LinearTaper(length=0.3, outer_radius=0.02),
-            section=Section(rings=(ring,)),
-            actuators=(*others, actuator),
-        )
+        return one_ring_arm(*others, actuator, rings=(ring,))
 
     cable = driven_by(Cable(name="c", place=(x, y), activation_bounds=bounds))
     tendon = driven_by(Tendon(name="t", distance=r, offset=angle, activation_bounds=bounds))
@@ -220,6 +200,7 @@ def test_units_and_route_are_told(narrow):
     [
         (NARROW, (), "parameters = none"),
         (NARROW, "tapper", 'did you mean "taper"'),
+        (NARROW, ["taper", "taper"], "parameters = taper: must be given once"),
         (NARROW, "left.bundles", "continuously"),
         (NARROW, "rings[0].material.young_modulus", "one number"),
         (NARROW.with_bounds([(-0.5, -0.5), (-1, 0), (-1, 0)]), "taper", "2 free bundles"),
@@ -233,10 +214,7 @@ def test_what_has_no_derivative_is_refused_in_one_line(arm, names, said):
 
 
 def test_a_bound_that_would_free_a_held_bundle_is_refused():
-    four = designs.redundant_trunk()
-    bounds = four.bounds.copy()
-    bounds[0] = -0.5
-    held = four.with_bounds(bounds)
+    held = FOUR.with_bounds([(-0.5, -0.5), *FOUR.bounds[1:]])
     first = f"{held.actuators[0].name}.lower"
     with pytest.raises((InvalidInput, InvalidDesign)):
         volume_gradient(held, first)
@@ -251,19 +229,14 @@ def test_loaded_arms_have_derivatives_too():
         return rasterized_set(as_tip_map(arm), 32, None, 0.02).volume
 
     value = find_parameter(arm, "upper").value(arm)
-    steps = 0.1
-    at = [volume(changed(arm, {"upper": value + k * steps})) for k in (-1, 1)]
-    expected = (at[1] - at[0]) / (2 * steps)
+    low, high = (volume(changed(arm, {"upper": value + step})) for step in (-0.1, 0.1))
+    expected = (high - low) / 0.2
     assert found.volume[0] == pytest.approx(expected, rel=0.05)
 
 
+TURNS = {"left": -176, "right": 181, "longitudinal": 8}
 FOLDED = changed(
-    designs.minimal_trunk(revolution=np.radians(54), taper=np.radians(2.7)),
-    {
-        "left.revolution": np.radians(-176),
-        "right.revolution": np.radians(181),
-        "longitudinal.revolution": np.radians(8),
-    },
+    trunk_at(54, 2.7), {f"{name}.revolution": np.radians(turn) for name, turn in TURNS.items()}
 )
 FOUR = designs.redundant_trunk()
 
@@ -317,11 +290,10 @@ def test_rough_derivatives_are_those_of_finer_volumes_within_their_errors(arm, n
 
 @pytest.mark.large
 def test_five_bundles_have_derivatives_of_finer_volumes():
-    arm = five_bundles()
-    found = volume_gradient(arm, ("length", "outer_radius", "lower"), accuracy=0.02)
+    found = volume_gradient(FIVE, ("length", "outer_radius", "lower"), accuracy=0.02)
     scaled, error = (each[:2] @ [1.0, 0.06] / 3.0 for each in (found.volume, found.volume_error))
     assert abs(scaled - found.solid.volume) < error + found.solid.volume_error
-    ends = [reachable_set(changed(arm, {"lower": low}), accuracy=5e-3) for low in (-1.25, -1.15)]
+    ends = [reachable_set(changed(FIVE, {"lower": low}), accuracy=5e-3) for low in (-1.25, -1.15)]
     change = (ends[1].volume - ends[0].volume) / 0.1
     assert found.volume[2] == pytest.approx(change, abs=found.volume_error[2])
 

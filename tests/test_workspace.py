@@ -1,7 +1,5 @@
 """The reachable set: known volumes, clouds inside it, and what is said of curves and surfaces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -23,7 +21,6 @@ from tests.sets import is_closed, solid, trunk_at
 
 @pytest.fixture(scope="module")
 def best(trunk: Manipulator) -> ReachableSet:
-    """The paper's best design."""
     return solid(trunk)
 
 

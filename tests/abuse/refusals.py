@@ -1,7 +1,5 @@
 """What every refusal has in common: one clear line, and nothing lost."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

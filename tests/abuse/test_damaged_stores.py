@@ -1,7 +1,5 @@
 """Stores damaged in any file, any way: noticed, named in one line, mended by the same command."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -28,7 +26,6 @@ TIP = "tip/c/0/0/0/0"
 
 
 def flipped(content: bytes) -> bytes:
-    """One bit of it, anywhere."""
     bit = int(np.random.default_rng(len(content)).integers(8 * len(content)))
     damaged = bytearray(content)
     damaged[bit // 8] ^= 1 << bit % 8
@@ -123,9 +120,7 @@ def test_damage_of_any_file_is_named_and_mended_by_the_command_that_built_the_at
             assert only_files(place) == atlas_files
 
 
-def test_nothing_is_written_to_an_atlas_whose_root_is_lost_by_another_command(
-    atlas_files, tmp_path
-):
+def test_no_other_command_writes_to_an_atlas_whose_root_is_lost(atlas_files, tmp_path):
     for way, damage in WAYS.items():
         content = damage(atlas_files["zarr.json"])
         place = written(atlas_files, tmp_path / way, "zarr.json", content)
@@ -134,9 +129,7 @@ def test_nothing_is_written_to_an_atlas_whose_root_is_lost_by_another_command(
         assert files_in(place) == before
 
 
-def test_what_lies_beside_the_arrays_of_a_store_is_not_read(
-    cloud, cloud_files, atlas_files, tmp_path
-):
+def test_what_lies_beside_arrays_is_not_read(cloud, cloud_files, atlas_files, tmp_path):
     beside = {f"zarr.{32 * 'a'}.partial": b"", "mine/zarr.json": b"{}", "thesis.tex": b"precious"}
     place = written(cloud_files | beside, tmp_path / "cloud.zarr")
     assert sr.open_cloud(place).identical(cloud)
@@ -211,10 +204,9 @@ def test_the_same_command_says_which_design_it_computes_again(atlas_files, tmp_p
         assert verify_atlas(place).damaged == left
 
 
-def test_commands_name_what_is_damaged(cloud_files, atlas_files, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_commands_name_what_is_damaged(cloud_files, atlas_files, folder, capsys):
     written(cloud_files, Path("cloud.zarr"), "tip/c/0/0", flipped(cloud_files["tip/c/0/0"]))
-    assert "chunk 0/0 of array tip" in refusal_of(["volume", "cloud.zarr"], capsys, tmp_path)
+    assert "chunk 0/0 of array tip" in refusal_of(["volume", "cloud.zarr"], capsys, folder)
     written(atlas_files, Path("a.zarr"), TIP, flipped(atlas_files[TIP]))
     assert run(["atlas", "verify", "a.zarr"]) == 2
     printed = capsys.readouterr()
@@ -260,9 +252,7 @@ def test_a_durable_file_is_synced_before_it_counts(atlas_files, tmp_path, monkey
 # What softreach did not write
 
 
-def test_stores_of_other_programs_and_of_another_kind_are_refused(
-    cloud, cloud_files, atlas_files, tmp_path
-):
+def test_stores_of_others_and_other_kinds_are_refused(cloud, cloud_files, atlas_files, tmp_path):
     bare = cloud.drop_vars(["axis", "bundle"])
     bare.to_zarr(tmp_path / "own.zarr", zarr_format=3, consolidated=False)
     bare.to_zarr(tmp_path / "old.zarr", zarr_format=2, consolidated=False)

@@ -1,7 +1,5 @@
 """Designs at the edges of what an arm can be: numbers that mean something, or a clear refusal."""
 
-from __future__ import annotations
-
 import json
 import math
 
@@ -19,7 +17,6 @@ TRUNK = minimal_trunk()
 
 
 def many(bundles: int, **changes: object) -> sr.Manipulator:
-    """An arm of evenly spread helical bundles."""
     fiber = sr.FiberArchitecture(
         revolution=1.0, extent=0.2, bundles=bundles, activation_bounds=(-1.0 / bundles, 0.0)
     )
@@ -27,14 +24,12 @@ def many(bundles: int, **changes: object) -> sr.Manipulator:
 
 
 def frozen(*held: int, at: float = -0.7) -> sr.Manipulator:
-    """The trunk with some bundles held."""
     bounds = TRUNK.bounds.copy()
     bounds[list(held)] = at
     return TRUNK.with_bounds(bounds)
 
 
 def fiber(**changes: object) -> sr.FiberArchitecture:
-    """One bundle."""
     return sr.FiberArchitecture(**{"revolution": 1.0, "extent": 0.5, **changes})
 
 
@@ -61,52 +56,35 @@ DESIGNS: dict[str, sr.Manipulator] = {
     "a ring thin as a film": arm_of(fiber(), inner_radius=(1 - 1e-9) / 16),
     "an arm thick as it is long": arm_of(fiber(), outer_radius=1.0, inner_radius=0.5),
     "an arm thin as a hair": arm_of(
-        fiber(activation_bounds=(-0.01, 0.0)),
-        outer_radius=1e-3,
-        inner_radius=5e-4,
-        activation_bounds=None,
+        fiber(), outer_radius=1e-3, inner_radius=5e-4, activation_bounds=(-0.01, 0.0)
     ),
     "no actuator at all": TRUNK.replace(actuators=()),
 }
 
 
 @pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
-def test_a_degenerate_design_has_finite_tips_within_its_reach(arm):
+def test_a_degenerate_design_describes_itself_and_has_finite_tips_within_its_reach(arm):
+    assert "L" in repr(arm)
+    sr.describe(arm)
     cloud = sr.compute_cloud(arm, 64, sampler="boundary")
     longest = 1.0 + np.abs(arm.bounds).sum()
     assert np.isfinite(cloud.tip.values).all()
     assert (np.linalg.norm(cloud.tip.values, axis=1) <= longest * arm.length).all()
 
 
-@pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
-def test_a_degenerate_design_describes_itself(arm):
-    assert "L" in repr(arm)
-    sr.describe(arm)
-
-
-LENGTHS = [1e-6, 1e-3, 1e3]
-
-
-@pytest.mark.parametrize("length", LENGTHS, ids=lambda length: f"L = {length:g} m")
+@pytest.mark.parametrize("length", [1e-6, 1e3])
 @pytest.mark.parametrize("taper", [0.0, 2.0, -3.0])
 def test_results_over_l_do_not_depend_on_l(length, taper):
-    one = sr.compute_cloud(minimal_trunk(taper=math.radians(taper)), 256)
-    other = sr.compute_cloud(minimal_trunk(taper=math.radians(taper), length=length), 256)
-    assert np.allclose(other.tip.values / length, one.tip.values, rtol=0.0, atol=1e-9)
-    assert sr.convex_hull(other.tip).volume / length**3 == pytest.approx(
-        sr.convex_hull(one.tip).volume, rel=1e-9
-    )
-    alpha = sr.concave_hull(other.tip, 0.5 * length).volume / length**3
-    assert alpha == pytest.approx(sr.concave_hull(one.tip, 0.5).volume, rel=1e-9)
+    def results(size):
+        arm = minimal_trunk(taper=math.radians(taper), length=size)
+        tip = sr.compute_cloud(arm, 256).tip
+        hulls = sr.convex_hull(tip), sr.concave_hull(tip, 0.5 * size)
+        sets = *hulls, sr.reachable_set(arm, accuracy=0.05)
+        return tip.values / size, [one.volume / size**3 for one in sets]
 
-
-@pytest.mark.parametrize("length", [1e-6, 1e3], ids=lambda length: f"L = {length:g} m")
-def test_the_reachable_volume_over_l_cubed_does_not_depend_on_l(length):
-    volumes = [
-        sr.reachable_set(minimal_trunk(length=one), accuracy=0.05).volume / one**3
-        for one in (1.0, length)
-    ]
-    assert volumes[1] == pytest.approx(volumes[0], rel=1e-9)
+    (tips, volumes), (expected, known) = results(length), results(1.0)
+    assert np.allclose(tips, expected, rtol=0.0, atol=1e-9)
+    assert volumes == pytest.approx(known, rel=1e-9)
 
 
 @pytest.mark.parametrize("arm", [frozen(0, 1), frozen(1, 2), frozen(0, 2), many(1)])
@@ -153,15 +131,7 @@ def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(
     assert sr.concave_hull(points, 0.01).volume == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    "jitter",
-    [
-        1e-8,
-        pytest.param(3e-9, marks=pytest.mark.large),
-        1e-9,
-        pytest.param(1e-12, marks=pytest.mark.large),
-    ],
-)
+@pytest.mark.parametrize("jitter", [1e-8, 1e-9, pytest.param(1e-12, marks=pytest.mark.large)])
 def test_many_points_that_crowd_near_a_curve_are_told_before_they_cost(jitter):
     tip = sr.compute_cloud(frozen(1, 2), 20_000).tip.values
     points = tip + jitter * np.random.default_rng(1).standard_normal(tip.shape)
@@ -176,23 +146,15 @@ def test_a_hundred_copies_of_each_tip_but_for_rounding_have_its_volume():
     assert sr.concave_hull(crowd, 0.5).volume == pytest.approx(alone, rel=1e-6)
 
 
-@pytest.mark.parametrize("station", [0.0, 0.5, 1.0])
-def test_a_single_station_is_a_row_of_its_own(station):
-    shape = sr.configuration(TRUNK, [-0.5, -0.5, -0.5], [station])
-    assert shape.position.shape == (1, 3)
-
-
-def test_one_number_of_stations_is_too_few():
+def test_a_single_station_is_a_row_of_its_own_and_one_number_of_them_too_few():
+    for station in (0.0, 0.5, 1.0):
+        shape = sr.configuration(TRUNK, [-0.5, -0.5, -0.5], [station])
+        assert shape.position.shape == (1, 3)
     assert "2 or more" in str(raised_by(lambda: sr.configuration(TRUNK, [0, 0, 0], 1)))
 
 
-@pytest.mark.parametrize("draw", ["plot_arm", "plot_views"])
-def test_a_shape_shortened_to_nothing_is_not_drawn(draw):
-    shape = sr.configuration(TRUNK, [-1.0, -1.0, -1.0])
+def test_a_shape_shortened_to_nothing_is_not_drawn():
+    shape, cloud = sr.configuration(TRUNK, [-1.0, -1.0, -1.0]), sr.compute_cloud(TRUNK, 16)
     shape["extension"] -= 1.0
-    cloud = sr.compute_cloud(TRUNK, 16)
-    calls = {
-        "plot_arm": lambda: sr.plot.plot_arm(TRUNK, shape),
-        "plot_views": lambda: sr.plot.plot_views(cloud, TRUNK, shape),
-    }
-    assert "extension ζ" in str(raised_by(calls[draw]))
+    assert "extension ζ" in str(raised_by(lambda: sr.plot.plot_arm(TRUNK, shape)))
+    assert "extension ζ" in str(raised_by(lambda: sr.plot.plot_views(cloud, TRUNK, shape)))

@@ -1,7 +1,5 @@
 """Design files as nobody should write them: each loads, or is refused in a few clear lines."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

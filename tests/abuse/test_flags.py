@@ -1,7 +1,5 @@
 """Numbers and options that no command can use: each is refused in one line, before any work."""
 
-from __future__ import annotations
-
 import typing
 
 import pytest
@@ -82,17 +80,12 @@ def test_what_a_command_cannot_use_is_refused_in_one_line(words, tmp_path, monke
     assert REFUSED[words] in refusal_of(words.split(), capsys, tmp_path)
 
 
-@pytest.mark.parametrize("text", ["+7", "2.5e3", "400_000", " 12 ", str(2**63 - 1)])
-def test_a_whole_number_may_be_written_in_every_way_that_rounds_nothing(text):
-    assert read_whole_number(text) == (float(text) if "." in text else int(text))
-
-
-@pytest.mark.parametrize(
-    "text", ["1.5", "0x10", "１２", "", "nan", "1e400", "1e-3", "1__0", "True"]
-)
-def test_what_is_no_whole_number_is_refused(text):
-    with pytest.raises(ValueError, match=r"^"):
-        read_whole_number(text)
+def test_a_whole_number_may_be_written_in_every_way_that_rounds_nothing_and_in_no_other():
+    for text in ("+7", "2.5e3", "400_000", " 12 ", str(2**63 - 1)):
+        assert read_whole_number(text) == (float(text) if "." in text else int(text))
+    for text in ("1.5", "0x10", "１２", "", "nan", "1e400", "1e-3", "1__0", "True"):
+        with pytest.raises(ValueError, match=r"^"):
+            read_whole_number(text)
 
 
 FILES = {

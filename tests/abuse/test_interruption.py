@@ -1,10 +1,9 @@
 """A signal ends a command at any moment: in one line, with its exit code, and nothing half-done."""
 
-from __future__ import annotations
-
 import os
 import pty
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -49,9 +48,8 @@ def started(command: list[str], folder: Path, stderr: int) -> subprocess.Popen[b
 
 
 def _catches(pid: int, number: int) -> bool:
-    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    caught = next((int(line.split()[1], 16) for line in lines if line.startswith("SigCgt")), 0)
-    return bool(caught >> (number - 1) & 1)
+    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
+    return caught is not None and bool(int(caught[1], 16) >> (number - 1) & 1)
 
 
 def processes_of(session: int) -> list[str]:
@@ -104,7 +102,6 @@ def run():
 
 sys.exit(interruption.run_stoppable(run))
 """
-
 
 GOES_ON = 'parallel.run([lambda: print("went on")])'
 

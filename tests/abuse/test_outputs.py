@@ -1,7 +1,5 @@
 """Outputs appear whole or not at all, and replace nothing unasked; both before any work."""
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess
@@ -85,17 +83,13 @@ def no_file_larger_than(size: int):
 
 
 @every_writer
-def test_on_a_full_disk_an_output_is_an_error_of_one_line_and_what_was_there_stays(
-    name, things, tmp_path
-):
+def test_a_full_disk_is_an_error_of_one_line_and_what_was_there_stays(name, things, tmp_path):
     write(name, things, tmp_path / "old" / name)
     (tmp_path / "new").mkdir()
     before = files_in(tmp_path)
-    for folder in ("old", "new"):
+    for place in (tmp_path / "old" / name, tmp_path / "new" / name):
         with no_file_larger_than(100):
-            error = raised_by(
-                lambda place=tmp_path / folder / name: write(name, things, place, overwrite=True)
-            )
+            error = raised_by(lambda at=place: write(name, things, at, overwrite=True))
         assert " cannot be written: File too large" in str(error)
         assert "\n" not in str(error)
         assert isinstance(error, OSError)
@@ -171,11 +165,8 @@ def test_a_library_that_swallows_an_error_does_not_get_away_with_it(tmp_path):
             with suppress(OSError):
                 file.write(b"\x89PNG" * 100_000)
 
-    with (
-        no_file_larger_than(1000),
-        pytest.raises(NotWritten),
-        writing(tmp_path / "a.png") as file,
-    ):
+    place = tmp_path / "a.png"
+    with no_file_larger_than(1000), pytest.raises(NotWritten), writing(place) as file:
         careless(file)
     assert not any(tmp_path.iterdir())
 
@@ -247,9 +238,8 @@ def test_a_kill_before_any_operation_leaves_the_old_or_the_new_whole(name, tmp_p
 
 
 def test_a_folder_whose_replacement_was_killed_is_found_and_comes_back(tmp_path):
-    place, new, old = (
-        tmp_path / f"a.zarr{end}" for end in ("", ".softreach-new", ".softreach-old")
-    )
+    ends = ("", ".softreach-new", ".softreach-old")
+    place, new, old = (tmp_path / f"a.zarr{end}" for end in ends)
     for path in (new, old):
         path.mkdir()
         (path / "whole").write_text(path.name)
@@ -267,7 +257,6 @@ def test_a_folder_whose_replacement_was_killed_is_found_and_comes_back(tmp_path)
 TRUNK = "minimal_trunk"
 THERE = "something is there; choose another name, or pass --overwrite"
 
-
 UNWRITABLE = {
     f"cloud {TRUNK} --out notes.csv": "must be a file name ending in .zarr",
     f"cloud {TRUNK} --out folder.zarr --overwrite": "never replaced",
@@ -282,21 +271,16 @@ UNWRITABLE = {
 
 
 @pytest.fixture
-def crowded(tmp_path, monkeypatch):
-    """A folder with files that are nobody's output."""
-    monkeypatch.chdir(tmp_path)
-    for name in ("notes.ply", "notes.png", "notes.jl", "path.csv"):
-        (tmp_path / name).write_text("my notes")
-    for name in ("folder.zarr/a", "mine/report.html", "mine/cloud.png", "pictures/figures/a.png"):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("mine")
-    return tmp_path
+def crowded(folder):
+    notes = "notes.ply notes.png notes.jl path.csv folder.zarr/a mine/report.html mine/cloud.png"
+    for name in (*notes.split(), "pictures/figures/a.png"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("my notes")
+    return folder
 
 
 @pytest.mark.parametrize("words", UNWRITABLE)
-def test_an_output_that_cannot_be_written_is_refused_before_the_work(
-    words, crowded, capsys, monkeypatch
-):
+def test_what_cannot_be_written_is_refused_before_the_work(words, crowded, capsys, monkeypatch):
     def computed(*_, **__):
         raise AssertionError("it was computed first")
 
@@ -306,10 +290,9 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(
     assert UNWRITABLE[words] in refusal_of(words.split(), capsys, crowded)
 
 
-def test_missing_extras_are_named_all_at_once_before_the_work(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_missing_extras_are_named_all_at_once_before_the_work(folder, monkeypatch, capsys):
     for library in ("trimesh", "matplotlib", "skimage"):
         monkeypatch.setitem(sys.modules, library, None)
-    said = refusal_of(["reach", TRUNK, "--out", "a.stl", "--out", "a.png"], capsys, tmp_path)
+    said = refusal_of(["reach", TRUNK, "--out", "a.stl", "--out", "a.png"], capsys, folder)
     assert "trimesh and matplotlib and scikit-image; install them with: " in said
     assert "pip install 'softreach[export,plot,surface]', or in a clone with: make setup" in said

@@ -1,7 +1,5 @@
 """Numbers, names, labels and files that mean nothing: refused where they enter, in one line."""
 
-from __future__ import annotations
-
 import zipfile
 
 import numpy as np
@@ -41,30 +39,21 @@ def test_a_number_that_no_arm_has_is_refused_with_its_bound(old, new, bound):
     assert bound in str(raised_by(lambda: sr.Manipulator.from_toml(text)))
 
 
-def test_loads_too_small_for_their_square_are_none():
-    assert Loads(gravity=(0.0, 0.0, 1e-300)).gravity == (0.0, 0.0, 0.0)
-
-
-def test_activations_that_push_a_tendon_or_are_far_from_their_bounds_are_refused():
+def test_activations_that_push_a_tendon_or_are_far_from_bounds_and_circular_drives_are_refused():
+    circle = raised_by(lambda: Drive.antagonists("b", "t1", "t1", bounds=(-1, 1)))
+    assert "another bundle" in str(circle)
     assert "cannot push" in str(raised_by(lambda: sr.tip_positions(ROBOT, [[-1.0, 0.0, 0.0]])))
     assert "1000 times" in str(raised_by(lambda: sr.tip_positions(ROBOT, [[9e3, 0.0, 0.0]])))
     trunk = sr.designs.minimal_trunk()
     assert np.isfinite(sr.tip_positions(trunk, [[-5 / 3, 0.5, 0.0]])).all()  # no bound is one
 
 
-def test_a_drive_pulls_one_bundle_and_releases_another():
-    error = raised_by(lambda: Drive.antagonists("b", "t1", "t1", bounds=(-1, 1)))
-    assert "another bundle" in str(error)
-
-
 def test_labels_count_and_not_the_places_of_columns():
     arm = sr.designs.minimal_trunk()
     cloud = sr.compute_cloud(arm, 200)
     turned = cloud.isel(axis=[2, 0, 1])
-    assert np.array_equal(
-        np.sort(sr.convex_hull(turned.tip).vertices, axis=0),
-        np.sort(sr.convex_hull(cloud.tip).vertices, axis=0),
-    )
+    one, other = (np.sort(sr.convex_hull(each.tip).vertices, axis=0) for each in (turned, cloud))
+    assert np.array_equal(one, other)
     assert "x, y, z" in str(raised_by(lambda: sr.plot.plot_cloud(turned)))
     activation = cloud.activation.isel(bundle=[1, 2, 0]).transpose()
     assert np.allclose(sr.tip_positions(arm, activation), cloud.tip, rtol=0.0, atol=1e-15)
@@ -83,8 +72,7 @@ def test_a_mesh_of_ours_is_read_in_the_unit_that_its_file_states(suffix, unit, t
     box.export(path := tmp_path / "other.stl")
     assert "unit" in str(raised_by(lambda: Mesh.load(path)))
     text = '[[avoid]]\nof = "tip"\nmesh = "other.stl"\n'
-    said = str(raised_by(lambda: Requirements.from_toml(text, folder=tmp_path)))
-    assert "mesh_unit" in said
+    assert "mesh_unit" in str(raised_by(lambda: Requirements.from_toml(text, folder=tmp_path)))
 
 
 def test_a_mesh_is_never_unpacked(tmp_path):
@@ -128,7 +116,8 @@ def test_nothing_moves_the_tip_of_a_passive_arm(capsys, tmp_path):
     assert "nan" not in capsys.readouterr().out
 
 
-def test_a_zero_needs_no_unit():
+def test_a_zero_needs_no_unit_and_loads_too_small_for_their_square_are_none():
+    assert Loads(gravity=(0.0, 0.0, 1e-300)).gravity == (0.0, 0.0, 0.0)
     assert position_in("target", "80mm,0,120mm") == [0.08, 0.0, 0.12]
     with pytest.raises(InvalidInput):
         position_in("target", "80mm,0.1,120mm")

@@ -1,7 +1,5 @@
 """Spaces of designs and metrics as nobody should ask for them: refused in one line."""
 
-from __future__ import annotations
-
 import pytest
 
 import softreach as sr
@@ -23,9 +21,16 @@ SPACES = {
     "[parameters]\ntaper_deg = [[0, 1], [2]]": NUMBERS,
     "[parameters]\ntaper_deg = [nan]": "finite value",
     '[parameters]\ntaper_deg = "0:1:2:3"': NUMBERS,
+    '[parameters]\ntaper_deg = "0:3"': f"taper_deg = 0:3: {NUMBERS}",
+    "[parameters]\ntaper = [1]": "with its unit (deg, °, rad)",
+    "[parameters]\n'left.lower' = [-1]\nleft.lower = [-2]": "given once",
+    "lay_out = 1": "key = lay_out: must be one of design",
+    "=": "must be valid TOML",
+    'layout = "circle"\n[parameters]\ntaper_deg = [0]': "layout = circle: must be one of grid",
     "parameters = 5": "a table of parameters",
     "[parameters]": "at least one of",
     "layout = 5": "one of grid, list, sobol, latin",
+    sampled("[parameters]\ntaper_deg = [0]"): "must be two ends",
     sampled("designs = 1e9\n[parameters]\ntaper_deg = [0, 3]"): COUNT,
     sampled("seed = -1\n[parameters]\ntaper_deg = [0, 3]"): "seed = -1: must be a whole number",
     sampled("[parameters]\ntaper_deg = [3, 0]"): ENDS,
@@ -63,8 +68,3 @@ def test_a_number_that_no_design_has_is_refused(trunk, number):
 def test_a_metric_that_is_none_is_refused(change, expected):
     fine = {"name": "m", "unit": "1", "meaning": "x", "needs": (Need.TIPS,), "compute": len}
     assert expected in str(raised_by(lambda: Metric(**{**fine, **change})))
-
-
-def test_a_parameter_is_differentiated_by_once(trunk):
-    error = raised_by(lambda: sr.volume_gradient(trunk, ["taper", "taper"]))
-    assert "parameters = taper: must be given once" in str(error)

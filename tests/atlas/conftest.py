@@ -1,7 +1,5 @@
 """Atlases that several tests ask."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -14,7 +12,6 @@ from tests.atlas.scripts import build16
 
 @pytest.fixture(scope="session")
 def paper(tmp_path_factory) -> xr.Dataset:
-    """A coarse atlas of the paper's designs."""
     store = tmp_path_factory.mktemp("atlas") / "paper.zarr"
     return build16(store, n=20_000, alpha_over_length=0.1, accuracy=0.02).load()
 

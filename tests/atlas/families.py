@@ -1,7 +1,5 @@
 """Small families of designs and what is built of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 
@@ -10,16 +8,14 @@ from softreach.atlas import DesignSpace
 from softreach.atlas.command import Command
 from softreach.atlas.metrics import chosen_metrics
 
-_METRICS = ("extent", "convex", "concave", "curvature")
-SMALL = {"n": 2_000, "alpha_over_length": 0.5, "metrics": _METRICS}
+SMALL = {"n": 2_000, "alpha_over_length": 0.5}
+SMALL["metrics"] = ("extent", "convex", "concave", "curvature")
+TINY = SMALL | {"n": 10, "metrics": ("extent", "curvature")}
 
 
 def small_space(**more) -> DesignSpace:
     tapers = np.radians([0.0, 2.0])
     return DesignSpace.grid(sr.designs.minimal_trunk(), revolution=[0.5, 1.5], taper=tapers, **more)
-
-
-TINY = {"n": 10, "alpha_over_length": 0.5, "metrics": ("extent", "curvature")}
 
 
 def gapped_space() -> DesignSpace:
@@ -29,7 +25,6 @@ def gapped_space() -> DesignSpace:
 
 
 def similar_designs(*lengths: float) -> DesignSpace:
-    """Designs of one shape and different size."""
     base = sr.designs.minimal_trunk()
     radii = np.array(lengths) * base.profile.outer_radius
     return DesignSpace.listed(base, length=lengths, outer_radius=radii)
@@ -42,5 +37,4 @@ def command(space: DesignSpace, **options) -> Command:
 
 
 def assert_same(found: xr.Dataset, truth: xr.Dataset) -> None:
-    """Value for value, to the last bit."""
     xr.testing.assert_identical(found, truth)

@@ -1,7 +1,5 @@
 """Scripts that build an atlas in processes of their own, to be killed."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import textwrap
@@ -28,10 +26,6 @@ SCRIPT = """
         os.kill(os.getpid(), signal.SIGKILL)
 """
 
-
-PATIENCE = 1200.0  # seconds that a script may take on a loaded machine
-
-
 scope: dict = {}
 exec(textwrap.dedent(SCRIPT), scope)
 build16 = scope["build"]
@@ -47,7 +41,7 @@ def run_script(folder: Path, body: str, *arguments: str) -> subprocess.Popen:
 def ended(process: subprocess.Popen) -> tuple[None, str]:
     """What a script says until its end, which must come."""
     try:
-        return process.communicate(timeout=PATIENCE)
+        return process.communicate(timeout=1200.0)  # seconds, on a loaded machine
     finally:
         process.kill()
 

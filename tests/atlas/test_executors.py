@@ -1,10 +1,7 @@
 """Whoever computes an atlas, threads, processes or a cluster, the numbers are the same."""
 
-from __future__ import annotations
-
 import os
 import signal
-import textwrap
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -35,27 +32,23 @@ DIED = "SOFTREACH_TEST_DIED"
 
 
 def deadly_length(arm):
-    """A metric over which a worker dies, once."""
     if arm.profile.taper > 0.01 and not (mark := Path(os.environ[DIED])).exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return arm.length
 
 
-ABOUT = {"name": "deadly", "unit": "m", "meaning": "length", "needs": (Need.ARM,)}
-DEADLY_LENGTH = Metric(**ABOUT, compute=deadly_length)
+ABOUT = {"name": "deadly", "unit": "m", "meaning": "length"}
+DEADLY_LENGTH = Metric(**ABOUT, needs=(Need.ARM,), compute=deadly_length)
 
 
-def test_a_pool_that_loses_a_worker_ends_with_one_line_and_another_one_continues(
-    tmp_path, monkeypatch
-):
+def test_a_pool_that_loses_a_worker_ends_in_one_line_and_another_continues(tmp_path, monkeypatch):
     monkeypatch.setenv(DIED, str(tmp_path / "died"))
     asked = SMALL | {"metrics": ["extent", DEADLY_LENGTH]}
     store = tmp_path / "a.zarr"
-    with (
-        ProcessPoolExecutor(1, get_context("spawn")) as pool,
-        pytest.raises(SoftreachError, match=r"a worker died and broke its executor; .* continues"),
-    ):
+    said = r"a worker died and broke its executor; .* continues"
+    spawned = ProcessPoolExecutor(1, get_context("spawn"))
+    with spawned as pool, pytest.raises(SoftreachError, match=said):
         build_atlas(small_space(), store, executor=pool, **asked)
     assert atlas_status(store).done == 1
     with ThreadPoolExecutor(1) as pool:
@@ -84,7 +77,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
     assert (status.done, status.messages) == (3, {3: "its worker died repeatedly"})
 
 
-DEADLY = """
+ON_DASK = """
     right = building.Intermediates
 
     def deadly(arm, *rest):
@@ -96,15 +89,7 @@ DEADLY = """
         return right(arm, *rest)
 
     building.Intermediates = deadly
-"""
 
-
-def deadly(body: str) -> str:
-    """A script in which a worker dies over design number 3, once."""
-    return textwrap.dedent(DEADLY) + textwrap.dedent(body)
-
-
-ON_DASK = """
     if __name__ == "__main__":
         from distributed import Client, LocalCluster
         options = {"dashboard_address": ":0", "silence_logs": 50}
@@ -118,21 +103,18 @@ ON_DASK = """
 def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     pytest.importorskip("distributed")
     store = tmp_path / "a.zarr"
-    process = run_script(tmp_path, deadly(ON_DASK), str(store))
+    process = run_script(tmp_path, ON_DASK, str(store))
     ended(process)
     assert process.returncode == 0
     assert (tmp_path / "task.died").exists()
     assert_same(open_atlas(store).load(), whole)
 
 
-def test_workers_refuse_a_store_in_the_memory_of_another_process(process):
+def test_memory_of_another_process_and_what_is_no_executor_are_refused(process, tmp_path):
     from zarr.storage import MemoryStore
 
     with pytest.raises(StoreFailed, match="in the memory of another process"):
         build_atlas(small_space(), MemoryStore(), executor=process, **SMALL)
-
-
-def test_what_is_no_executor_is_refused(tmp_path):
     with pytest.raises(InvalidInput, match=r"executor = 3: must be a concurrent\.futures executor"):
         build_atlas(small_space(), tmp_path / "a.zarr", executor=3, **SMALL)
 

@@ -1,7 +1,5 @@
 """Metrics of an atlas: what they say of the paper's designs, and how they scale."""
 
-from __future__ import annotations
-
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -36,13 +34,9 @@ from tests.bodies import rubber
 from tests.cable import Cable
 
 
-def test_volume_grows_with_revolution_for_every_taper(paper):
-    assert (paper.volume.diff("revolution") > 0).all()
-    assert (paper.exact_volume.diff("revolution") > 0).all()
-
-
-def test_largest_volume_is_at_full_revolution_and_two_degrees(paper):
+def test_volume_grows_with_revolution_and_is_largest_at_full_revolution_and_two_degrees(paper):
     for name in ("volume", "exact_volume"):
+        assert (paper[name].diff("revolution") > 0).all()
         best = best_designs(paper, name)
         np.testing.assert_allclose(np.degrees(best.revolution), 108)
         np.testing.assert_allclose(np.degrees(best.taper), 2)
@@ -102,17 +96,17 @@ def mean_height(tips):
     return tips[:, 2].mean()
 
 
-MEAN_HEIGHT = Metric(
-    name="mean_height",
-    unit="m",
-    meaning="mean height of the tips",
-    needs=(Need.TIPS,),
-    compute=mean_height,
-)
+ABOUT = {"name": "mean_height", "unit": "m", "meaning": "mean height of the tips"}
+MEAN_HEIGHT = Metric(**ABOUT, needs=(Need.TIPS,), compute=mean_height)
+
+
+def built_with(metrics, tmp_path, **options):
+    """The small atlas with these metrics."""
+    return build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"metrics": metrics} | options)
 
 
 def test_a_metric_of_ones_own_is_one_object(tmp_path):
-    atlas = build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"metrics": [MEAN_HEIGHT]})
+    atlas = built_with([MEAN_HEIGHT], tmp_path)
     assert atlas.mean_height.attrs == {"units": "m", "long_name": "mean height of the tips"}
     for number in range(4):
         alone = sr.compute_cloud(small_space().design(number), n=2_000)
@@ -130,8 +124,7 @@ def test_a_profile_of_ones_own_lies_over_stations_and_quantiles(tmp_path):
         compute=lambda statistics: 2 * statistics["torsion_quantile"].values,
         over=("station", "quantile"),
     )
-    metrics = ("curvature", doubled)
-    atlas = build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"metrics": metrics})
+    atlas = built_with(("curvature", doubled), tmp_path)
     assert atlas.twice_the_torsion.dims == ("revolution", "taper", "station", "quantile")
     np.testing.assert_array_equal(atlas.twice_the_torsion, 2 * atlas.torsion_quantile)
 
@@ -177,8 +170,7 @@ def test_what_metrics_share_is_computed_once_for_each_design(tmp_path, monkeypat
         counting(import_module("softreach.atlas.intermediates"), name)
     counting(import_module("softreach.workspace"), "reachable_set")
     counting(TipMap, "tips_and_status")
-    options = SMALL | {"metrics": tuple(METRIC_GROUPS), "accuracy": 0.1}
-    build_atlas(small_space(), tmp_path / "a.zarr", **options)
+    built_with(tuple(METRIC_GROUPS), tmp_path, accuracy=0.1)
     assert calls == dict.fromkeys([*shared, "reachable_set", "tips_and_status"], 4)
 
 
@@ -194,13 +186,13 @@ def test_what_metrics_share_is_computed_once_for_each_design(tmp_path, monkeypat
 def test_a_metric_without_a_number_fails_its_designs_and_says_so(tmp_path, compute, message):
     faulty = replace(MEAN_HEIGHT, compute=compute)
     with pytest.warns(SoftreachWarning, match=f"4 designs failed, .*MetricFailed: {message}"):
-        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"metrics": [faulty]})
+        built_with([faulty], tmp_path)
     assert atlas_status(tmp_path / "a.zarr").failed == 4
 
 
 def test_nan_is_an_answer_where_the_metric_says_when(tmp_path):
     sometimes = replace(MEAN_HEIGHT, compute=lambda tips: np.nan, nan_if="there is no sky")
-    atlas = build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"metrics": [sometimes]})
+    atlas = built_with([sometimes], tmp_path)
     assert np.isnan(atlas.mean_height).all()
     assert atlas_status(atlas).done == 4
 
@@ -218,24 +210,21 @@ def test_nan_is_an_answer_where_the_metric_says_when(tmp_path):
 )
 def test_metrics_that_cannot_be_told_apart_are_refused(tmp_path, metrics, message):
     with pytest.raises(InvalidInput, match=message) as caught:
-        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"metrics": metrics})
+        built_with(metrics, tmp_path)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "a.zarr").exists()
 
 
 def test_a_call_with_other_metrics_does_not_resume(tmp_path):
-    store = tmp_path / "a.zarr"
-    asked = SMALL | {"metrics": ("extent", MEAN_HEIGHT)}
-    first = build_atlas(small_space(), store, **asked).load()
-    again = SMALL | {"metrics": (MEAN_HEIGHT, "extent")}
-    assert_same(build_atlas(small_space(), store, **again).load(), first)
+    first = built_with(("extent", MEAN_HEIGHT), tmp_path).load()
+    assert_same(built_with((MEAN_HEIGHT, "extent"), tmp_path).load(), first)
     for metrics, message in [
         (("extent",), "metrics: mean_height there and not here"),
         (("extent", "convex", MEAN_HEIGHT), "metrics: convex_volume here and not there"),
         (("extent", replace(MEAN_HEIGHT, compute=np.mean)), "mean_height, compute: 'tests.* there"),
     ]:
         with pytest.raises(InvalidInput, match=message):
-            build_atlas(small_space(), store, **SMALL | {"metrics": metrics})
+            built_with(metrics, tmp_path)
 
 
 def test_a_store_is_read_without_the_functions_of_its_metrics(tmp_path):
@@ -251,11 +240,10 @@ def test_a_store_is_read_without_the_functions_of_its_metrics(tmp_path):
 
 def test_lambdas_are_refused_in_one_line_where_processes_compute_them(process, tmp_path):
     typed = replace(MEAN_HEIGHT, compute=lambda tips: 0.0)
-    options = SMALL | {"metrics": [typed]}
     with pytest.raises(InvalidInput, match=r"compute of metric .*lambda"):
-        build_atlas(small_space(), tmp_path / "a.zarr", executor=process, **options)
+        built_with([typed], tmp_path, executor=process)
     with ThreadPoolExecutor(1) as threads:
-        atlas = build_atlas(small_space(), tmp_path / "a.zarr", executor=threads, **options)
+        atlas = built_with([typed], tmp_path, executor=threads)
     assert (atlas.mean_height == 0).all()
 
 
@@ -284,13 +272,8 @@ def count(tips, activations):
     return len(tips)
 
 
-COUNT = Metric(
-    name="stable_samples",
-    unit="1",
-    meaning="number of stable samples",
-    needs=(Need.TIPS, Need.ACTIVATIONS),
-    compute=count,
-)
+COUNTED = {"name": "stable_samples", "unit": "1", "meaning": "number of stable samples"}
+COUNT = Metric(**COUNTED, needs=(Need.TIPS, Need.ACTIVATIONS), compute=count)
 
 
 @pytest.fixture(scope="module")
@@ -317,18 +300,16 @@ def build(space, store):
 
 
 def test_lost_samples_count_for_nothing_but_their_share(built):
-    atlas = built
     arm = designs.lce_arm().replace(loads=Loads(gravity=(0.0, 0.0, -9.81), payload=PAYLOADS[1]))
     cloud = compute_cloud(arm, N)
     stable = cloud.status.values == TipStatus.STABLE
-    at = atlas.isel({"loads.payload": 1})
+    at = built.isel({"loads.payload": 1})
     assert 0 < at.lost_share.item() == pytest.approx(1.0 - stable.mean())
     assert at.stable_samples.item() == stable.sum()
     tips = cloud.tip.values[stable]
     assert at.z_min.item() == pytest.approx(tips[:, 2].min())
-    hull = concave_hull(tips, 0.6 * arm.length)
-    assert at.volume.item() == pytest.approx(hull.volume)
-    assert atlas.lost_share.values[0] == 0.0
+    assert at.volume.item() == pytest.approx(concave_hull(tips, 0.6 * arm.length).volume)
+    assert built.lost_share.values[0] == 0.0
     assert np.isfinite(at.bending_quantile.values).all()
 
 
@@ -349,8 +330,7 @@ def test_a_design_that_is_nowhere_stable_is_told_and_not_tried_again(squeezed):
 
 
 def test_clouds_of_loaded_designs_have_their_status(built, squeezed):
-    cases = [(built, payload) for payload in PAYLOADS]
-    for atlas, payload in cases + [(squeezed[0], payload) for payload in SQUEEZING]:
+    for atlas, payload in zip([built] * 2 + [squeezed[0]] * 2, PAYLOADS + SQUEEZING, strict=True):
         cloud = atlas_cloud(atlas, **{"loads.payload": payload})
         lost = (cloud.status.values != TipStatus.STABLE).mean()
         assert lost == atlas.lost_share.sel({"loads.payload": payload}).item()

@@ -1,8 +1,5 @@
 """An atlas that is read: its clouds, designs, best designs, and its figures."""
 
-from __future__ import annotations
-
-import json
 import pickle
 import re
 from functools import partial
@@ -22,7 +19,7 @@ from softreach.cli import atlas as atlas_command
 from softreach.cli.app import run
 from softreach.picture.projection import view_axes
 from softreach.plot import plot_metric_map
-from softreach.plot.atlas import box_over_length, hull_over_length, panel_extent
+from softreach.plot.atlas import box_over_length, hull_over_length, panel_extent, sheet_axes
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import (
     SMALL,
@@ -68,12 +65,11 @@ def test_an_atlas_that_was_read_is_a_dataset_like_any_other(small, operation):
     operation(small, "taper")._repr_html_()
 
 
-@pytest.mark.parametrize("name", ["where", "where drop", "reindex", "max", "diff", "pickle"])
-def test_so_is_a_cloud(tmp_path, trunk, name):
+def test_so_is_a_cloud(tmp_path, trunk):
     sr.save_cloud(sr.compute_cloud(trunk, 50), tmp_path / "cloud.zarr")
     cloud = sr.open_cloud(tmp_path / "cloud.zarr")
-    numbered = cloud.assign_coords(sample=np.arange(50.0))
-    EVERYDAY[name](numbered, "sample")._repr_html_()
+    for name in ("where", "where drop", "reindex", "max", "diff", "pickle"):
+        EVERYDAY[name](cloud.assign_coords(sample=np.arange(50.0)), "sample")._repr_html_()
     assert cloud.reindex(axis=["z", "none"]).tip.isnull().any()
 
 
@@ -159,14 +155,7 @@ def test_best_designs_are_the_best_that_meet_the_constraints(paper):
         best_designs(paper, "volumes")
 
 
-def test_what_is_not_there_is_not_opened(tmp_path):
-    with pytest.raises(InvalidInput, match="by build_atlas; it does not exist"):
-        sr.open_atlas(tmp_path / "nothing.zarr")
-    assert not (tmp_path / "nothing.zarr").exists()
-
-
 def test_no_tip_lies_outside_its_panel_of_the_sheet(paper):
-    pytest.importorskip("matplotlib")
     extent = panel_extent(box_over_length(paper), "oblique")
     seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes("oblique")[:2].T
     assert extent.left < seen[:, 0].min() < seen[:, 0].max() < extent.right
@@ -174,7 +163,6 @@ def test_no_tip_lies_outside_its_panel_of_the_sheet(paper):
 
 
 def test_maps_need_two_parameters(paper):
-    pytest.importorskip("matplotlib")
     with pytest.raises(InvalidInput, match="a grid of two parameters"):
         plot_metric_map(paper.isel(taper=0), "volume")
     with pytest.raises(InvalidInput, match="metric = volumes"):
@@ -194,18 +182,12 @@ def some(tmp_path_factory) -> Path:
 
 def test_every_question_takes_a_store_or_what_was_opened_of_it(some):
     at = {"taper": np.radians(2), "outer_radius": 0.1}
-    for ask in (
-        atlas_status,
-        partial(best_designs, metric="volume"),
-        partial(atlas_design, **at),
-        partial(atlas_cloud, **at),
-    ):
-        answers = [ask(place) for place in (some, str(some), sr.open_atlas(some))]
-        for answer in answers[1:]:
-            if isinstance(answer, xr.Dataset):
-                assert_same(answer, answers[0])
-            else:
-                assert answer == answers[0]
+    best = partial(best_designs, metric="volume")
+    design, cloud = partial(atlas_design, **at), partial(atlas_cloud, **at)
+    for ask in (atlas_status, best, design, cloud):
+        first, *others = (ask(place) for place in (some, str(some), sr.open_atlas(some)))
+        for answer in others:
+            assert answer.identical(first) if ask in (best, cloud) else answer == first
 
 
 def test_reading_an_atlas_makes_none_of_its_designs(tmp_path, monkeypatch):
@@ -220,14 +202,16 @@ def test_reading_an_atlas_makes_none_of_its_designs(tmp_path, monkeypatch):
 
 
 def test_building_an_atlas_makes_each_design_once_before_any_is_computed(tmp_path, monkeypatch):
-    made = []
-    plain = sr.DesignSpace.design
+    made, plain = [], sr.DesignSpace.design
     monkeypatch.setattr(sr.DesignSpace, "design", lambda *a: made.append(a[1]) or plain(*a))
     build_atlas(small_space(), tmp_path / "a.zarr", shard=(3, 4), **SMALL)
     assert made == [0, 1, 2, 3, 3]
 
 
-def test_what_is_no_atlas_is_refused_by_every_question(trunk):
+def test_what_is_no_atlas_or_not_there_is_refused_by_every_question(trunk, tmp_path):
+    with pytest.raises(InvalidInput, match="by build_atlas; it does not exist"):
+        sr.open_atlas(tmp_path / "nothing.zarr")
+    assert not (tmp_path / "nothing.zarr").exists()
     cloud = sr.compute_cloud(trunk, n=10)
     for ask in (atlas_status, partial(best_designs, metric="x"), atlas_design, atlas_cloud):
         with pytest.raises(InvalidInput, match="a store, or a dataset from open_atlas"):
@@ -262,18 +246,16 @@ def test_questions_about_a_design_name_the_parameters_they_need(some):
 
 
 def test_figures_show_each_design_in_lengths_of_its_own(tmp_path):
-    """Similar designs of any size fill the same box and have the same hull."""
-    small, large = (
-        build_atlas(similar_designs(length), tmp_path / f"{length}.zarr", **SMALL)
-        for length in (1.0, 2.0)
+    """Similar designs of any size fill the same box."""
+    small, large, both = (
+        build_atlas(similar_designs(*lengths), tmp_path / f"{lengths[0]}.zarr", **SMALL)
+        for lengths in ((1.0,), (2.0,), (0.5, 2.0, 1.0))
     )
-    np.testing.assert_allclose(box_over_length(large), box_over_length(small), rtol=1e-12)
-    both = build_atlas(similar_designs(2.0, 1.0, 0.5), tmp_path / "a.zarr", **SMALL)
-    np.testing.assert_allclose(box_over_length(both), box_over_length(small), rtol=1e-12)
+    for atlas in (large, both):
+        np.testing.assert_allclose(box_over_length(atlas), box_over_length(small), rtol=1e-12)
 
 
 def test_maps_and_hulls_of_an_atlas_over_length_are_relative_to_each_length(tmp_path):
-    pytest.importorskip("matplotlib")
     base = sr.designs.minimal_trunk(taper=0.0)
     space = sr.DesignSpace.grid(base, revolution=[0.5, 1.5], length=[0.5, 2.0])
     atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
@@ -289,10 +271,8 @@ def test_maps_and_hulls_of_an_atlas_over_length_are_relative_to_each_length(tmp_
 # `softreach atlas`: what it prints, draws and refuses
 
 
-def test_every_figure_is_written_as_png_and_pdf(paper, tmp_path, capsys):
-    pytest.importorskip("matplotlib")
+def test_every_figure_is_written_as_png_and_pdf(paper, tmp_path):
     atlas_command.figures(paper.encoding["source"], out=tmp_path, panels=2)
-    capsys.readouterr()
     names = {"clouds", "hulls", "corners", "curvature", "map_volume", "map_exact_unreachability"}
     assert names <= {path.stem for path in tmp_path.glob("*.png")}
     assert {p.stem for p in tmp_path.glob("*.png")} == {p.stem for p in tmp_path.glob("*.pdf")}
@@ -301,30 +281,19 @@ def test_every_figure_is_written_as_png_and_pdf(paper, tmp_path, capsys):
 BUILD = ("--vary", "taper_deg=0,2", "--n", "500", "--metrics", "extent,concave")
 
 
-def test_a_built_atlas_is_that_of_the_library(tmp_path, capsys):
-    store = str(tmp_path / "a.zarr")
-    assert run(["atlas", "build", store, *BUILD, "--alpha", "0.8L", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["done"] == 2
-    atlas = sr.open_atlas(store)
+def test_a_built_atlas_and_its_best_designs_are_those_of_the_library(folder, printed):
+    assert printed("atlas", "build", "a.zarr", *BUILD, "--alpha", "0.8L")["done"] == 2
+    atlas = sr.open_atlas("a.zarr")
     assert atlas.volume.attrs["alpha_over_length"] == 0.8
     alone = sr.compute_cloud(sr.designs.minimal_trunk(taper=np.radians(2)), n=500)
     volume = atlas.volume.sel(taper=np.radians(2), method="nearest")
     np.testing.assert_allclose(volume, sr.concave_hull(alone.tip, 0.8).volume, rtol=1e-12)
-
-
-def test_the_best_of_a_store_are_printed_in_units_of_people(tmp_path, capsys):
-    store = str(tmp_path / "a.zarr")
-    assert run(["atlas", "build", store, *BUILD, "--alpha", "0.8L"]) == 0
-    capsys.readouterr()
-    assert run(["atlas", "best", store, "volume", "--where", "taper_deg<=1", "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["taper_deg"] == [0.0]
-    design = tmp_path / "best.toml"
-    assert run(["atlas", "best", store, "volume", "--out", str(design)]) == 0
-    best = best_designs(sr.open_atlas(store), "volume")
-    taper = float(best.taper[0])
-    assert sr.Manipulator.load(design) == sr.designs.minimal_trunk(taper=taper)
-    assert run(["atlas", "best", store, "volume", "--where", "volume>=9", "--out", "a.toml"]) == 2
+    asked = ["atlas", "best", "a.zarr", "volume"]
+    assert printed(*asked, "--where", "taper_deg<=1")["taper_deg"] == [0.0]
+    assert run([*asked, "--out", "best.toml"]) == 0
+    taper = float(best_designs(atlas, "volume").taper[0])
+    assert sr.Manipulator.load("best.toml") == sr.designs.minimal_trunk(taper=taper)
+    assert run([*asked, "--where", "volume>=9", "--out", "a.toml"]) == 2
 
 
 # Atlases over numbers of parts, called by their paths in Python, files and commands alike
@@ -335,16 +304,9 @@ VALUES = {MODULUS: [1e5, 2e5], END: [0.5, 1.0]}
 VARIED = ("--vary", f"{MODULUS}_pa=1e5,2e5", "--vary", f"{END}=0.5,1", "--n", "10")
 
 
-def space() -> sr.DesignSpace:
-    return sr.DesignSpace.grid(sr.designs.minimal_trunk(), **VALUES)
-
-
-def varied(store):
-    return sr.build_atlas(space(), store, **TINY)
-
-
-def test_the_dimensions_of_an_atlas_are_the_paths(tmp_path):
-    atlas = varied(tmp_path / "a.zarr")
+def test_the_dimensions_of_an_atlas_are_the_paths_and_axes_show_symbol_part_and_unit(tmp_path):
+    space = sr.DesignSpace.grid(sr.designs.minimal_trunk(), **VALUES)
+    atlas = sr.build_atlas(space, tmp_path / "a.zarr", **TINY)
     assert atlas["status"].dims == (MODULUS, END)
     assert atlas[MODULUS].attrs["units"] == "Pa"
     assert (atlas["status"] == 1).all()
@@ -355,28 +317,18 @@ def test_the_dimensions_of_an_atlas_are_the_paths(tmp_path):
     np.testing.assert_allclose(atlas_cloud(atlas, **at).tip, cloud.tip, atol=1e-5)
     height = atlas.reach_height.sel(at)
     np.testing.assert_allclose(height, cloud.tip[:, 2].max(), rtol=1e-12)
-
-
-def test_the_command_line_writes_the_unit_behind_the_path(tmp_path, capsys):
-    store = str(tmp_path / "a.zarr")
-    assert run(["atlas", "build", store, *VARIED, "--metrics", "extent"]) == 0
-    assert sr.open_atlas(store)["status"].dims == (MODULUS, END)
-    capsys.readouterr()
-    where = ("--where", f"{MODULUS}_pa>=1.5e5", "--where", f"{END}<=0.6")
-    assert run(["atlas", "best", store, "reach_height", *where, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (found[f"{MODULUS}_pa"], found[END]) == ([2e5], [0.5])
-
-
-def test_axes_of_figures_show_symbol_part_and_unit(tmp_path):
-    pytest.importorskip("matplotlib")
-    from softreach.plot.atlas import plot_metric_map, sheet_axes
-
-    atlas = varied(tmp_path / "a.zarr")
     across, up = sheet_axes(atlas)
     assert across.label == "E of rings[0].material (Pa)"
     assert up.label == "Z₁/L of left"
     assert plot_metric_map(atlas, "reach_height").get_xlabel() == across.label
+
+
+def test_the_command_line_writes_the_unit_behind_the_path(folder, printed):
+    assert run(["atlas", "build", "a.zarr", *VARIED, "--metrics", "extent"]) == 0
+    assert sr.open_atlas("a.zarr")["status"].dims == (MODULUS, END)
+    where = ("--where", f"{MODULUS}_pa>=1.5e5", "--where", f"{END}<=0.6")
+    found = printed("atlas", "best", "a.zarr", "reach_height", *where)
+    assert (found[f"{MODULUS}_pa"], found[END]) == ([2e5], [0.5])
 
 
 def test_one_number_is_not_varied_under_two_names():

@@ -1,7 +1,5 @@
 """The designs of a space: every combination, lists, samples, and how they are written."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -33,10 +31,10 @@ def test_a_list_takes_values_together():
 
 @pytest.mark.parametrize("method", ["sobol", "latin"])
 def test_sampled_designs_fill_each_stratum_once(method):
-    arm = sr.designs.minimal_trunk()
-    space = DesignSpace.sampled(arm, 16, method=method, taper=(0.0, 0.04), extent=(0.5, 1.0))
+    ends = {"taper": (0.0, 0.04), "extent": (0.5, 1.0)}
+    space = DesignSpace.sampled(sr.designs.minimal_trunk(), 16, method=method, **ends)
     for name, values in space.parameters:
-        low, high = {"taper": (0.0, 0.04), "extent": (0.5, 1.0)}[name]
+        low, high = ends[name]
         strata = np.floor((np.array(values) - low) / (high - low) * 16)
         assert sorted(strata) == list(range(16))
 
@@ -61,7 +59,6 @@ def test_designs_that_would_be_shortened_to_nothing_are_gaps():
         ({}, "parameters = none"),
         ({"tapper": [0]}, "parameter = tapper: must be one of revolution, taper.*did you mean"),
         ({"taper": []}, "taper = .*: must be one finite value"),
-        ({"taper": [np.nan]}, "taper = .*: must be one finite value"),
         ({"taper": [0.01, 0.01]}, "taper = .*: must be values that differ"),
     ],
 )
@@ -111,23 +108,6 @@ def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
     space = parse_space(f"design = 'redundant_trunk'\n{table}", builtin)
     wanted = {"left.offset": np.radians(60), "longitudinal 1.bundles": 2}
     assert space.values(0) == pytest.approx(wanted)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('layout = "circle"\n[parameters]\ntaper_deg = [0]', "layout = circle: must be one of g"),
-        ("[parameters]\ntaper = [1]", r"taper = \[1\]: must be a .* its unit \(deg, °, rad\)"),
-        ('[parameters]\ntaper_deg = "0:3"', "taper_deg = 0:3: must be numbers"),
-        ('layout = "sobol"\n[parameters]\ntaper_deg = [0]', "taper = .*: must be two ends"),
-        ("[parameters]\n'left.lower' = [-1]\nleft.lower = [-2]", "left.lower = .* given once"),
-        ("lay_out = 1", "key = lay_out: must be one of design"),
-        ("=", "must be valid TOML"),
-    ],
-)
-def test_faulty_space_files_are_refused(text, message):
-    with pytest.raises(InvalidInput, match=message):
-        parse_space(text, builtin)
 
 
 def test_sampled_spaces_can_be_written_too():

@@ -1,7 +1,5 @@
 """The store of an atlas: begun by several at once, killed, elsewhere, damaged."""
 
-from __future__ import annotations
-
 import asyncio
 import re
 import shutil
@@ -10,7 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from threading import Barrier
-from typing import Any, NamedTuple
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,20 +54,13 @@ def interrupting_store(place: Path, write: int, interruption):
     return Store(LocalStore(place))
 
 
-class Begun(NamedTuple):
-    """A store that is begun."""
-
-    files: dict[str, bytes]
-    writes: int
-
-
 @pytest.fixture(scope="module")
-def begun(tmp_path_factory) -> Begun:
-    """As one creator leaves it whom nobody disturbs."""
+def begun(tmp_path_factory):
+    """A store as one creator leaves it whom nobody disturbs: its files and how many writes."""
     place = tmp_path_factory.mktemp("begun")
     store = interrupting_store(place, -1, None)
     AtlasStore.begin(store, command(gapped_space(), **TINY))
-    return Begun(stored_files(place), store.count)
+    return SimpleNamespace(files=stored_files(place), writes=store.count)
 
 
 def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(begun, tmp_path):
@@ -140,7 +132,6 @@ def test_many_creators_may_start_at_one_moment(begun, tmp_path):
 
 @pytest.fixture(params=["a URL", "a URL of a file", "a Zarr store", "a place in a Zarr store"])
 def elsewhere(request, tmp_path) -> Any:
-    """Places that are no paths."""
     if request.param == "a URL of a file":
         return f"file://{tmp_path}/a.zarr"
     if "Zarr" in request.param:
@@ -194,12 +185,11 @@ def test_a_machine_that_draws_other_activations_does_not_mend_them(tmp_path, mon
         AtlasStore.begin(tmp_path / "a.zarr", asked)
 
 
-def test_designs_of_the_same_atlas_built_in_two_folders_may_be_copied_together(tmp_path):
-    places = [tmp_path / name for name in ("0.zarr", "1.zarr", "whole.zarr")]
-    for place, shard in zip(places, ((0, 2), (1, 2), (0, 1)), strict=True):
-        build_atlas(small_space(), place, shard=shard, **SMALL)
-    shutil.copytree(places[1], places[0], dirs_exist_ok=True)
-    assert stored_files(places[0]) == stored_files(places[2])
+def test_designs_of_the_same_atlas_built_in_two_folders_may_be_copied_together(folder):
+    for name, shard in {"a": (0, 2), "b": (1, 2), "whole": (0, 1)}.items():
+        build_atlas(small_space(), name, shard=shard, **SMALL)
+    shutil.copytree("b", "a", dirs_exist_ok=True)
+    assert stored_files(folder / "a") == stored_files(folder / "whole")
 
 
 def test_only_public_names_of_zarr_are_used():
@@ -224,12 +214,6 @@ def test_a_store_says_how_long_each_design_is_and_steps_by_the_shortest(tmp_path
         alone = sr.compute_cloud(of_length(space.base, length), n=2_000)
         off = np.abs(atlas_cloud(atlas, length=length).tip.values - alone.tip.values).max()
         assert 0 < off <= 0.5e-5 * 0.8 * (1 + 1e-9)
-
-
-def test_lengths_that_cannot_share_a_step_are_refused(tmp_path):
-    space = DesignSpace.grid(sr.designs.minimal_trunk(taper=0.0), length=[0.01, 1000.0])
-    with pytest.raises(InvalidInput, match=r"length = 0\.01 to 1000 m: .*pass keep_clouds=False"):
-        build_atlas(space, tmp_path / "a.zarr", **SMALL)
 
 
 # Interrupted or refused, failed or retried, an atlas ends with the same numbers
@@ -279,35 +263,28 @@ def test_a_second_call_computes_nothing(tmp_path, monkeypatch):
     assert build_atlas(small_space(), tmp_path / "a.zarr", **SMALL).identical(first)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"n": 3_000}, "n: 2000 there, 3000 here"),
-        ({"seed": 1}, "seed: 0 there, 1 here"),
-        ({"alpha_over_length": 0.4}, "alpha_over_length: 0.5 there, 0.4 here"),
-        ({"keep_clouds": False}, "keep_clouds: True there, False here"),
-        ({"metrics": ("extent",)}, "metrics: convex_volume, volume, .* there and not here"),
-    ],
-)
-def test_another_command_is_refused_with_what_differs(tmp_path, change, message):
+BASE = sr.designs.minimal_trunk()
+NEW = {
+    "n: 2000 there, 3000 here": {"n": 3_000},
+    "seed: 0 there, 1 here": {"seed": 1},
+    "alpha_over_length: 0.5 there, 0.4 here": {"alpha_over_length": 0.4},
+    "keep_clouds: True there, False here": {"keep_clouds": False},
+    "metrics: convex_volume, volume, .* there and not here": {"metrics": ("extent",)},
+    "revolution: ": {"space": DesignSpace.grid(BASE, revolution=[0.5, 1.0], taper=[0.0, 0.03])},
+    "taper: .* there, none here": {"space": DesignSpace.grid(BASE, revolution=[0.5, 1.5])},
+    "length_m = 1.0 there, length_m = 1.5 here": {
+        "space": DesignSpace.grid(of_length(BASE, 1.5), revolution=[0.5, 1.5])
+    },
+}
+
+
+@pytest.mark.parametrize("message", NEW)
+def test_another_command_or_space_is_refused_with_what_differs(tmp_path, message):
     store = tmp_path / "a.zarr"
     AtlasStore.begin(store, command(small_space(), **SMALL))
     with pytest.raises(InvalidInput, match=message) as caught:
-        build_atlas(small_space(), store, **SMALL | change)
+        build_atlas(**{"space": small_space(), "store": store} | SMALL | NEW[message])
     assert "\n" not in str(caught.value)
-
-
-def test_another_space_is_refused_with_what_differs(tmp_path):
-    AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
-    base = sr.designs.minimal_trunk()
-    longer = DesignSpace.grid(of_length(base, 1.5), revolution=[0.5, 1.5])
-    for space, message in [
-        (DesignSpace.grid(base, revolution=[0.5, 1.0], taper=[0.0, np.radians(2)]), "revolution: "),
-        (DesignSpace.grid(base, revolution=[0.5, 1.5]), "taper: .* there, none here"),
-        (longer, "length_m = 1.0 there, length_m = 1.5 here"),
-    ]:
-        with pytest.raises(InvalidInput, match=message):
-            build_atlas(space, tmp_path / "a.zarr", **SMALL)
 
 
 def test_gaps_are_told_before_anything_runs_and_stay_gaps(tmp_path):
@@ -321,9 +298,12 @@ def test_gaps_are_told_before_anything_runs_and_stay_gaps(tmp_path):
     assert "leaves no tip" in status.messages[2]
 
 
-def test_a_space_of_gaps_alone_is_refused(tmp_path):
+def test_a_space_of_gaps_alone_and_lengths_that_cannot_share_a_step_are_refused(tmp_path):
     space = DesignSpace.grid(sr.designs.minimal_trunk(), taper=[0.1, 0.2])
     with pytest.raises(InvalidInput, match=r"valid for at least one design; .*leaves no tip"):
+        build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    space = DesignSpace.grid(sr.designs.minimal_trunk(taper=0.0), length=[0.01, 1000.0])
+    with pytest.raises(InvalidInput, match=r"length = 0\.01 to 1000 m: .*pass keep_clouds=False"):
         build_atlas(space, tmp_path / "a.zarr", **SMALL)
 
 
