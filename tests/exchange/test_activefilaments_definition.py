@@ -1,7 +1,5 @@
 """Definitions of ActiveFilaments.jl: what is read, what is written, and what is refused."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

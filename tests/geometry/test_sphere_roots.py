@@ -1,7 +1,5 @@
 """All places where a map of the sphere takes a value: maps whose places are known."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

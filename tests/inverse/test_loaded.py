@@ -1,7 +1,5 @@
 """The inverse problem and paths of arms whose loads leave some activations no stable rest."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Newton steps in a box against SciPy's bounded least squares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

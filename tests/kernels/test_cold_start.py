@@ -1,7 +1,5 @@
 """What a first run compiles: as little as can be, and nothing that crept in."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import re

@@ -1,7 +1,5 @@
 """Coverage of mapped boxes: every place counted as often as it is covered, to the last bit."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """What a search prints, draws and writes, its file, and its command."""
 
-from __future__ import annotations
-
 import json
 import re
 

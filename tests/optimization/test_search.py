@@ -1,7 +1,5 @@
 """Laws of a search: what it finds, that it goes on, and that chance is in its seed alone."""
 
-from __future__ import annotations
-
 import sqlite3
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Tolerance of a design: closed forms of moving boundaries, and arms that are really made."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -10,8 +10,6 @@ and tends to that of the rod with the square of the links' length h. Moments and
 have no potential and are refused. Second derivatives are imaginary parts of the first.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """An arm as a chain of arcs between disks that guide its tendons: least energy, by SciPy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

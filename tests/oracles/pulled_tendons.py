@@ -6,8 +6,6 @@ nowhere. Paths are those of lines at p = ρ (cos θ, sin θ): a small change of 
 their length by ∫ t3 dζ + dω·(p × t) dZ, with t along the straight arm.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

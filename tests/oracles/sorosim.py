@@ -3,8 +3,6 @@
 `python -m tests.oracles.sorosim` compares all of them with the shooting of `loaded_rod`.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import sys

@@ -12,8 +12,6 @@ the last for a solid rod of the radius R, to first order. The linear law is wron
 tension. A parallel tendon does not turn: for it the linear law is that of the follower load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The shooting of loaded rods against closed forms, published numbers and other programs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

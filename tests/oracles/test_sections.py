@@ -1,7 +1,5 @@
 """The section's quadrature against closed forms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The rod with follower tendons against closed forms, and against the balance of its cut parts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Laws of the check of a design against requirements."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

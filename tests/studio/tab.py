@@ -1,7 +1,5 @@
 """A browser tab as a person uses it, beside the session that serves it."""
 
-from __future__ import annotations
-
 import io
 import time
 from collections.abc import Callable, Sequence

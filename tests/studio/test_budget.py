@@ -1,7 +1,5 @@
 """What a computation of the studio may use."""
 
-from __future__ import annotations
-
 import re
 import time
 from dataclasses import replace

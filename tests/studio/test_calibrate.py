@@ -1,7 +1,5 @@
 """Measured poses in a tab without a browser: their markers over the arm, and a fit to them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

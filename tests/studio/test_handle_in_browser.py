@@ -1,7 +1,5 @@
 """The tip is dragged in the page: the arm follows on its branch, as far as that leads."""
 
-from __future__ import annotations
-
 import io
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Files that no studio saved are refused in one line, at once."""
 
-from __future__ import annotations
-
 import json
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """What follows from a change of the state."""
 
-from __future__ import annotations
-
 import threading
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Five journeys through the page: what a person does there, and what is seen of it."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

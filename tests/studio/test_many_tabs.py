@@ -1,7 +1,5 @@
 """Many tabs, tabs that are shaken, and tabs that are gone: without a browser, as sockets."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import time

@@ -1,7 +1,5 @@
 """Needs in a tab without a browser: typed, loaded, judged live and drawn."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

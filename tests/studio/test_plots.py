@@ -1,7 +1,5 @@
 """Plots beside the scene and paths of the tip, as values."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a design can reach, coarse and fine, and how points are colored, thinned, cut and picked."""
 
-from __future__ import annotations
-
 import io
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Nothing that came from elsewhere is rendered, and the page talks to its own server alone."""
 
-from __future__ import annotations
-
 import json
 import socket
 

@@ -1,7 +1,5 @@
 """Laws of the arm in the scene of the studio: a mesh for each part, moved and not made anew."""
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A safe start."""
 
-from __future__ import annotations
-
 import re
 from http.client import HTTPConnection
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """A tab without a browser: what a click hits, and what its panels are told."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 

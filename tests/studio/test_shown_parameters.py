@@ -1,7 +1,5 @@
 """Parameters as a person reads them: sliders of a design, numbers of its parts."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

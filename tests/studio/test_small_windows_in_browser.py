@@ -1,7 +1,5 @@
 """Everything can be reached and read in the window of a phone, and beside docked plots."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

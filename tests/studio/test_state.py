@@ -1,7 +1,5 @@
 """Laws of the state, without a server."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Laws of the page of plain files: its numbers and surfaces are those that were computed."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -1,7 +1,5 @@
 """End to end: what a person does in the page, and what the library says about it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

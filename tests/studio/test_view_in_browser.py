@@ -1,7 +1,5 @@
 """What the scene shows, as pixels: the arm in sight from every side, views, lights, pictures."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
