@@ -10,7 +10,7 @@ from softreach.rod import as_tip_map
 
 
 @pytest.fixture
-def inverse_tab(tab):
+def tab(tab):
     tab.open("Move")
     return tab
 
@@ -33,14 +33,8 @@ def around(tab, point):
     return imread(io.BytesIO(tab.page.screenshot(clip=clip)))[..., :3]
 
 
-FOLDED = (-0.48, -0.16, -1.23)
-"""The oblique eye sees the tip behind the body."""
-START = (-0.7, -0.4, -0.9)
-
-
 @pytest.mark.large
-def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
-    tab = inverse_tab
+def test_a_click_on_a_ghost_takes_that_solution(tab):
     arm, scene = tab.session.state.design, tab.session.scene
     tab.session.aim(np.array([0.2932, 0.0739, 0.0088]))
     tab.settle()
@@ -59,8 +53,7 @@ def test_a_click_on_a_ghost_takes_that_solution(inverse_tab):
 
 
 @pytest.mark.large
-def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse_tab):
-    tab = inverse_tab
+def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(tab):
     begin = pose(tab, (-0.2, -0.1, -0.1))
     tab.drag_tip(begin, begin + [0.0, 0.0, 0.35])
     tab.wait(lambda: tab.session.found.lag and tab.session.found.lag.dragged.gap > 0.02, "a gap")
@@ -78,12 +71,11 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
 
 
 @pytest.mark.large
-def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_tab):
-    tab = inverse_tab
+def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(tab):
     tab.session.look_from("oblique")
-    pose(tab, START)
+    pose(tab, (-0.7, -0.4, -0.9))
     tab.wait(lambda: tab.drawn("/arm/0").opacity is None, "an arm beside its tip is solid")
-    begin = pose(tab, FOLDED)
+    begin = pose(tab, (-0.48, -0.16, -1.23))  # the tip behind the body
     tab.wait(lambda: tab.drawn("/arm/0").opacity == 0.6, "an arm before its tip is not")
     tab.wait(lambda: around(tab, begin).min() < 0.45, "the ball is seen")  # the body is lighter
     tab.drag_tip(begin, begin + [0.0, 0.0, 0.02])

@@ -98,17 +98,16 @@ def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(ta
     tab.press("Clear the target")
 
     tab.choose("mouse", "sets the target")
-    tab.click_at(goal)
+    page.mouse.click(*tab.screen(goal))
     page.get_by_text(re.compile(r"\d activations? reach")).first.wait_for()
     tab.settle()
-    np.testing.assert_allclose(
-        tab.screen(np.array(tab.session.state.target)), tab.screen(goal), atol=12
-    )
+    aimed = tab.screen(np.array(tab.session.state.target))
+    np.testing.assert_allclose(aimed, tab.screen(goal), atol=12)
     tab.press("Clear the target")
     tab.choose("mouse", "drags the tip")
 
     pulled(tab, (-1.0, -0.2, -0.5))
-    around = 2 * np.pi * np.linspace(0, 1, 33)
+    around = np.linspace(0, 2 * np.pi, 33)
     offset = 0.05 * np.stack([np.cos(around) - 1, np.sin(around), 0 * around], axis=1)
     tip = sr.tip_positions(TRUNK, [tab.session.state.activation])[0]
     tab.upload("Load a path (CSV)", written(tmp_path / "circle.csv", tip + offset, "xyz"))
@@ -116,9 +115,8 @@ def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(ta
     saved = tab.save("Save the path (CSV)", tmp_path).read_text().splitlines()
     assert len(saved) == 1 + 33
     tab.press("Play")
-    tab.wait(
-        lambda: tab.slider("point").get_attribute("aria-valuenow") == "32", "the arm is at the end"
-    )
+    point = tab.slider("point")
+    tab.wait(lambda: point.get_attribute("aria-valuenow") == "32", "the arm is at the end")
 
 
 def test_a_design_is_kept_and_what_a_change_costs_is_read_beside_it(tab):

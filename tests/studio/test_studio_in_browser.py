@@ -165,23 +165,23 @@ def test_plots_follow_the_slice_and_the_design(tab):
     cut = Slice(axis="z", center=0.5, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut, sweep=True, swept="taper"))
 
+    def sources() -> set[str]:
+        images = tab.page.locator("img[src^=blob]").all()
+        return {image.get_attribute("src") for image in images}
+
     def area() -> float:
         return enclosed_area(section_curves(tab.session.found.reach, cut), 2)
 
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
     tab.page.get_by_text(f"{area():.4g} m²").wait_for()
     tab.page.get_by_text("values make no design").wait_for()
-    images = tab.page.locator("img[src^=blob]")
-    pictures = {image.get_attribute("src") for image in images.all()}
+    pictures = sources()
     tab.open("Design")
     tab.drag("taper φ [deg]", -20)
     tab.settle()
     assert tab.session.found.sweep.arm == tab.session.found.section.arm == tab.session.state.design
     tab.page.get_by_text(f"{area():.4g} m²").wait_for()
-    tab.wait(
-        lambda: not {image.get_attribute("src") for image in images.all()} & pictures,
-        "both pictures follow",
-    )
+    tab.wait(lambda: not sources() & pictures, "both pictures follow")
 
 
 def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_design(tab):
@@ -212,7 +212,6 @@ def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_
 
 
 # No design and no failure takes the server or the tab away
-
 
 ENDLESS = Quality(coarse_level=12, fine_level=12, fine_accuracy=1e-5, most_seconds=3600.0)
 

@@ -8,36 +8,31 @@ import pytest
 from softreach.studio.scene.camera import VIEWS, framing
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
-from softreach.support.palette import bundle_color
 from tests.studio.tab import like
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
-BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
 
 
-def show(tab, **look) -> None:
+def pixels(tab, **look) -> np.ndarray:
     tab.session.update(lambda s: s.showing(**look))
-    tab.settle()
+    return tab.pixels()
 
 
 @pytest.mark.large
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
-    show(tab, mouse="none")  # the handle has a blue arrow
-    seen = like(tab.pixels(), BLUE)
-    show(tab, half=False)
-    hidden = like(tab.pixels(), BLUE)
-    show(tab, cloud=False)
-    alone = like(tab.pixels(), BLUE)
+    seen = like(pixels(tab, mouse="none"), BLUE)  # the handle has a blue arrow
+    hidden = like(pixels(tab, half=False), BLUE)
+    alone = like(pixels(tab, cloud=False), BLUE)
     assert seen > 0.9 * alone
     assert hidden < 0.75 * seen
 
 
 @pytest.mark.large
-@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.large)])
+@pytest.mark.parametrize("dark", [False, True])
 def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
     def change(**look) -> np.ndarray:
         """By how much the arm changes each pixel, 0 to 1."""
-        with_arm, without = (pixels_of(tab, arm=shown, **look) for shown in (True, False))
+        with_arm, without = (pixels(tab, arm=shown, **look) for shown in (True, False))
         return np.abs(with_arm - without).max(axis=-1)
 
     look = {"cloud": False, "mouse": "none", "dark": dark}
@@ -46,37 +41,26 @@ def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
     assert (change(surface=True, **look)[of_arm] > 0.08).mean() > 0.9
 
 
-def pixels_of(tab, **look) -> np.ndarray:
-    show(tab, **look)
-    return tab.pixels()
-
-
 @pytest.mark.large
 def test_buttons_look_from_the_front_the_side_and_the_top(tab):
-    def texts() -> set[str]:
-        return {label.text for label in tab.labels() if label.text.endswith("[m]")}
+    def is_seen_along(axis: int) -> bool:
+        camera = tab.session.camera.actual()
+        way = np.subtract(camera.look_at, camera.position)
+        names = {label.text for label in tab.labels() if label.text.endswith("[m]")}
+        others = {f"{other} [m]" for other in "xyz".replace("xyz"[axis], "")}
+        return abs(way[axis]) / np.linalg.norm(way) > 0.99 and names == others
 
     tab.open("View")
     for view, axis in (("front", 1), ("side", 0), ("top", 2)):
         tab.press(view)
-        tab.wait(lambda axis=axis: along(tab, axis) > 0.99, f"the {view} is seen")
-        tab.settle()
-        names = {f"{'xyz'[k]} [m]" for k in range(3) if k != axis}
-        tab.wait(lambda names=names: texts() == names, f"{names} are named")
-
-
-def along(tab, axis: int) -> float:
-    """Cosine between where the eye looks and an axis."""
-    camera = tab.session.camera.actual()
-    way = np.subtract(camera.look_at, camera.position)
-    return abs(way[axis]) / np.linalg.norm(way)
+        tab.wait(lambda axis=axis: is_seen_along(axis), f"the {view} is seen, its axes are named")
 
 
 @pytest.mark.large
 def test_a_saved_picture_is_drawn_anew_over_key_numbers_and_design(tab, tmp_path, monkeypatch):
     from matplotlib.image import imread
 
-    show(tab, cloud=False, surface=True)
+    tab.show_surface()
     camera = tab.session.client.camera
     tab.open("Export")
     tab.choose("picture", "as it is seen (.png)")
