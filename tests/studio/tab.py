@@ -232,10 +232,6 @@ class Tab:
         apart = np.abs(now[:rows, :columns] - before[:rows, :columns]).max(axis=-1)
         return float((apart > 0.03).mean())
 
-    def like(self, color: Sequence[float]) -> int:
-        """Number of pixels of the canvas of about this hue, however bright."""
-        return like(self.pixels(), color)
-
     def screen(self, point: np.ndarray) -> tuple[float, float]:
         """Pixels of a point of the scene [L] in the page."""
         canvas = self.page.locator("canvas").first.bounding_box()

@@ -119,7 +119,9 @@ def slopes(small_arm) -> VolumeSlopes:
     return volume_slopes(reach_of(small_arm), QUALITY, nothing)
 
 
-def test_a_slope_is_that_of_the_library_in_units_of_the_slider(small_arm, slopes):
+def test_each_slider_that_moves_continuously_has_the_slope_of_the_library_in_its_unit(
+    small_arm, slopes
+):
     theirs = volume_gradient(small_arm, list(slopes.slopes), accuracy=QUALITY.fine_accuracy)
     sliders = {each.name: each for each in slider_parameters(small_arm)}
     rows = zip(theirs.parameters, theirs.volume, theirs.volume_error, strict=True)
@@ -127,12 +129,8 @@ def test_a_slope_is_that_of_the_library_in_units_of_the_slider(small_arm, slopes
         scale, ours = sliders[name].scale, slopes.slopes[name]
         assert abs(ours.value - value * scale) <= ours.error + error * scale
         assert ours.error < 10 * error * scale
-
-
-def test_every_slider_that_moves_continuously_has_a_slope(small_arm, slopes):
     known = parameters(small_arm)
-    sliders = {each.name for each in slider_parameters(small_arm)}
-    assert {name for name in sliders if known[name].whole} == sliders - set(slopes.slopes) != set()
+    assert {name for name in sliders if known[name].whole} == {*sliders} - {*slopes.slopes} != set()
 
 
 def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
@@ -158,17 +156,19 @@ def test_a_set_that_is_flat_or_torn_has_no_slopes_and_what_takes_too_long_is_lef
     assert volume_slopes(reach, replace(QUALITY, most_seconds=0.0), nothing).slopes == {}
 
 
-def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
+def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter_or_stage(trunk):
     reach, calls = reach_of(trunk), []
 
     def check() -> None:
         calls.append(None)
-        if len(calls) == 5:
+        if len(calls) >= 5:
             raise Dropped
 
     with pytest.raises(Dropped):
         volume_slopes(reach, QUALITY, check)
     assert len(calls) == 5
+    with pytest.raises(Dropped):
+        next(stages(trunk, 11, SMALL, check))
 
 
 def share_of(html: str) -> float:

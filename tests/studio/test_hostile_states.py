@@ -24,12 +24,15 @@ from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
 STATE = StudioState(design=designs.minimal_trunk())
 
 
+SAVED = json.loads(STATE.to_json())
+
+
 def state_with(**changes):
-    return json.dumps(json.loads(STATE.to_json()) | changes)
+    return json.dumps(SAVED | changes)
 
 
 def look_with(**changes):
-    return state_with(appearance=json.loads(STATE.to_json())["appearance"] | changes)
+    return state_with(appearance=SAVED["appearance"] | changes)
 
 
 def design_with(old, new):
@@ -39,10 +42,7 @@ def design_with(old, new):
 
 
 HOSTILE = {
-    "many bundles.toml": design_with(
-        'name = "longitudinal"', 'name = "longitudinal"\nbundles = 1000000'
-    ),
-    "nested.json": "[" * 100_000,
+    "many bundles.toml": design_with('name = "left"', 'name = "left"\nbundles = 1000000'),
     "50 MB.json": " " * 50_000_000,
     "mouse.json": look_with(mouse=["tip"]),
     "section.json": look_with(section=1),
@@ -56,9 +56,7 @@ HOSTILE = {
     "needs of a file.json": state_with(needs='[[reach]]\nfile = "/etc/passwd"'),
     "needs of a mesh.json": state_with(needs='[[avoid]]\nmesh = "/etc/passwd"'),
     "many places.json": state_with(needs=f"[[reach]]\nplaces_m = {[[0, 0, 1]] * 301}"),
-    "null.json": "null",
     "list.json": "[]",
-    "nothing.json": "{}",
     "version.json": state_with(softreach_studio=99),
     "flat target.json": state_with(target=[1, 2]),
     "unknown field.json": state_with(searched=None),
@@ -85,14 +83,12 @@ def test_a_large_file_is_refused_before_it_is_read(tmp_path):
 
 # What a tab is opened on and saved as
 
-
 SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
 
 
 @pytest.fixture(scope="module")
 def fine(trunk):
-    *_, last = stages(trunk, 10, SMALL, lambda: None)
-    return last
+    return [*stages(trunk, 10, SMALL, lambda: None)][-1]
 
 
 def saved(fine, state, kind: str, name: str) -> bytes:
@@ -132,11 +128,10 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     kept = in_slice(fine.cloud.tip.values / fine.arm.length, cut)
     np.testing.assert_array_equal(plotted["cloud"].tip, fine.cloud.tip[kept])
     wanted = sample_values(fine, 14, color)
-    wanted = wanted[kept] if not isinstance(wanted, str | int) else wanted
-    np.testing.assert_array_equal(plotted["color"], wanted)
     if not isinstance(wanted, str | int):
-        bar = plotted["figure"].axes[-1]
-        assert bar.get_ylabel().startswith(color)
+        wanted = wanted[kept]
+        assert plotted["figure"].axes[-1].get_ylabel().startswith(color)
+    np.testing.assert_array_equal(plotted["color"], wanted)
 
 
 def test_a_saved_page_holds_everything_itself(fine):

@@ -12,6 +12,7 @@ from softreach.rod.kinematics import marker_positions
 from softreach.studio.captions import size_text
 from softreach.support import palette
 from tests.calibration.arms import table
+from tests.studio.tab import like
 from tests.studio.test_calibrate import ARM, INPUTS, MARKERS, NAMES, PLACES
 
 ORANGE = (0.92, 0.35, 0.0)
@@ -160,14 +161,14 @@ def test_requirements_are_seen_met_and_missed_and_follow_a_slider(tab):
     tab.settle()
     tab.press("Add to the needs")
     page.get_by_text("place 2: missed by 0.0082").wait_for()
-    assert tab.like(red) > 5
+    assert like(tab.pixels(), red) > 5
 
     tab.open("Design")
     page.get_by_text("needs: 1 of 2 met · place 2 missed by").wait_for()
     tab.drag("taper φ [deg]", -85)
     page.get_by_text("needs: 2 of 2 met").wait_for()
-    tab.wait(lambda: tab.like(red) == 0, "the cross is a ball")
-    assert tab.like(green) > 5
+    tab.wait(lambda: like(tab.pixels(), red) == 0, "the cross is a ball")
+    assert like(tab.pixels(), green) > 5
     tab.open("Goals")
     page.get_by_text("place 2: reached").wait_for()
     tab.press("Undo")
@@ -189,7 +190,7 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     tab.unfold("measured poses")
     tab.upload("Load measured poses (CSV)", bench)
     page.get_by_text("bench.csv: 20 samples of half, tool").wait_for()
-    assert tab.like(ORANGE) > 20
+    assert like(tab.pixels(), ORANGE) > 20
     for sample in (0, 1):
         predicted = marker_positions(ARM, INPUTS[sample])[0]
         half, tool = 1e3 * np.linalg.norm(PLACES[sample] - predicted, axis=1)

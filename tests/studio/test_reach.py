@@ -45,8 +45,8 @@ from softreach.studio.tabs.design import (
     other_loads,
     setting_text,
 )
-from softreach.studio.work import Dropped
 from softreach.support.errors import InvalidDesign, InvalidInput
+from tests.laws import differences
 from tests.studio.test_scene import Meshes
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -65,14 +65,6 @@ def test_the_coarse_cloud_is_the_beginning_of_the_fine_one_which_has_what_is_sho
     assert coarse.volume == pytest.approx(fine.volume, rel=0.02)
     *_, shown = stages(trunk, 14, SMALL, lambda: None)
     assert shown.samples == 1 << 14
-
-
-def test_a_check_that_raises_stops_the_work(trunk):
-    def check():
-        raise Dropped
-
-    with pytest.raises(Dropped):
-        next(stages(trunk, 11, SMALL, check))
 
 
 def test_a_grid_from_a_file_is_thinned_evenly(trunk):
@@ -101,13 +93,9 @@ def test_points_are_colored_by_the_determinant_of_the_tips_velocities(both, trun
     reach = both[-1]
     shown = sample_values(reach, 8, "manipulability").values
     sample = int(np.argsort(shown)[len(shown) // 2])  # the few largest and smallest are clipped
-    gamma, h = reach.cloud.activation.values[[sample]], 1e-4
-    columns = [
-        (tip_positions(trunk, gamma + h * e, 1e-9) - tip_positions(trunk, gamma - h * e, 1e-9))[0]
-        for e in np.eye(3)
-    ]
-    expected = abs(np.linalg.det(np.array(columns) / (2 * h)))
-    assert shown[sample] == pytest.approx(expected, rel=1e-3)
+    gamma = reach.cloud.activation.values[[sample]]
+    (slopes,) = differences(lambda gamma: tip_positions(trunk, gamma, 1e-9), gamma, 1e-4)
+    assert shown[sample] == pytest.approx(abs(np.linalg.det(slopes)), rel=1e-3)
 
 
 def test_a_slice_shows_what_lies_within_its_thickness(rng):
@@ -236,7 +224,6 @@ def test_numbers_stand_outside_and_the_name_of_an_axis_keeps_its_distance_from_t
 
 # Loads as they are typed, and what is computed of a loaded arm
 
-
 HANGING = GRAVITIES["up"]
 LOADS = ("gravity", "payload", "payload_arm", "tip_force")
 NOTHING = dict.fromkeys(LOADS, (0.0, 0.0, 0.0)) | {"payload": 0.0}
@@ -276,11 +263,10 @@ def test_what_is_typed_is_what_the_design_has(lce):
 
 
 def test_directions_are_known_by_name(lce):
-    for name, gravity in GRAVITIES.items():
+    for name, gravity in (GRAVITIES | {"": (0.0, 0.0, -1.62)}).items():
         arm = loaded(lce, gravity=gravity)
         assert gravity_name(StudioState(design=arm)) == name
         assert typed_loads(arm)["gravity"] == gravity
-    assert gravity_name(StudioState(design=loaded(lce, gravity=(0.0, 0.0, -1.62)))) == ""
 
 
 def test_place_and_turn_of_the_base_are_typed_in_mm_and_degrees_and_the_rest_of_it_stays(lce):
@@ -319,12 +305,9 @@ def test_a_caption_says_how_an_arm_stands_and_what_acts_on_it_where_that_is_not_
 
 
 def test_matter_that_lacks_what_loads_need_is_named_in_one_line(trunk):
-    with pytest.raises(InvalidDesign) as caught:
+    line = r"^.*Young's modulus E and the density ρ of ring 0.*tab Parts.*\Z"
+    with pytest.raises(InvalidDesign, match=line):
         loaded(trunk, gravity=HANGING)
-    line = str(caught.value)
-    assert "\n" not in line
-    assert "Young's modulus E and the density ρ of ring 0" in line
-    assert "tab Parts" in line
 
 
 @pytest.mark.parametrize("wrong", [-1e9, 1e9, math.nan, math.inf])

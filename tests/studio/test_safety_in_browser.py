@@ -79,19 +79,6 @@ def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser
 
 
 @pytest.mark.large
-def test_no_other_page_can_frame_the_studio(browser, studio):
-    page = browser.new_page()
-    page.set_content(f'<iframe src="{studio.url}"></iframe>')
-    page.wait_for_timeout(1500)
-    assert all("softreach" not in frame.content() for frame in page.frames[1:])
-    assert not any(frame.locator("#root").count() for frame in page.frames[1:])
-    page.close()
-
-
-# A studio that others can reach shows itself only to those who know its token
-
-
-@pytest.mark.large
 def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, studio):
     with Studio(studio.start, token="secret") as guarded:
         tab = Tab(browser, guarded)
