@@ -49,7 +49,7 @@ def places(part: dict) -> np.ndarray:
     return low + steps / 65535 * (high - low)
 
 
-def test_numbers_on_the_page_are_those_of_the_reachable_set(written, trunk):
+def test_numbers_on_the_page_are_those_of_the_reachable_set_and_gaps_say_why(written, trunk):
     space = grid(trunk)
     for number in (0, 1):
         reached = reachable_set(space.design(number))
@@ -60,6 +60,9 @@ def test_numbers_on_the_page_are_those_of_the_reachable_set(written, trunk):
             assert error == getattr(reached, f"{name}_error")
         assert numbers["volume"][2].endswith("liters")
         assert numbers["volume"][2].startswith(f"{1e3 * reached.volume:.1f}")
+    gaps = [design["gap"] for design in sheet(written)["designs"][2:]]
+    assert len(gaps) == written.gaps == 2
+    assert all(gap.startswith("taper_deg = 4: leaves no tip") for gap in gaps)
 
 
 def test_places_are_those_of_the_surface_within_a_hundredth_of_the_length(written, trunk):
@@ -75,12 +78,6 @@ def test_places_are_those_of_the_surface_within_a_hundredth_of_the_length(writte
     assert np.quantile(distance, 0.99) < 0.01 * 100
     step = np.ptp(design["box"], axis=0).max() / 65535
     assert rounding == pytest.approx(step, rel=0.5)
-
-
-def test_gaps_say_why_and_in_degrees(written):
-    gaps = [design["gap"] for design in sheet(written)["designs"] if "gap" in design]
-    assert len(gaps) == written.gaps == 2
-    assert all(gap.startswith("taper_deg = 4: leaves no tip") for gap in gaps)
 
 
 def test_no_file_names_a_host_or_ends_its_script_and_none_is_large(written):
