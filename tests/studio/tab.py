@@ -102,8 +102,7 @@ class Tab:
         deadline = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < deadline, f"still waiting until {what}"
-            if hasattr(self, "page"):
-                self.page.wait_for_timeout(30)
+            self.page.wait_for_timeout(30)
 
     def settle(self) -> None:
         """Wait until the page has sent what it holds back, and the session has done its work.

@@ -159,19 +159,16 @@ def test_work_is_found_again_and_a_folder_that_cannot_be_written_is_named(tmp_pa
     assert work.latest == STATE
 
 
-@pytest.fixture
-def home(tmp_path, monkeypatch):
+def test_the_command_goes_on_with_the_work_on_its_design_unless_it_is_to_begin_afresh(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    return tmp_path
-
-
-def test_the_command_goes_on_with_the_work_on_its_design_alone_unless_it_is_to_begin_afresh(home):
     bent = STATE.replace(activation=(-0.5, 0.0, 0.0))
     work_on(TRUNK).keep(bent)
     for fresh, latest in ((False, bent), (True, None)):
         assert begun("minimal_trunk", fresh=fresh)[1].latest == latest
-    assert home in next(home.rglob("latest.json")).parents
-    file = home / "state.json"
+    assert tmp_path in next(tmp_path.rglob("latest.json")).parents
+    file = tmp_path / "state.json"
     file.write_text(STATE.to_json())  # is shown as it is
     assert begun(str(file), fresh=False)[1].latest is None
     assert work_on(changed(TRUNK, {"taper": 0.0})).latest is None  # each has work of its own

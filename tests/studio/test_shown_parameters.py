@@ -41,16 +41,18 @@ def test_sliders_start_within_their_ends_at_the_value_of_the_design_and_leave_it
             assert one.values(made) == before, name
 
 
-@pytest.mark.parametrize("design", designs.__all__)
-def test_a_moved_slider_shows_its_own_value_in_the_new_design(design):
-    arm = getattr(designs, design)()
-    for control in slider_parameters(arm):
+@pytest.fixture(params=designs.__all__)
+def named(request):
+    return getattr(designs, request.param)()
+
+
+def test_a_moved_slider_shows_its_own_value_in_the_new_design(named):
+    for control in slider_parameters(named):
         to = 0.95 * control.shown + 0.05 * control.limits[0]
         to = 2 if control.name.endswith(".bundles") else to
-        made = changed(arm, {control.name: to * control.scale})
-        again = next((c for c in slider_parameters(made) if c.name == control.name), None)
-        assert again is not None
-        assert again.shown == pytest.approx(to, abs=1e-6)
+        made = changed(named, {control.name: to * control.scale})
+        again = {one.name: one.shown for one in slider_parameters(made)}
+        assert again[control.name] == pytest.approx(to, abs=1e-6)
 
 
 def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
@@ -80,19 +82,17 @@ def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
     assert f"{name}.unknown" in {one.name for one in typed}
 
 
-@pytest.mark.parametrize("design", designs.__all__)
-def test_sliders_end_where_the_design_ends_and_not_before(design):
-    arm = getattr(designs, design)()
-    ends = slider_ends(arm, {}, lambda: None)
-    for control in slider_parameters(arm):
+def test_sliders_end_where_the_design_ends_and_not_before(named):
+    ends = slider_ends(named, {}, lambda: None)
+    for control in slider_parameters(named):
         for end, limit in zip(ends[control.name], control.limits, strict=True):
-            made = changed(arm, {control.name: end * control.scale})
+            made = changed(named, {control.name: end * control.scale})
             value = find_parameter(made, control.name).value(made)
             assert value == pytest.approx(end * control.scale, abs=1e-9)
             if end != limit:
                 beyond = end + 0.011 * np.copysign(end, limit - end)
                 with pytest.raises(InvalidDesign):
-                    changed(arm, {control.name: beyond * control.scale})
+                    changed(named, {control.name: beyond * control.scale})
 
 
 def test_ends_are_those_of_the_design_when_they_are_looked_for_near_others(trunk):
@@ -157,13 +157,11 @@ def test_sliders_of_a_design_are_made_once_and_none_of_what_it_leaves_open(trunk
     assert not [name for name in names if "modulus" in name]
 
 
-@pytest.mark.parametrize("design", designs.__all__)
-def test_a_parameter_is_shown_in_one_part_and_is_its_value_in_the_unit_that_is_shown(design):
-    arm = getattr(designs, design)()
-    typed = [one for part in parts(arm).values() for one in part_parameters(arm, part)]
+def test_a_parameter_is_shown_in_one_part_and_is_its_value_in_the_unit_that_is_shown(named):
+    typed = [one for part in parts(named).values() for one in part_parameters(named, part)]
     assert len({one.name for one in typed}) == len(typed)
-    for one in [*typed, *named_parameters(arm), *slider_parameters(arm)]:
-        value = find_parameter(arm, one.name).value(arm)
+    for one in [*typed, *named_parameters(named), *slider_parameters(named)]:
+        value = find_parameter(named, one.name).value(named)
         assert one.shown * one.scale == pytest.approx(value, rel=1e-11, nan_ok=True)
 
 

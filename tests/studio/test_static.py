@@ -18,8 +18,6 @@ from softreach.workspace import reachable_set
 pytest.importorskip("matplotlib.pyplot")
 pytest.importorskip("skimage")
 
-_LARGEST = 20e6 / 64  # bytes of a design, that 8 by 8 of them stay below 20 MB
-
 
 def grid(trunk, tapers=(2.0, 4.0), revolutions=(72.0, 108.0)) -> DesignSpace:
     """Designs of which those with a taper of 4° have no tip."""
@@ -88,7 +86,7 @@ def test_no_file_names_a_host_or_ends_its_script_and_none_is_large(written):
         text = path.read_text()
         assert "://" not in text
         assert "fetch(" not in text
-        assert len(text) < _LARGEST
+        assert len(text) < 20e6 / 64  # that 8 by 8 of them stay below 20 MB
     assert written.size == sum(path.stat().st_size for path in written.page.parent.rglob("*.*"))
 
 
