@@ -15,7 +15,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 from tests.browser import CHROMIUM, FLAGS
 from tests.studio.tab import Tab
-from tests.studio.test_handle_in_browser import pose
+from tests.studio.test_view_in_browser import pose
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed

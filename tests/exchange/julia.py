@@ -1,7 +1,5 @@
 """What ActiveFilaments.jl writes as JSON of a filament: its constructors, in Python."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

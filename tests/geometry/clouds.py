@@ -1,7 +1,5 @@
 """Clouds to triangulate: easy, real and malicious."""
 
-from __future__ import annotations
-
 import numpy as np
 
 __all__ = ["DEGENERATE", "FLAT", "arc_tips", "random_points"]

@@ -1,7 +1,5 @@
 """The predicates again, in rational numbers: slow and beyond doubt."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 

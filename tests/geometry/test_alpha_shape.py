@@ -1,7 +1,5 @@
 """Alpha shapes against their definition, and against SciPy."""
 
-from __future__ import annotations
-
 from collections import Counter
 from unittest.mock import ANY
 

@@ -1,7 +1,5 @@
 """Means over balls equal a loop over all pairs, whatever the cloud and the radius."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

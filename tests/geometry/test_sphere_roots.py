@@ -1,7 +1,5 @@
 """All places where a map of the sphere takes a value: maps whose places are known."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np
@@ -70,15 +68,12 @@ def folded(amount):
 
     def image(points):
         x, y, z = points.T
-        return turned(np.arctan2(np.hypot(x, y), z), np.arctan2(y, x), amount)
+        polar, around = np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)
+        leaning = polar + amount * np.sin(polar) * np.cos(around) * np.sin(3 * polar)
+        ring = np.sin(leaning)
+        return np.stack([ring * np.cos(around), ring * np.sin(around), np.cos(leaning)], axis=1)
 
     return image
-
-
-def turned(polar, around, amount):
-    leaning = polar + amount * np.sin(polar) * np.cos(around) * np.sin(3 * polar)
-    ring = np.sin(leaning)
-    return np.stack([ring * np.cos(around), ring * np.sin(around), np.cos(leaning)], axis=1)
 
 
 @pytest.mark.parametrize("amount", [0.3, 1.0, 2.5])
@@ -148,7 +143,6 @@ def test_four_parts_cover_what_was_cut():
 
 
 # Every sign equals that of rational arithmetic
-
 
 WORK = scratch()
 

@@ -1,7 +1,5 @@
 """Tips on the boundary of what an arm reaches: what the error of tips leaves open is reached."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.adversarial_inverse import activations, boundary_tips, bounded_design

@@ -1,7 +1,5 @@
 """An arm whose tip is dragged follows on its branch, and stays as near as that leads."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The least activation that reaches a target is found; bounds of what a linear map leaves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.adversarial_inverse import activations, random_design

@@ -1,7 +1,5 @@
 """Four bundles and more: what is reached is found, what is called unreachable is so."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from benchmarks.adversarial_inverse import PLACES, activations, random_design

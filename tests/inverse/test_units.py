@@ -1,7 +1,5 @@
 """The inverse problem of arms whose activations are forces, pressures and strains at once."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

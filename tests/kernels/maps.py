@@ -1,7 +1,5 @@
 """Quadratic maps of a box into space, with everything about them known, and their meshes."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

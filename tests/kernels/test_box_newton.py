@@ -1,7 +1,5 @@
 """Newton steps in a box against SciPy's bounded least squares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -127,7 +125,6 @@ def test_the_projection_does_not_depend_on_where_it_begins(bundles):
 
 # Searches for the least change side by side, against one at a time in NumPy
 
-
 RESTORING = 1e6
 
 
@@ -138,10 +135,8 @@ def reference(rod, target, near, gamma, most):
     miss, slope = at(rod, target, gamma)
     for count in range(1, most + 1):
         softness = (1e-15 if norm(miss) < 1e-3 else 1e-6) * (slope**2).sum() + 1e-30
-        bounds = [
-            np.maximum(low, gamma - reach * rod.box.scales),
-            np.minimum(high, gamma + reach * rod.box.scales),
-        ]
+        room = reach * rod.box.scales
+        bounds = np.maximum(low, gamma - room), np.minimum(high, gamma + room)
         center, wanted = (near + sigma * gamma) / (1 + sigma), slope @ gamma - miss
         trial, force = np.empty((1, len(gamma))), np.zeros((1, 3))
         given = center, slope, wanted, np.array(softness), *bounds
@@ -201,10 +196,8 @@ def searches(design, n):
 def test_searches_end_where_those_of_the_reference_do(design, most):
     rod, request, start = searches(design, 24)
     ends = sqp(rod, request, np.arange(24), start, most=most)
-    wanted = [
-        reference(rod, *given, most)
-        for given in zip(request.targets, request.near, start, strict=True)
-    ]
+    given = zip(request.targets, request.near, start, strict=True)
+    wanted = [reference(rod, *one, most) for one in given]
     np.testing.assert_allclose(ends.gamma, wanted, atol=1e-6)
     miss = norm(rod.tips(ends.gamma) - request.targets, axis=1)
     np.testing.assert_allclose(ends.residual, miss, atol=1e-12)
@@ -227,14 +220,12 @@ def test_least_changes_are_stationary():
     assert len(reached) > 100
     low, high = rod.box.low, rod.box.high
     slopes = rod.tips_and_slopes(ends.gamma)[1]
-    stationary = []
     for row in reached:
         gamma = ends.gamma[row]
         free = (gamma > low + 1e-9) & (gamma < high - 1e-9)
         change, slope = (request.near[row] - gamma)[free], slopes[row][:, free]
         left = change - slope.T @ np.linalg.lstsq(slope.T, change, rcond=None)[0]
-        stationary.append(norm(left) < 1e-5)
-    assert all(stationary)
+        assert norm(left) < 1e-5
 
 
 # Linear complementarity problems by their own conditions

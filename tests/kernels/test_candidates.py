@@ -1,7 +1,5 @@
 """Where Newton's method starts: at every root of a map that is affine or quadratic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

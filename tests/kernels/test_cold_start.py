@@ -1,7 +1,5 @@
 """What a first run compiles: as little as can be, and nothing that crept in."""
 
-from __future__ import annotations
-
 import importlib
 import pkgutil
 import re
@@ -15,28 +13,13 @@ from softreach.kernels.parts import KernelDispatcher
 
 ROD = {"tips._tips"}
 SLOPES = ROD | {"slopes._slopes"}
-HULL = {
-    "spatial_sort._sort_keys",
-    "bowyer_watson._insert",
-    "alpha.measure_cells",
-    "alpha.boundary_faces",
-    "alpha.join_regions",
-}
-REACH = {
-    "contour.stretches",
-    "contour.critical_triangles",
-    "raster.most_crossings",
-    "raster.crossings",
-    "raster.add_counts",
-}
+HULL = {"spatial_sort._sort_keys", "bowyer_watson._insert"}
+HULL |= {f"alpha.{name}" for name in ("measure_cells", "boundary_faces", "join_regions")}
+REACH = {"contour.stretches", "contour.critical_triangles"}
+REACH |= {f"raster.{name}" for name in ("most_crossings", "crossings", "add_counts")}
 MESH = {"activation_mesh.interpolation_errors", "activation_mesh.face_planes"}
-NEWTON = {
-    "candidates._find_starts",
-    "newton.newton_step",
-    "newton.conditions",
-    "newton.merge_equal",
-    "newton.second_preimages",
-}
+OF_NEWTON = ("newton_step", "conditions", "merge_equal", "second_preimages")
+NEWTON = {"candidates._find_starts", *(f"newton.{name}" for name in OF_NEWTON)}
 KERNELS = {
     "cloud": ROD,
     "volume": ROD | HULL,

@@ -1,7 +1,5 @@
 """Laws of compilation."""
 
-from __future__ import annotations
-
 import importlib
 import logging
 import os

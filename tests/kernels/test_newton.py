@@ -1,7 +1,5 @@
 """Laws of the root finder: singular values, steps, and which solutions are one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

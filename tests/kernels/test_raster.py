@@ -1,7 +1,5 @@
 """Coverage of mapped boxes: every place counted as often as it is covered, to the last bit."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -39,19 +37,15 @@ def grid(cells: tuple[int, ...]) -> np.ndarray:
     return np.array(list(itertools.product(*(range(n + 1) for n in cells))), float)
 
 
-Cells = tuple[int, int, int]
-
-
-def critical(vertices: np.ndarray, cells: Cells, stretches: np.ndarray) -> np.ndarray:
+def critical(vertices: np.ndarray, cells: tuple[int, ...], stretches: np.ndarray) -> np.ndarray:
     star = contour.stars(cells)
     out = np.empty((len(vertices) * len(star.triangles), 5), np.int64)
     whole = np.zeros(len(vertices), bool)
-    arguments = (np.array(cells), whole, 0, len(vertices), star, out)
-    used = contour.critical_triangles(vertices, stretches, *arguments)
-    return out[:used]
+    part = np.array(cells), whole, 0, len(vertices)
+    return out[: contour.critical_triangles(vertices, stretches, *part, star, out)]
 
 
-def counts(vertices: np.ndarray, cells: Cells, size: int) -> tuple[np.ndarray, ...]:
+def counts(vertices: np.ndarray, cells: tuple[int, ...], size: int) -> tuple[np.ndarray, ...]:
     """Cover counts and degrees at the centers UNIT · (i, j, k), i, j, k < size."""
     stretches = contour.stretches(vertices, np.array(cells))
     triangles = critical(vertices, cells, stretches)
@@ -71,7 +65,7 @@ def tetrahedra(cells: tuple[int, ...]) -> np.ndarray:
     return base[:, None] + steps[faces[which]]
 
 
-def holders(vertices: np.ndarray, cells: Cells, point: np.ndarray) -> list[tuple[np.ndarray, int]]:
+def holders(vertices, cells, point) -> list[tuple[np.ndarray, int]]:
     """The tetrahedra that hold a point, by barycentric coordinates in exact integers.
 
     Returns:
@@ -143,8 +137,7 @@ def test_a_one_to_one_image_covers_every_center_once(seed, ties):
 @given(seed=st.integers(0, 2**32 - 1))
 def test_any_map_covers_what_its_tetrahedra_hold_less_those_turned_against_the_stretches(seed):
     rng = np.random.default_rng(seed)
-    first, second, third = (int(n) for n in rng.integers(1, 3, 3))
-    cells = (first, second, third)
+    cells = tuple(rng.integers(1, 3, 3).tolist())
     vertices = rng.integers(64, 700, (int(np.prod(np.add(cells, 1))), 3)).astype(float)
     stretches = rng.integers(-1000, 1001, len(vertices)).astype(float)
     triangles = critical(vertices, cells, stretches)
@@ -167,8 +160,7 @@ def test_points_and_centers_of_any_map_are_counted_alike(seed):
     at = rng.integers(0, 12, (9, 3))
     members, starts = raster.bin_triangles(vertices, triangles, UNIT, (12, 12))
     found = np.empty(9, np.int64)
-    arguments = (members, starts, UNIT * at, found)
-    raster.cover_at(vertices, triangles, UNIT, (12, 12), *arguments)
+    raster.cover_at(vertices, triangles, UNIT, (12, 12), members, starts, UNIT * at, found)
     assert (found == cover[tuple(at.T)]).all()
     off = UNIT * at + [1e-3, 1e-6, 0.0]  # as a center counts: never on a face
     held = [holders(1e6 * vertices, cells, np.rint(1e6 * p)) for p in off]
@@ -247,7 +239,6 @@ def test_moved_seeds_come_nearer_to_their_targets(seeds):
 
 # How far an image may lie from its linear interpolant: what "every branch" rests on
 
-
 SEEDS = st.integers(0, 2**32 - 1)
 CELLS, TOL = 32, 1e-9
 
@@ -255,14 +246,10 @@ CELLS, TOL = 32, 1e-9
 def random_arm(rng: np.random.Generator) -> Manipulator:
     """Three bundles of any kind, nearly all with folds."""
     while True:
-        fibers = (
-            FiberArchitecture(
-                revolution=rng.uniform(-4, 4),
-                offset=rng.uniform(-3, 3),
-                extent=rng.uniform(0.2, 1.0),
-            )
-            for _ in range(3)
-        )
+        fibers = [
+            FiberArchitecture(revolution=turn, offset=offset, extent=extent)
+            for turn, offset, extent in rng.uniform((-4, -3, 0.2), (4, 3, 1.0), (3, 3))
+        ]
         taper = rng.uniform(0, 0.8) / 16
         arm = arm_of(*fibers, taper=taper, activation_bounds=(-5 / 3, 0.0))
         if extension_range(arm)[0] > 0:

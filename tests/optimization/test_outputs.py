@@ -1,7 +1,5 @@
 """What a search prints, draws and writes, its file, and its command."""
 
-from __future__ import annotations
-
 import json
 import re
 
@@ -52,12 +50,11 @@ def several():
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch):
+def folder(folder):
     """A folder with a design, and what is asked of it."""
-    monkeypatch.chdir(tmp_path)
     ARM.save("arm.toml")
-    (tmp_path / "needs.toml").write_text(NEEDS_FILE)
-    return tmp_path
+    (folder / "needs.toml").write_text(NEEDS_FILE)
+    return folder
 
 
 def read(text, folder, **given):
@@ -123,10 +120,9 @@ def test_pictures_say_their_units_and_tell_the_infeasible_by_shape(one, several)
     assert {"60 mm", "80 mm", "0°"} <= texts
     figure = sr.plot.plot_search(several, unit="cm")
     assert figure.axes[0].get_ylabel() == "reach_height [cm] (large is better)"
-    met = several.to_dataset()
-    met = met.isel(design=met.front.values)
-    drawn = np.concatenate([c.get_offsets() for c in figure.axes[0].collections[-1:]])
-    np.testing.assert_allclose(drawn[:, 1], 1e2 * met.objective_value.values[:, 1])
+    drawn, found = figure.axes[0].collections[-1].get_offsets(), several.to_dataset()
+    heights = found.objective_value.values[found.front.values, 1]
+    np.testing.assert_allclose(drawn[:, 1], 1e2 * heights)
 
 
 def test_a_file_says_the_same_as_the_call(folder):
@@ -190,8 +186,7 @@ def test_the_command_writes_what_the_call_finds(folder, capsys):
 
 
 def test_the_exit_code_says_whether_the_best_meets_all(folder, capsys):
-    text = NEEDS_FILE.replace('"8kg"', '"1g"')
-    (folder / "needs.toml").write_text(text)
+    (folder / "needs.toml").write_text(NEEDS_FILE.replace('"8kg"', '"1g"'))
     assert run(["search", "needs.toml", "-o", "best"]) == 1
     assert "MISSED  mass: " in capsys.readouterr().out
     text = (folder / "best" / "best.toml").read_text()

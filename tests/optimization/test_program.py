@@ -1,7 +1,5 @@
 """The program of a design: derivatives against differences, and what they say of an optimum."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

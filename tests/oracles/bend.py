@@ -6,8 +6,6 @@ International Journal for Numerical Methods in Engineering 14, 961-986 (1979): a
 stiffness of the polar moment, and a dead force of 600 at the tip, across the circle's plane.
 """
 
-from __future__ import annotations
-
 import math
 
 from tests.oracles.rod import Loads, Rod

@@ -10,8 +10,6 @@ and tends to that of the rod with the square of the links' length h. Moments and
 have no potential and are refused. Second derivatives are imaginary parts of the first.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -100,12 +98,9 @@ class Chain:
     def pull(self) -> Array:
         """Dead force that the end of each link carries, half its own weight in it: (links, 3)."""
         loads = self.loads
-        own = self.h * np.array(
-            [
-                self.rod.mass(z) * np.array(loads.gravity) + np.asarray(loads.force_per_length(z))
-                for z in self.centers
-            ]
-        )
+        mass = np.array([self.rod.mass(z) for z in self.centers])
+        forces = np.array([loads.force_per_length(z) for z in self.centers])
+        own = self.h * (mass[:, None] * loads.gravity + forces)
         beyond = np.cumsum(own[::-1], axis=0)[::-1] - own / 2
         beyond = beyond + np.array(loads.tip_force) + self.weight
         for point in loads.points:
@@ -127,7 +122,9 @@ class Chain:
 
     def solve(self, start: Array | None = None) -> Array:
         """Coordinates of the equilibrium near a start: that of the rod's shooting if None."""
-        q = self._shot() if start is None else start
+        if start is None:
+            start = self.near(equilibrium(self.rod, self.loads, self.joints, rtol=1e-7))
+        q = start
         for _ in range(30):
             step = np.linalg.solve(self.hessian(q), -self.gradient(q))
             q = q + step
@@ -186,9 +183,6 @@ class Chain:
         w, zeta = self._parts(q)
         axes = self._frames(w[None])[0, 1:-1, :, 2]
         return np.cumsum([np.zeros(3), *(self.h * zeta[:, None] * axes)], axis=0)
-
-    def _shot(self) -> Array:
-        return self.near(equilibrium(self.rod, self.loads, self.joints, rtol=1e-7))
 
     def _coordinates(self, u: Array, zeta: Array) -> Array:
         return np.concatenate([(u * self.span[:, None]).ravel(), zeta])

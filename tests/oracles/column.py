@@ -3,8 +3,6 @@
 j are zeros of Bessel functions.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.polynomial.legendre import Legendre, leggauss

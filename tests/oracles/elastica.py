@@ -1,7 +1,5 @@
 """Inextensible cantilevers: elliptic integrals, shooting in the angle, and a helix."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

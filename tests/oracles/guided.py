@@ -1,7 +1,5 @@
 """An arm as a chain of arcs between disks that guide its tendons: least energy, by SciPy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,10 +65,8 @@ class ArcChain:
 
     def at_pulled(self, pulled: Array, stiffness: float) -> Array:
         """Strains of least energy where tendons with a stiffness [N/m] are pulled in [m]."""
-        size, straight = (
-            np.sqrt(self._springs),
-            self.tendon_lengths(np.zeros((len(self.lengths), 4))),
-        )
+        size = np.sqrt(self._springs)
+        straight = self.tendon_lengths(np.zeros((len(self.lengths), 4)))
 
         def residuals(x: Array) -> Array:
             off = self.tendon_lengths(x.reshape(size.shape) / size) - (straight - pulled)

@@ -7,8 +7,6 @@ sections of the shape, in its directors, the coefficients solve the equations of
 ∫ φ (u - K⁻¹ m) dZ = 0 for every shape function φ.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline

@@ -15,8 +15,6 @@ from nothing along the branch of the unloaded shape, by steps of a tangent predi
 halved where Newton's method fails.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ nowhere. Paths are those of lines at p = ρ (cos θ, sin θ): a small change of 
 their length by ∫ t3 dζ + dω·(p × t) dZ, with t along the straight arm.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -63,9 +61,8 @@ class PulledArm:
         for tendon in self.arm.actuators:
             if not isinstance(tendon, LengthTendon):
                 continue
-            start, end = (
-                x * self.arm.length for x in (tendon.start_over_length, tendon.end_over_length)
-            )
+            ends = tendon.start_over_length, tendon.end_over_length
+            start, end = (end * self.arm.length for end in ends)
             rate = tendon.revolution / (end - start)
             for k in range(tendon.bundles):
                 angle = tendon.offset + 2 * np.pi * k / tendon.bundles + rate * (z - start)
@@ -81,15 +78,8 @@ class PulledArm:
         """(ζ, ω) of least energy at the nodes, shape (station, 4)."""
         before, eta = self.unpulled
         stiffness = self.arm.section.stiffness_at(self.arm.profile, self.nodes[0].ravel())
-        resists = np.stack(
-            [
-                stiffness.axial,
-                stiffness.bending / eta,
-                stiffness.bending / eta,
-                stiffness.torsion / eta,
-            ],
-            axis=1,
-        )
+        turning = stiffness.bending / eta, stiffness.bending / eta, stiffness.torsion / eta
+        resists = np.stack([stiffness.axial, *turning], axis=1)
         size = np.sqrt(self.nodes[1].ravel()[:, None] * resists)  # energy is ½ |size d|²
         paths = self.paths() * self.nodes[1].ravel()[:, None]
         at_rest = np.column_stack([np.ones(len(before)), np.zeros((len(before), 3))])
@@ -157,10 +147,9 @@ class HeavyPulledArm(PulledArm):
         """r at the ends of the steps [m] of strains (..., node, 4), which may be complex."""
         along = np.einsum("zn,...nc->z...c", self.between, strains)
         h = self.arm.length / self.steps
-        turn = np.eye(3) + np.zeros(
-            (*strains.shape[:-2], 3, 3), strains.dtype
-        )  # columns d1, d2, d3
-        place = np.zeros((*strains.shape[:-2], 3), strains.dtype)
+        batch, kind = strains.shape[:-2], strains.dtype
+        turn = np.eye(3) + np.zeros((*batch, 3, 3), kind)  # columns d1, d2, d3
+        place = np.zeros((*batch, 3), kind)
         places = [place]
 
         def rates(values: Array, turn: Array) -> tuple[Array, Array]:

@@ -1,7 +1,5 @@
 """Delaunay triangulations by Qhull, through SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from softreach.geometry.delaunay import Delaunay

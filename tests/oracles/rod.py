@@ -1,7 +1,5 @@
 """A rod and what acts on it, as the oracles of loaded rods take them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ E ε33 and the shear stresses E/(1 + ν) ε13 and E/(1 + ν) ε23; the rest is f
 moment are the integrals of these over the area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 `python -m tests.oracles.sorosim` compares all of them with the shooting of `loaded_rod`.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import sys
@@ -66,21 +64,13 @@ def deviation(case: Case, *, rtol: float = 1e-9) -> float:
 
 
 def _case(block: Array) -> Case:
-    (gravity, mid, tip), shape = block[:, :3].T, block[:, 3:]
-    return Case(
-        Loads(
-            gravity=tuple(gravity[3:].tolist()),
-            points=(
-                PointLoad(
-                    place=LENGTH / 2, force=tuple(mid[3:].tolist()), moment=tuple(mid[:3].tolist())
-                ),
-            ),
-            tip_force=tuple(tip[3:].tolist()),
-            tip_moment=tuple(tip[:3].tolist()),
-        ),
-        shape[3:].T,
-        shape[:3].T,
+    _, gravity, mid_moment, mid_force, tip_moment, tip_force = map(
+        tuple, block[:, :3].T.reshape(6, 3).tolist()
     )
+    middle = PointLoad(place=LENGTH / 2, force=mid_force, moment=mid_moment)
+    wrench = {"tip_force": tip_force, "tip_moment": tip_moment}
+    loads = Loads(gravity=gravity, points=(middle,), **wrench)
+    return Case(loads, block[3:, 3:].T, block[:3, 3:].T)
 
 
 if __name__ == "__main__":

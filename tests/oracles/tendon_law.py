@@ -12,8 +12,6 @@ the last for a solid rod of the radius R, to first order. The linear law is wron
 tension. A parallel tendon does not turn: for it the linear law is that of the follower load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -36,8 +34,6 @@ class Deviation(NamedTuple):
     """Distance of the tips over L [-]."""
     relative: float
     """Distance of the tips over what the tip moves [-]."""
-    direction: float
-    """Angle between the tip tangents [rad]."""
 
 
 def linear_strains(rod: Rod, tendons: Sequence[Tendon], z: float) -> Array:
@@ -100,10 +96,4 @@ def linear_law_deviation(rod: Rod, tendons: Sequence[Tendon], *, stations: int =
     radius = np.max([np.broadcast_to(tendon.radius(z), z.shape) for tendon in tendons], axis=0)
     miss = np.linalg.norm(exact.place[-1] - linear.place[-1])
     moved = np.linalg.norm(exact.place[-1] - [0.0, 0.0, rod.length])
-    sine = np.linalg.norm(np.cross(exact.frame[-1, 2], linear.frame[-1, 2]))
-    return Deviation(
-        float((kappa * radius).max()),
-        float(miss / rod.length),
-        float(miss / moved),
-        float(np.arcsin(min(1.0, sine))),
-    )
+    return Deviation(float((kappa * radius).max()), float(miss / rod.length), float(miss / moved))

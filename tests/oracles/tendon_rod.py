@@ -15,8 +15,6 @@ value problem: f contains ω' and ζ', for which the balances are solved at each
 With m = K ω and n3 = K0 (ζ - 1): an elastic rod whose energy is per length at rest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """The section's quadrature against closed forms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -59,8 +57,8 @@ def test_a_straight_muscle_pulls_with_the_modulus_times_its_area_moments():
     np.testing.assert_allclose(moment, 2e6 * np.array(expected), rtol=1e-13, atol=1e-13)
 
 
-@pytest.mark.parametrize("helical_angle", [0.0, 0.3, -1.2])
-@pytest.mark.parametrize("slope", [0.0, -0.05, 0.4])
+@pytest.mark.parametrize("helical_angle", [0.0, -1.2])
+@pytest.mark.parametrize("slope", [0.0, 0.4])
 def test_fibers_pull_by_the_radial_integrals_of_the_theory(helical_angle, slope):
     """N and M of theory (4), with the integrals (1) to (3) by adaptive quadrature."""
     nu, (start, stop) = RING.poisson_ratio, SECTOR
@@ -72,10 +70,8 @@ def test_fibers_pull_by_the_radial_integrals_of_the_theory(helical_angle, slope)
     def t(x):
         return x * tan_alpha / ((1 + (x * tan_alpha) ** 2) * math.sqrt(1 + (x * slope) ** 2))
 
-    i0, i1, i3 = (
-        quad(f, ratio, 1, epsabs=1e-14)[0]
-        for f in (lambda x: x * k(x), lambda x: x**2 * k(x), lambda x: x**2 * t(x))
-    )
+    parts = (lambda x: x * k(x), lambda x: x**2 * k(x), lambda x: x**2 * t(x))
+    i0, i1, i3 = (quad(part, ratio, 1, epsabs=1e-14)[0] for part in parts)
     bend = 2e6 * 0.05**3 * i1
     expected = [
         bend * (math.cos(start) - math.cos(stop)),
@@ -105,9 +101,8 @@ def test_a_lumen_in_a_sector_has_the_centroid_of_the_sector():
     force, moment = pressure_load(ring_sector(0.02, 0.03, -0.5, 0.5))
     area = (0.03**2 - 0.02**2) / 2
     place = 2 * math.sin(0.5) * (0.03**3 - 0.02**3) / 3 / area
-    np.testing.assert_allclose(
-        [force, *moment], [area, 0, -area * place, 0], rtol=1e-13, atol=1e-20
-    )
+    wanted = [area, 0, -area * place, 0]
+    np.testing.assert_allclose([force, *moment], wanted, rtol=1e-13, atol=1e-20)
 
 
 def test_the_least_energy_is_where_force_and_moment_are_borne_by_the_stiffness():
@@ -138,13 +133,8 @@ LOADS = Loads(
     points=(PointLoad(place=0.37, force=(0.4, -0.2, 0.1)),),
     force_per_length=lambda z: (0.2 * z, 0.0, 0.1),
 )
-COLUMN = Rod(
-    length=1.0,
-    axial=lambda z: 1e9,
-    bending=lambda z: 1.0,
-    torsion=lambda z: 0.7,
-    mass=lambda z: 1.0,
-)
+STIFF = {"axial": lambda z: 1e9, "bending": lambda z: 1.0, "torsion": lambda z: 0.7}
+COLUMN = Rod(length=1.0, mass=lambda z: 1.0, **STIFF)
 
 
 def upright(load, links=30):
@@ -153,26 +143,20 @@ def upright(load, links=30):
     return chain, chain.solve(chain.rest())
 
 
-def test_the_gradient_is_the_derivative_of_the_energy():
+def test_gradient_and_hessian_are_the_derivatives_of_the_energy():
     chain = Chain(ROD, LOADS, 6)
     q = chain.rest() + 0.05 * np.random.default_rng(3).normal(size=4 * 6 + 3)
     steps = 1e-5 * np.eye(len(q))
     slopes = [(chain.energy(q + s) - chain.energy(q - s)) / 2e-5 for s in steps]
     np.testing.assert_allclose(chain.gradient(q), slopes, atol=1e-8)
-
-
-def test_the_hessian_is_the_derivative_of_the_gradient():
-    chain = Chain(ROD, LOADS, 4)
-    q = chain.rest() + 0.05 * np.random.default_rng(3).normal(size=4 * 4 + 3)
-    steps = 1e-5 * np.eye(len(q))
     slopes = [(chain.gradient(q + s) - chain.gradient(q - s)) / 2e-5 for s in steps]
     np.testing.assert_allclose(chain.hessian(q), slopes, atol=1e-7)
 
 
 def test_the_chain_tends_to_the_rod_with_the_square_of_its_links():
     tip = equilibrium(ROD, LOADS).tip
-    chains = {links: Chain(ROD, LOADS, links) for links in (12, 24)}
-    error = [np.linalg.norm(chain.nodes(chain.solve())[-1] - tip) for chain in chains.values()]
+    chains = [Chain(ROD, LOADS, links) for links in (12, 24)]
+    error = [np.linalg.norm(chain.nodes(chain.solve())[-1] - tip) for chain in chains]
     assert error[1] < 1e-3
     assert error[0] / error[1] == pytest.approx(4, rel=0.1)
 

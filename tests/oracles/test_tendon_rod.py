@@ -1,7 +1,5 @@
 """The rod with follower tendons against closed forms, and against the balance of its cut parts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -34,11 +32,7 @@ def arc(extension, angle, length, heading):
     """Tip of an arc of the length `extension * length` that turns by an angle toward a heading."""
     radius = extension * length / angle
     side = radius * (1 - math.cos(angle))
-    return [
-        side * math.cos(heading),
-        side * math.sin(heading),
-        radius * math.sin(angle),
-    ]
+    return [side * math.cos(heading), side * math.sin(heading), radius * math.sin(angle)]
 
 
 def test_a_parallel_tendon_bends_to_an_arc_and_shortens_by_its_tension_over_k0():
@@ -85,10 +79,8 @@ def test_the_linear_law_is_that_of_the_follower_load_for_parallel_tendons():
 
 def test_the_linear_law_misses_a_helical_tendon_at_second_order_in_the_tension():
     tensions = np.array([0.01, 0.02, 0.04])
-    found = [
-        linear_law_deviation(ROD, [replace(HELIX, tension=tension)], stations=3)
-        for tension in tensions
-    ]
+    helices = [[replace(HELIX, tension=tension)] for tension in tensions]
+    found = [linear_law_deviation(ROD, helix, stations=3) for helix in helices]
     for field, order in (("bend", 1.0), ("tip", 2.0), ("relative", 1.0)):
         values = [getattr(deviation, field) for deviation in found]
         slope = np.polyfit(np.log(tensions), np.log(values), 1)[0]

@@ -1,7 +1,5 @@
 """Laws of regions: signed distances, places inside, sections of an arm."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

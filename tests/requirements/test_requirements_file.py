@@ -1,7 +1,5 @@
 """Laws of requirements as values and as files."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

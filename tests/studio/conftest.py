@@ -1,7 +1,5 @@
 """A studio with small clouds, and a headless Chromium that looks at it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

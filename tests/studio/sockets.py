@@ -1,7 +1,5 @@
 """A tab without a browser: a socket that reads what it is sent."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable, Iterator

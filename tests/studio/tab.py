@@ -1,7 +1,5 @@
 """A browser tab as a person uses it, beside the session that serves it."""
 
-from __future__ import annotations
-
 import io
 import time
 from collections.abc import Callable, Sequence
@@ -104,8 +102,7 @@ class Tab:
         deadline = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < deadline, f"still waiting until {what}"
-            if hasattr(self, "page"):
-                self.page.wait_for_timeout(30)
+            self.page.wait_for_timeout(30)
 
     def settle(self) -> None:
         """Wait until the page has sent what it holds back, and the session has done its work.
@@ -208,9 +205,7 @@ class Tab:
         """The reach of a design, once the page has it."""
         self.wait(lambda: self.session.found.complete_reach(arm), "the reach is known")
         self.settle()
-        reach = self.session.found.complete_reach(arm)
-        assert reach is not None
-        return reach
+        return self.session.found.complete_reach(arm)
 
     def pixels(self) -> np.ndarray:
         """What the canvas shows once it stands still, RGB from 0 to 1, shape (rows, columns, 3)."""
@@ -223,11 +218,10 @@ class Tab:
             self.page.wait_for_timeout(250)
             return imread(io.BytesIO(self.page.screenshot(clip=canvas)))[..., :3]
 
-        image = picture()
-        for _ in range(8):
-            last, image = image, picture()
-            if (last == image).all():
-                break
+        last, image = picture(), picture()
+        for _ in range(7):
+            if (last != image).any():
+                last, image = image, picture()
         return image
 
     def changed(self, before: np.ndarray) -> float:
@@ -237,10 +231,6 @@ class Tab:
         apart = np.abs(now[:rows, :columns] - before[:rows, :columns]).max(axis=-1)
         return float((apart > 0.03).mean())
 
-    def like(self, color: Sequence[float]) -> int:
-        """Number of pixels of the canvas of about this hue, however bright."""
-        return like(self.pixels(), color)
-
     def screen(self, point: np.ndarray) -> tuple[float, float]:
         """Pixels of a point of the scene [L] in the page."""
         canvas = self.page.locator("canvas").first.bounding_box()
@@ -249,8 +239,7 @@ class Tab:
 
     def labels(self) -> list:
         """Numbers and names along the axes of the scene."""
-        known = [self.drawn(f"/axes/label {k}") for k in range(60)]
-        return [label for label in known if label is not None]
+        return [label for k in range(60) if (label := self.drawn(f"/axes/label {k}"))]
 
     def drag_tip(self, begin: np.ndarray, end: np.ndarray) -> None:
         """Grab the ball at a point [L] and pull it to another; the button stays down."""
@@ -261,19 +250,16 @@ class Tab:
             self.page.mouse.move(*self.screen(begin + part * (end - begin)))
             self.page.wait_for_timeout(30)
 
-    def click_at(self, point: np.ndarray) -> None:
-        self.page.mouse.click(*self.screen(point))
-
     def projected(self, point: np.ndarray) -> tuple[float, float]:
         """Place of a point in the canvas, 0 to 1 from its upper left."""
         camera = self.session.client.camera
-        forward = unit(camera.look_at - camera.position)
-        right = unit(np.cross(forward, camera.up_direction))
-        up = np.cross(right, forward)
-        offset = point - camera.position
-        half = np.tan(camera.fov / 2) * (offset @ forward)
-        across = offset @ right / (half * camera.aspect)
-        return 0.5 + across / 2, 0.5 - offset @ up / half / 2
+        forward = camera.look_at - camera.position
+        right = np.cross(forward, camera.up_direction)
+        ways = np.stack([right, np.cross(right, forward), forward])
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        across, up, ahead = ways @ (point - camera.position)
+        half = np.tan(camera.fov / 2) * ahead
+        return 0.5 + across / half / camera.aspect / 2, 0.5 - up / half / 2
 
 
 def like(image: np.ndarray, color: Sequence[float]) -> int:
@@ -281,7 +267,3 @@ def like(image: np.ndarray, color: Sequence[float]) -> int:
     size = np.linalg.norm(image, axis=-1)
     cosine = image @ np.asarray(color) / np.maximum(size, 1e-9) / np.linalg.norm(color)
     return int(((cosine > 0.985) & (size > 0.25)).sum())
-
-
-def unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)

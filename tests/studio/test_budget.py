@@ -1,6 +1,4 @@
-"""What a computation of the studio may use."""
-
-from __future__ import annotations
+"""What a computation of the studio may use, and the figures beside the scene."""
 
 import re
 import time
@@ -9,18 +7,30 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 
+from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
+from softreach.inverse.path import PathStatus, end_text
 from softreach.studio import figures
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
-from softreach.studio.figures import Slope, VolumeSlopes, slope_bars, volume_slopes
+from softreach.studio.figures import (
+    Slope,
+    VolumeSlopes,
+    enclosed_area,
+    section_curves,
+    slope_bars,
+    swept_volumes,
+    volume_slopes,
+)
 from softreach.studio.markup import bar
 from softreach.studio.reach import Quality, Reach, level_in_memory, stages
 from softreach.studio.shown_parameters import slider_parameters
+from softreach.studio.state import MOST_POINTS, Slice, TipPath
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.workspace import volume_gradient
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -45,14 +55,11 @@ def test_a_computation_ends_when_its_time_is_over_or_memory_runs_out_meanwhile(m
         running()
 
 
-def test_clouds_fit_into_memory_however_many_bundles_there_are():
-    for bundles in (3, 30, 1000):
+def test_clouds_fit_into_memory_and_a_smaller_one_says_what_it_left_out(trunk, monkeypatch):
+    for bundles in (3, 1000):
         level = level_in_memory(bundles, 1e9, 21)
         assert level == 21 or (1 << level) * 8 * (bundles + 3) <= 1e9
     assert level_in_memory(3, 0.0, 17) == 10
-
-
-def test_a_smaller_cloud_says_what_it_left_out(trunk, monkeypatch):
     monkeypatch.setattr(budget, "free_memory", lambda: 1e6)
     *_, fine = reaching.stages(trunk, 12, SMALL, nothing)
     assert fine.samples < fine.wanted == 1 << 12
@@ -103,7 +110,6 @@ def test_no_stage_keeps_the_turn_while_its_reach_is_drawn(trunk):
 
 # The bars under the sliders: how the volume changes with each, exactly and on one scale
 
-
 QUALITY = Quality(coarse_level=10, fine_level=10, coarse_accuracy=0.02, fine_accuracy=0.01)
 
 
@@ -122,7 +128,9 @@ def slopes(small_arm) -> VolumeSlopes:
     return volume_slopes(reach_of(small_arm), QUALITY, nothing)
 
 
-def test_a_slope_is_that_of_the_library_in_units_of_the_slider(small_arm, slopes):
+def test_each_slider_that_moves_continuously_has_the_slope_of_the_library_in_its_unit(
+    small_arm, slopes
+):
     theirs = volume_gradient(small_arm, list(slopes.slopes), accuracy=QUALITY.fine_accuracy)
     sliders = {each.name: each for each in slider_parameters(small_arm)}
     rows = zip(theirs.parameters, theirs.volume, theirs.volume_error, strict=True)
@@ -130,12 +138,8 @@ def test_a_slope_is_that_of_the_library_in_units_of_the_slider(small_arm, slopes
         scale, ours = sliders[name].scale, slopes.slopes[name]
         assert abs(ours.value - value * scale) <= ours.error + error * scale
         assert ours.error < 10 * error * scale
-
-
-def test_every_slider_that_moves_continuously_has_a_slope(small_arm, slopes):
     known = parameters(small_arm)
-    sliders = {each.name for each in slider_parameters(small_arm)}
-    assert {name for name in sliders if known[name].whole} == sliders - set(slopes.slopes) != set()
+    assert {name for name in sliders if known[name].whole} == {*sliders} - {*slopes.slopes} != set()
 
 
 def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
@@ -161,17 +165,19 @@ def test_a_set_that_is_flat_or_torn_has_no_slopes_and_what_takes_too_long_is_lef
     assert volume_slopes(reach, replace(QUALITY, most_seconds=0.0), nothing).slopes == {}
 
 
-def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter(trunk):
+def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter_or_stage(trunk):
     reach, calls = reach_of(trunk), []
 
     def check() -> None:
         calls.append(None)
-        if len(calls) == 5:
+        if len(calls) >= 5:
             raise Dropped
 
     with pytest.raises(Dropped):
         volume_slopes(reach, QUALITY, check)
     assert len(calls) == 5
+    with pytest.raises(Dropped):
+        next(stages(trunk, 11, SMALL, check))
 
 
 def share_of(html: str) -> float:
@@ -186,15 +192,12 @@ def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
     found = VolumeSlopes(trunk, 0.7, slopes)
     bars = slope_bars(found, sliders, old=False)
     assert list(bars) == [name for name in sliders if name in found.slopes]
-    changes = {name: found.slopes[name].value * sliders[name][1] for name in bars}
-    shares = {name: share_of(html) for name, html in bars.items()}
-    most = max(map(abs, changes.values()))
-    assert max(map(abs, shares.values())) == 1
-    wanted = [change / most for change in changes.values()]
-    np.testing.assert_allclose(list(shares.values()), wanted, atol=1e-3)
-    assert "\N{MINUS SIGN}1.00 ± 0.01 %" in bars["taper"]  # of V for 0.07 of its 7 degrees
-    assert "∂V/∂(taper) = -0.100 ± 0.001 m³ per deg" in bars["taper"]
-    assert "0.07 deg" in bars["taper"]
+    changes = np.array([found.slopes[name].value * sliders[name][1] for name in bars])
+    shares = np.array([share_of(html) for html in bars.values()])
+    assert np.abs(shares).max() == 1
+    np.testing.assert_allclose(shares, changes / np.abs(changes).max(), atol=1e-3)
+    of_taper = "\N{MINUS SIGN}1.00 ± 0.01 %", "∂V/∂(taper) = -0.100 ± 0.001 m³ per deg", "0.07 deg"
+    assert all(text in bars["taper"] for text in of_taper)  # of V for 0.07 of its 7 degrees
     assert "+1.686 ± 0.001 %" in bars["extent"]
     old = slope_bars(found, sliders, old=True)["taper"]
     assert "of the design before" in old
@@ -202,7 +205,74 @@ def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
 
 
 def test_a_bar_never_leaves_its_track_and_its_text_is_no_markup():
-    html = bar(-3.0, "<b>", '"><script>')
+    html = bar(-3.0, "<b>", '"><b>')
     assert share_of(html) == -1
     assert "<b>" not in html
-    assert "<script>" not in html
+
+
+# Plots beside the scene and paths of the tip, as values
+
+QUICK = Quality(coarse_level=10, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.02, tol=1e-4)
+
+
+def swept(arm, name):
+    parameter = next(each for each in slider_parameters(arm) if each.name == name)
+    return dict(swept_volumes(arm, parameter, QUICK))
+
+
+def test_a_sweep_has_the_volumes_of_the_designs_and_none_where_there_is_no_design(trunk):
+    volumes = swept(trunk, "taper")
+    assert next(iter(volumes)) == 2.0  # of the design itself
+    for taper, volume in volumes.items():
+        if volume is None:
+            with pytest.raises(SoftreachError):
+                tip_positions(changed(trunk, {"taper": np.radians(taper)}), [[0, 0, 0]])
+        else:
+            made = changed(trunk, {"taper": np.radians(taper)})
+            exact = reachable_set(made, accuracy=QUICK.coarse_accuracy, tol=QUICK.tol)
+            assert volume == exact.volume
+    assert None in volumes.values()
+
+
+def test_a_sweep_of_a_design_on_the_same_curve_computes_its_own_volume_alone(trunk, monkeypatch):
+    swept(trunk, "taper")
+    computed = []
+    monkeypatch.setattr(
+        "softreach.studio.figures.exact_set",
+        lambda arm, *_: computed.append(arm) or SimpleNamespace(volume=1.0),
+    )
+    arm = changed(trunk, {"taper": np.radians(0.95)})
+    assert swept(arm, "taper")[0.95] == 1.0
+    assert computed == [arm]
+
+
+def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
+    *_, reach = stages(trunk, 10, QUICK, nothing)
+    heights = reach.exact.surface().vertices[:, 2] / trunk.length
+    edges = np.linspace(heights.min(), heights.max(), 41)
+    middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
+    cuts = (Slice(axis="z", center=float(at)) for at in middles)
+    areas = [enclosed_area(section_curves(reach, cut), 2) for cut in cuts]
+    assert sum(areas) * width == pytest.approx(reach.volume / trunk.length**3, rel=0.02)
+
+
+# Paths of the tip as values: kept in a state, refused
+
+
+@pytest.mark.parametrize(
+    "points",
+    [[[0, 0, 1]], [[0, 0, 1]] * (MOST_POINTS + 1), [[0, 0, 1], [0, 0, np.inf]], [[0, 0], [1, 1]]],
+)
+def test_a_path_that_cannot_be_followed_is_refused(points):
+    with pytest.raises(InvalidInput, match="path"):
+        TipPath.through(points)
+
+
+@pytest.mark.parametrize("end", [status for status in PathStatus if status > 0])
+def test_every_end_of_a_path_is_said_in_words(trunk, end):
+    status = "point", [PathStatus.FOLLOWED, end]
+    known = {"status": status, "end_length": 0.2, "end_length_error": 1e-3}
+    about = {"end": end.name.lower(), "end_bundle": "left", "end_bound": "lower"}
+    text = end_text(xr.Dataset(known, attrs=about), trunk.length_unit)
+    assert text.endswith(".")
+    assert "{" not in text

@@ -1,7 +1,5 @@
 """Measured poses in a tab without a browser: their markers over the arm, and a fit to them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -35,11 +33,8 @@ def session(opened) -> Session:
 
 def shown(session, number=0, inputs=INPUTS) -> None:
     """Load measured poses, and bring the arm to one of them."""
-    columns = {
-        name.removesuffix("_N"): values.tolist()
-        for name, values in table(PLACES, inputs, NAMES, MARKERS).items()
-    }
-    data = read_measurements(ARM, columns)
+    columns = table(PLACES, inputs, NAMES, MARKERS).items()
+    data = read_measurements(ARM, {name.removesuffix("_N"): [*row] for name, row in columns})
     bench = Bench(data=data, arm=ARM, number=number, free=("pose", "taper"))
     session.update(bench.posed)
     session.learn({"bench": bench})

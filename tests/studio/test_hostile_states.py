@@ -1,8 +1,7 @@
 """Files that no studio saved are refused in one line, at once."""
 
-from __future__ import annotations
-
 import json
+import os
 from types import SimpleNamespace
 
 import numpy as np
@@ -26,12 +25,15 @@ from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
 STATE = StudioState(design=designs.minimal_trunk())
 
 
+SAVED = json.loads(STATE.to_json())
+
+
 def state_with(**changes):
-    return json.dumps(json.loads(STATE.to_json()) | changes)
+    return json.dumps(SAVED | changes)
 
 
 def look_with(**changes):
-    return state_with(appearance=json.loads(STATE.to_json())["appearance"] | changes)
+    return state_with(appearance=SAVED["appearance"] | changes)
 
 
 def design_with(old, new):
@@ -41,10 +43,7 @@ def design_with(old, new):
 
 
 HOSTILE = {
-    "many bundles.toml": design_with(
-        'name = "longitudinal"', 'name = "longitudinal"\nbundles = 1000000'
-    ),
-    "nested.json": "[" * 100_000,
+    "many bundles.toml": design_with('name = "left"', 'name = "left"\nbundles = 1000000'),
     "50 MB.json": " " * 50_000_000,
     "mouse.json": look_with(mouse=["tip"]),
     "section.json": look_with(section=1),
@@ -58,9 +57,7 @@ HOSTILE = {
     "needs of a file.json": state_with(needs='[[reach]]\nfile = "/etc/passwd"'),
     "needs of a mesh.json": state_with(needs='[[avoid]]\nmesh = "/etc/passwd"'),
     "many places.json": state_with(needs=f"[[reach]]\nplaces_m = {[[0, 0, 1]] * 301}"),
-    "null.json": "null",
     "list.json": "[]",
-    "nothing.json": "{}",
     "version.json": state_with(softreach_studio=99),
     "flat target.json": state_with(target=[1, 2]),
     "unknown field.json": state_with(searched=None),
@@ -77,24 +74,14 @@ def test_a_hostile_file_is_refused_in_a_few_words(name):
     assert "Traceback" not in str(caught.value)
 
 
-def test_a_large_file_is_refused_before_it_is_read(tmp_path):
-    path = tmp_path / "state.json"
-    with path.open("wb") as file:
-        file.truncate(50_000_000)
-    with pytest.raises(SoftreachError, match=r"state\.json: must be at most 2 MB"):
-        start_on_state(path)
-
-
 # What a tab is opened on and saved as
-
 
 SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
 
 
 @pytest.fixture(scope="module")
 def fine(trunk):
-    *_, last = stages(trunk, 10, SMALL, lambda: None)
-    return last
+    return [*stages(trunk, 10, SMALL, lambda: None)][-1]
 
 
 def saved(fine, state, kind: str, name: str) -> bytes:
@@ -134,11 +121,10 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     kept = in_slice(fine.cloud.tip.values / fine.arm.length, cut)
     np.testing.assert_array_equal(plotted["cloud"].tip, fine.cloud.tip[kept])
     wanted = sample_values(fine, 14, color)
-    wanted = wanted[kept] if not isinstance(wanted, str | int) else wanted
-    np.testing.assert_array_equal(plotted["color"], wanted)
     if not isinstance(wanted, str | int):
-        bar = plotted["figure"].axes[-1]
-        assert bar.get_ylabel().startswith(color)
+        wanted = wanted[kept]
+        assert plotted["figure"].axes[-1].get_ylabel().startswith(color)
+    np.testing.assert_array_equal(plotted["color"], wanted)
 
 
 def test_a_saved_page_holds_everything_itself(fine):
@@ -161,13 +147,18 @@ def test_a_design_file_changes_the_design_alone(trunk):
         state_from("x.toml", tight.to_toml().encode(), state)
 
 
-def test_a_design_is_begun_with_at_rest_and_a_saved_state_as_it_is(trunk, tmp_path):
+def test_a_design_is_begun_with_at_rest_and_a_saved_state_as_it_is_but_not_a_large_file(
+    trunk, tmp_path
+):
     assert start_on_design(trunk).state.activation == (0.0, 0.0, 0.0)
     state = StudioState(design=trunk, activation=(-1.0, 0.0, -0.2)).showing(level=14)
     (tmp_path / "state.json").write_text(state.to_json(), encoding="utf-8")
     assert start_on_state(tmp_path / "state.json").state == state
     with pytest.raises(InvalidInput, match="state file"):
         start_on_state(tmp_path / "nothing.json")
+    os.truncate(tmp_path / "state.json", 50_000_000)
+    with pytest.raises(SoftreachError, match=r"state\.json: must be at most 2 MB"):
+        start_on_state(tmp_path / "state.json")
 
 
 def test_a_cloud_from_a_file_is_shown_as_it_is(trunk, tmp_path):

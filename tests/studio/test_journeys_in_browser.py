@@ -1,7 +1,5 @@
 """Five journeys through the page: what a person does there, and what is seen of it."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -14,6 +12,7 @@ from softreach.rod.kinematics import marker_positions
 from softreach.studio.captions import size_text
 from softreach.support import palette
 from tests.calibration.arms import table
+from tests.studio.tab import like
 from tests.studio.test_calibrate import ARM, INPUTS, MARKERS, NAMES, PLACES
 
 ORANGE = (0.92, 0.35, 0.0)
@@ -100,17 +99,16 @@ def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(ta
     tab.press("Clear the target")
 
     tab.choose("mouse", "sets the target")
-    tab.click_at(goal)
+    page.mouse.click(*tab.screen(goal))
     page.get_by_text(re.compile(r"\d activations? reach")).first.wait_for()
     tab.settle()
-    np.testing.assert_allclose(
-        tab.screen(np.array(tab.session.state.target)), tab.screen(goal), atol=12
-    )
+    aimed = tab.screen(np.array(tab.session.state.target))
+    np.testing.assert_allclose(aimed, tab.screen(goal), atol=12)
     tab.press("Clear the target")
     tab.choose("mouse", "drags the tip")
 
     pulled(tab, (-1.0, -0.2, -0.5))
-    around = 2 * np.pi * np.linspace(0, 1, 33)
+    around = np.linspace(0, 2 * np.pi, 33)
     offset = 0.05 * np.stack([np.cos(around) - 1, np.sin(around), 0 * around], axis=1)
     tip = sr.tip_positions(TRUNK, [tab.session.state.activation])[0]
     tab.upload("Load a path (CSV)", written(tmp_path / "circle.csv", tip + offset, "xyz"))
@@ -118,9 +116,8 @@ def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(ta
     saved = tab.save("Save the path (CSV)", tmp_path).read_text().splitlines()
     assert len(saved) == 1 + 33
     tab.press("Play")
-    tab.wait(
-        lambda: tab.slider("point").get_attribute("aria-valuenow") == "32", "the arm is at the end"
-    )
+    point = tab.slider("point")
+    tab.wait(lambda: point.get_attribute("aria-valuenow") == "32", "the arm is at the end")
 
 
 def test_a_design_is_kept_and_what_a_change_costs_is_read_beside_it(tab):
@@ -164,14 +161,14 @@ def test_requirements_are_seen_met_and_missed_and_follow_a_slider(tab):
     tab.settle()
     tab.press("Add to the needs")
     page.get_by_text("place 2: missed by 0.0082").wait_for()
-    assert tab.like(red) > 5
+    assert like(tab.pixels(), red) > 5
 
     tab.open("Design")
     page.get_by_text("needs: 1 of 2 met · place 2 missed by").wait_for()
     tab.drag("taper φ [deg]", -85)
     page.get_by_text("needs: 2 of 2 met").wait_for()
-    tab.wait(lambda: tab.like(red) == 0, "the cross is a ball")
-    assert tab.like(green) > 5
+    tab.wait(lambda: like(tab.pixels(), red) == 0, "the cross is a ball")
+    assert like(tab.pixels(), green) > 5
     tab.open("Goals")
     page.get_by_text("place 2: reached").wait_for()
     tab.press("Undo")
@@ -193,7 +190,7 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     tab.unfold("measured poses")
     tab.upload("Load measured poses (CSV)", bench)
     page.get_by_text("bench.csv: 20 samples of half, tool").wait_for()
-    assert tab.like(ORANGE) > 20
+    assert like(tab.pixels(), ORANGE) > 20
     for sample in (0, 1):
         predicted = marker_positions(ARM, INPUTS[sample])[0]
         half, tool = 1e3 * np.linalg.norm(PLACES[sample] - predicted, axis=1)

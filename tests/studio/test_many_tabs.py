@@ -1,7 +1,5 @@
 """Many tabs, tabs that are shaken, and tabs that are gone: without a browser, as sockets."""
 
-from __future__ import annotations
-
 import gc
 import threading
 import time
@@ -83,8 +81,7 @@ def test_of_tabs_that_were_closed_nothing_stays(studio):
         with page(studio) as session:
             gone.append(weakref.ref(session.found.reach.cloud))
             del session
-    until(lambda: not studio.sessions)
-    until(lambda: own_threads() <= before)
+    until(lambda: not studio.sessions and own_threads() <= before)
 
     def clouds() -> int:
         gc.collect()
@@ -120,7 +117,6 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
         threads = own_threads()
         shake(session, 40, 0.01)
         assert session.settle(PATIENCE)
-        assert session.found.reach is not None
         assert session.found.reach.arm == session.state.design
         assert computed[-1] == session.state.design
         assert len(computed) < 60  # each in two or three stages, of which the later are dropped
@@ -143,7 +139,6 @@ def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):
         try:
             calm.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.021})))
             assert calm.settle(PATIENCE)
-            assert calm.found.reach is not None
             assert calm.found.reach.arm == calm.state.design
         finally:
             stop.set()

@@ -1,7 +1,5 @@
 """Needs in a tab without a browser: typed, loaded, judged live and drawn."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -119,17 +117,15 @@ def test_a_payload_without_a_modulus_is_refused_below_the_needs(session):
     assert session.found.check is None
 
 
-BAD_FILES = {
-    "bytes": (b"\xff\xfe", "UTF-8"),
-    "a key": (b"[[reech]]", "reech"),
-    "a file": (b'[[reach]]\nfile = "/etc/passwd"', "not sent along"),
-    "large": (b"#" * 2_000_001, "at most 2 MB"),
-}
+BAD_FILES = (
+    (b"\xff\xfe", "UTF-8"), (b"#" * 2_000_001, "at most 2 MB"), (b"[[reech]]", "reech"),
+    (b'[[reach]]\nfile = "/etc/passwd"', "not sent along"),
+)  # fmt: skip
 
 
 def test_files_and_numbers_of_no_needs_are_refused_and_the_needs_before_stay(opened):
     before = opened.state
-    for content, words in BAD_FILES.values():
+    for content, words in BAD_FILES:
         with pytest.raises(SoftreachError, match=words) as caught:
             goals.read_needs(opened, "<b>.toml", content)
         assert "root" not in str(caught.value)
@@ -143,8 +139,7 @@ def test_files_and_numbers_of_no_needs_are_refused_and_the_needs_before_stay(ope
 def test_a_click_adds_a_place_to_reach_only_while_the_mouse_is_for_that(session):
     session.update(lambda state: state.showing(half=False, cloud=True))
     assert session.settle()
-    tip = session.found.reach.cloud.tip.values[3]
-    point = tip / ARM.length
+    point = session.found.reach.cloud.tip.values[3] / ARM.length
     origin = 3.0 * point
     click(session, origin, point - origin)
     assert session.state.needs == ""

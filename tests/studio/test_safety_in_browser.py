@@ -1,44 +1,27 @@
 """Nothing that came from elsewhere is rendered, and the page talks to its own server alone."""
 
-from __future__ import annotations
-
-import json
 import socket
 
 import pytest
 
-from softreach.arm import designs
-from softreach.studio import Start, Studio, StudioState
-from tests.studio.conftest import SMALL
+from softreach.studio import Studio
 from tests.studio.tab import CHEAP, Tab
-from tests.studio.test_hostile_states import design_with
+from tests.studio.test_hostile_states import design_with, look_with, state_with
 
 STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
 QUOTED = STRIKE.replace('"', '\\"')
-
-
-def state_with(**changes) -> str:
-    """A state as text, of which some fields are not what the studio saved."""
-    values = json.loads(StudioState(design=designs.minimal_trunk()).showing(level=12).to_json())
-    look = values["appearance"]
-    for path, value in changes.items():
-        place, _, name = path.rpartition("__")
-        {"": values, "look": look, "slice": look["slice"]}[place][name] = value
-    return json.dumps(values)
 
 
 NAMED = design_with('name = "left"', f'name = "{QUOTED}"')
 RING = design_with(
     "inner_ratio", f'name = "{QUOTED}"\nmaterial = {{ name = "{QUOTED}" }}\ninner_ratio'
 )
-
-NAMELESS = f"{STRIKE.replace('/', '')}.toml"
 FILES = {
-    "level.json": state_with(look__level=STRIKE),
-    "color.json": state_with(look__color=STRIKE),
+    "level.json": look_with(level=STRIKE),
+    "color.json": look_with(level=12, color=STRIKE),
     "reference.json": state_with(design=RING, reference=NAMED),
     "kind.toml": design_with('kind = "fiber"', f'kind = "{QUOTED}"'),
-    NAMELESS: "=",
+    f"{STRIKE.replace('/', '')}.toml": "=",
 }
 """One of each kind of place: a value, a choice, the names of parts, a key, the name of the file."""
 
@@ -53,31 +36,27 @@ def assert_nothing_struck(page):
 def read(tab, name, text):
     with tab.page.expect_file_chooser() as caught:
         tab.press("Load state or design")
-    before = tab.session.revision, tab.session.note
+    before = tab.session.revision
     tab.session.note = ""
     file = {"name": name, "mimeType": "text/plain", "buffer": text.encode()}
     caught.value.set_files(file)
-    tab.wait(
-        lambda: tab.session.note or tab.session.revision != before[0], f"{name} is taken or refused"
-    )
+    session = tab.session
+    tab.wait(lambda: session.note or session.revision != before, f"{name} is taken or refused")
     tab.settle()
     tab.page.wait_for_timeout(100)
-
-
-PANELS = ("Design", "Parts", "Move", "View", "Compare", "Export")
 
 
 def test_no_text_of_a_file_or_its_name_is_markup(tab):
     """What is taken is on many panels; what is refused, in one message, as the text that it is."""
     tab.open("Export")
     taken = set()
-    for name in FILES:
+    for name, text in FILES.items():
         before = tab.session.state
-        read(tab, name, FILES[name])
+        read(tab, name, text)
         assert_nothing_struck(tab.page)
         if tab.session.state != before:
             taken.add(name)
-            for panel in PANELS:
+            for panel in ("Design", "Parts", "Move", "View", "Compare", "Export"):
                 tab.open(panel)
                 assert_nothing_struck(tab.page)
         if name == "level.json":
@@ -100,28 +79,9 @@ def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser
 
 
 @pytest.mark.large
-def test_no_other_page_can_frame_the_studio(browser, studio):
-    page = browser.new_page()
-    page.set_content(f'<iframe src="{studio.url}"></iframe>')
-    page.wait_for_timeout(1500)
-    assert all("softreach" not in frame.content() for frame in page.frames[1:])
-    assert not any(frame.locator("#root").count() for frame in page.frames[1:])
-    page.close()
-
-
-# A studio that others can reach shows itself only to those who know its token
-
-
-@pytest.fixture
-def guarded():
-    state = StudioState(design=designs.minimal_trunk()).showing(level=12)
-    with Studio(Start(state=state, quality=SMALL), token="secret") as running:
-        yield running
-
-
-@pytest.mark.large
-def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, guarded):
-    tab = Tab(browser, guarded)
-    assert tab.session.found.reach is not None
-    assert tab.errors == []
-    tab.close()
+def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, studio):
+    with Studio(studio.start, token="secret") as guarded:
+        tab = Tab(browser, guarded)
+        assert tab.session.found.reach is not None
+        assert tab.errors == []
+        tab.close()

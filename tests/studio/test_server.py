@@ -1,7 +1,5 @@
 """A safe start."""
 
-from __future__ import annotations
-
 import re
 from http.client import HTTPConnection
 from importlib.resources import files
@@ -24,9 +22,10 @@ from softreach.studio.serve import (
 from softreach.support.errors import InvalidInput
 
 
-@pytest.fixture(scope="module")
-def server():
-    running = start_server()
+@pytest.fixture(scope="module", params=[""])
+def server(request):
+    """One that asks for a token, or for none."""
+    running = start_server(token=request.param)
     yield running
     stop_server(running)
 
@@ -35,13 +34,10 @@ def address_of(server):
     return page_address(server.get_host(), server.get_port())
 
 
-def test_only_this_machine_can_connect_and_nobody_can_open_a_tunnel(server):
+def test_only_this_machine_can_connect_nobody_opens_a_tunnel_and_a_taken_port_is_refused(server):
     assert server.get_host() == "127.0.0.1"
     assert address_of(server) == f"http://127.0.0.1:{server.get_port()}"
     assert server.request_share_url() is None
-
-
-def test_a_taken_port_is_refused_and_not_replaced(server):
     with pytest.raises(InvalidInput, match="a free port"):
         start_server(port=server.get_port())
     with pytest.raises(InvalidInput, match=r"203\.0\.113\.7"):
@@ -94,21 +90,6 @@ def test_the_page_is_served_with_rules_and_not_to_be_framed(server):
     assert f"ws://127.0.0.1:{server.get_port()}" in policy
 
 
-def test_text_becomes_markup_in_one_file_only():
-    room = Path(softreach.studio.__file__).parent
-    sources = {p.name: p.read_text(encoding="utf-8") for p in room.rglob("*.py")}
-    assert {name for name, text in sources.items() if "import html" in text} == {"markup.py"}
-    assert {name for name, text in sources.items() if "add_html(" in text} == {"widgets.py"}
-    assert not {name for name, text in sources.items() if "add_markdown(" in text}
-
-
-@pytest.fixture(scope="module")
-def guarded():
-    running = start_server(token="secret")
-    yield running
-    stop_server(running)
-
-
 def answer(server, path, headers):
     line = HTTPConnection("127.0.0.1", server.get_port(), timeout=600)
     line.request("GET", path, headers=headers)
@@ -118,23 +99,20 @@ def answer(server, path, headers):
     return found
 
 
-def test_without_the_token_there_is_no_page(guarded):
-    for token in ("", "token=guess", "token="):
-        assert answer(guarded, f"/?{token}", {}).status == 403
-    for cookie in ("softreach_token=guess", "="):
-        assert answer(guarded, "/", {"Cookie": cookie}).status == 403
-    assert answer(guarded, "/?token=secret", {}).status == 200
-    cookie = "other=1; softreach_token=secret"
-    assert answer(guarded, "/", {"Cookie": cookie}).status == 200
-
-
-def test_without_the_token_there_is_no_socket(guarded):
+@pytest.mark.parametrize("server", ["secret"], indirect=True)
+def test_without_the_token_there_is_no_page_and_no_socket(server):
     from websockets.exceptions import InvalidStatus
 
+    for token in ("", "token=guess", "token="):
+        assert answer(server, f"/?{token}", {}).status == 403
+    for cookie in ("softreach_token=guess", "="):
+        assert answer(server, "/", {"Cookie": cookie}).status == 403
     with pytest.raises(InvalidStatus, match="403"):
-        socket_of(guarded)
-    cookie = answer(guarded, "/?token=secret", {}).headers["Set-Cookie"].split(";")[0]
-    with socket_of(guarded, additional_headers={"Cookie": cookie}) as ours:
+        socket_of(server)
+    page = answer(server, "/?token=secret", {})
+    cookie = page.headers["Set-Cookie"].split(";")[0]
+    assert page.status == answer(server, "/", {"Cookie": f"other=1; {cookie}"}).status == 200
+    with socket_of(server, additional_headers={"Cookie": cookie}) as ours:
         assert ours.recv(timeout=600)
 
 
@@ -171,11 +149,16 @@ def test_our_head_is_for_this_viser_and_another_page_stays_as_it_is():
     assert headed(other, zipped=False) == other
 
 
-def test_only_one_file_uses_names_that_viser_keeps_to_itself():
-    room = Path(softreach.studio.__file__).parent
-    private = re.compile(r"server\._[a-z]|_live_connections|_websock|sockets\.serve")
-    users = {p.name for p in room.rglob("*.py") if private.search(p.read_text(encoding="utf-8"))}
-    assert users == {"serve.py"}
+@pytest.mark.parametrize(
+    ("words", "users"),
+    [
+        ("import html", {"markup.py"}), (r"add_html\(", {"widgets.py"}), (r"add_markdown\(", set()),
+        (r"server\._[a-z]|_live_connections|_websock|sockets\.serve", {"serve.py"}),
+    ],
+)  # fmt: skip
+def test_one_file_only_makes_markup_of_text_or_uses_names_that_viser_keeps_to_itself(words, users):
+    sources = Path(softreach.studio.__file__).parent.rglob("*.py")
+    assert {p.name for p in sources if re.search(words, p.read_text(encoding="utf-8"))} == users
 
 
 def test_a_server_whose_requests_cannot_be_checked_does_not_start(monkeypatch):

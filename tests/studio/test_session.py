@@ -1,7 +1,5 @@
 """A tab without a browser: what a click hits, and what its panels are told."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 
@@ -27,6 +25,7 @@ from softreach.studio.start import KeptWork, work_on
 from softreach.studio.state import StudioState
 from softreach.studio.tabs import click
 from softreach.studio.work import Dropped
+from tests.sets import trunk_at
 from tests.studio.sockets import page
 
 
@@ -36,32 +35,24 @@ def session(studio) -> Iterator[Session]:
         yield opened
 
 
-def clicked_path(session: Session, origin, direction) -> np.ndarray | None:
-    """The path [L] after a click that may lead it on."""
-    session.update(lambda state: state.showing(mouse="path"))
-    click(session, origin, direction)
-    assert session.settle()
-    path, length = session.state.path, session.state.design.length
-    return None if path is None else np.array(path.points) / length
-
-
 def test_a_click_for_a_path_hits_no_point_that_is_cut_away(session):
-    session.update(lambda state: state.showing(cloud=True))
+    session.update(lambda state: state.showing(cloud=True, mouse="path"))
     assert session.settle()
     points = cloud_points(session.found.reach, session.state.appearance.level)
     hidden = session.scene.hidden(points)
     eye = np.asarray(session.client.camera.position)
     distance = np.linalg.norm(points - eye, axis=1)
     target = points[np.argmin(np.where(hidden, distance, np.inf))]
-    path = clicked_path(session, eye, target - eye)
-    assert path is None or not session.scene.hidden(path[-1:]).any()
+    click(session, eye, target - eye)
+    assert session.settle()
+    path, length = session.state.path, session.state.design.length
+    assert path is None or not session.scene.hidden(np.array(path.points[-1:]) / length).any()
 
 
 def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_design(session):
     calls: list[str] = []
 
     def watch(frame, event, argument) -> None:
-        del argument
         if event == "call" and "parameter" in frame.f_globals.get("__name__", ""):
             calls.append(frame.f_code.co_qualname)
 
@@ -75,26 +66,22 @@ def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_des
 
 # How many activations reach a shown point: what the inverse finds, and the volume tells
 
-
 SMALL = Quality(coarse_level=8, fine_level=13, fine_accuracy=0.01)
 LEVEL = 13
-FOLDED = ((75.0, 3.0), (36.0, 3.0), (0.0, 3.0), (54.0, 2.0))
-"""Revolution and taper [deg] of designs whose map folds."""
 
 
 def fine_reach(revolution: float, taper: float) -> Reach:
-    arm = designs.minimal_trunk(revolution=np.radians(revolution), taper=np.radians(taper))
-    return list(stages(arm, LEVEL, SMALL, lambda: None))[-1]
+    """Of a design whose map folds."""
+    return [*stages(trunk_at(revolution, taper), LEVEL, SMALL, lambda: None)][-1]
 
 
 @pytest.fixture(scope="module")
 def folded() -> Reach:
-    return fine_reach(*FOLDED[1])
+    return fine_reach(36.0, 3.0)
 
 
 @pytest.mark.parametrize(
-    ("revolution", "taper"),
-    [FOLDED[0], *(pytest.param(*folded, marks=pytest.mark.large) for folded in FOLDED[1:])],
+    ("revolution", "taper"), [(75.0, 3.0), pytest.param(0.0, 3.0, marks=pytest.mark.large)]
 )
 def test_places_counted_once_for_every_activation_make_up_the_volume(revolution, taper):
     # V = ∫ |det ∂r/∂γ| / m dγ over the box, if every place counts m activations.
@@ -134,7 +121,7 @@ def test_the_key_has_the_color_and_the_share_of_each_number_of_activations(folde
 def test_coarse_clouds_are_not_counted_and_what_was_before_it_was_stopped_is_kept(folded):
     coarse = next(stages(folded.arm, LEVEL, SMALL, lambda: None))
     assert isinstance(sample_values(coarse, 8, "multiplicity"), str)  # colored by activations
-    reach = fine_reach(*FOLDED[1])
+    reach = fine_reach(36.0, 3.0)
     rows = np.arange(1 << LEVEL)
 
     def stop(doing: str) -> None:
@@ -146,7 +133,6 @@ def test_coarse_clouds_are_not_counted_and_what_was_before_it_was_stopped_is_kep
 
 
 # Work comes back from its file, and files that are none of ours are refused
-
 
 TRUNK = designs.minimal_trunk()
 STATE = StudioState(design=TRUNK)
@@ -173,19 +159,16 @@ def test_work_is_found_again_and_a_folder_that_cannot_be_written_is_named(tmp_pa
     assert work.latest == STATE
 
 
-@pytest.fixture
-def home(tmp_path, monkeypatch):
+def test_the_command_goes_on_with_the_work_on_its_design_unless_it_is_to_begin_afresh(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    return tmp_path
-
-
-def test_the_command_goes_on_with_the_work_on_its_design_alone_unless_it_is_to_begin_afresh(home):
     bent = STATE.replace(activation=(-0.5, 0.0, 0.0))
     work_on(TRUNK).keep(bent)
     for fresh, latest in ((False, bent), (True, None)):
         assert begun("minimal_trunk", fresh=fresh)[1].latest == latest
-    assert home in next(home.rglob("latest.json")).parents
-    file = home / "state.json"
+    assert tmp_path in next(tmp_path.rglob("latest.json")).parents
+    file = tmp_path / "state.json"
     file.write_text(STATE.to_json())  # is shown as it is
     assert begun(str(file), fresh=False)[1].latest is None
     assert work_on(changed(TRUNK, {"taper": 0.0})).latest is None  # each has work of its own

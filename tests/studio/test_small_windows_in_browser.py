@@ -1,31 +1,36 @@
 """Everything can be reached and read in the window of a phone, and beside docked plots."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 import softreach as sr
 from tests.studio.tab import Tab
 
-SHEET = "[style*='max-height: 60%']"
 SIZES = {"laptop": {"width": 1366, "height": 768}, "phone": {"width": 390, "height": 844}}
 
 
 @pytest.fixture
 def opened(tab):
-    """The tab in a window of a kind."""
+    """The tab in a window of a kind, with everything in sight."""
+
+    def told() -> bool:
+        box = tab.page.locator("canvas").first.bounding_box()
+        return np.isclose(tab.session.camera.aspect, box["width"] / box["height"], rtol=0.01)
 
     def opened(kind: str) -> Tab:
         tab.page.set_viewport_size(SIZES[kind])
-        see_all(tab)
+        tab.wait(told, "the page has told how wide it is")
+        tab.page.wait_for_timeout(500)  # the eye looks twice before it moves
+        tab.settle()
+        tab.session.look_from("oblique")
+        tab.settle()
         return tab
 
     return opened
 
 
 @pytest.mark.large
-@pytest.mark.parametrize("kind", [pytest.param("laptop", marks=pytest.mark.large), "phone"])
+@pytest.mark.parametrize("kind", SIZES)
 def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
     tab = opened(kind)
     tab.page.get_by_role("tab", name="Export").wait_for()
@@ -46,8 +51,7 @@ def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
 @pytest.mark.large
 def test_the_arm_is_in_sight_above_the_sheet_of_a_phone(opened):
     tab = opened("phone")
-    tab.settle()
-    sheet = tab.page.locator(SHEET).bounding_box()["y"]
+    sheet = tab.page.locator("[style*='max-height: 60%']").bounding_box()["y"]
     places = np.array([tab.screen(point) for point in (np.zeros(3), np.array([0, 0, 1.0]))])
     assert (places > 0).all()
     assert (places < (390, sheet)).all()
@@ -97,8 +101,7 @@ FAINT = """() => {
 
 def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
     tab = opened("phone")
-    tabs = [one.inner_text() for one in tab.page.get_by_role("tab").all()]
-    for name in tabs:
+    for name in [one.inner_text() for one in tab.page.get_by_role("tab").all()]:
         tab.open(name)
         tab.wait(lambda: not tab.page.evaluate(LACKING), f"controls of {name} are named")
     inside = sr.tip_positions(tab.session.state.design, [[-0.5, -0.4, -0.3]])[0]
@@ -114,25 +117,10 @@ def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
     assert tab.slider("taper φ [deg]").get_attribute("aria-label") == "taper φ [deg]"
 
 
-def see_all(tab):
-    """Look at everything, once the page has come to rest in its window."""
-
-    def told() -> bool:
-        box = tab.page.locator("canvas").first.bounding_box()
-        return np.isclose(tab.session.camera.aspect, box["width"] / box["height"], rtol=0.01)
-
-    tab.wait(told, "the page has told how wide it is")
-    tab.page.wait_for_timeout(500)  # the eye looks twice before it moves
-    tab.settle()
-    tab.session.look_from("oblique")
-    tab.settle()
-
-
 @pytest.mark.large
 @pytest.mark.parametrize("narrows", ["plots", "window"])
 def test_arm_and_numbers_stay_in_sight_where_the_scene_gets_narrow_and_wide_again(opened, narrows):
     tab = opened("laptop")
-    see_all(tab)
     wide = tab.page.locator("canvas").first.bounding_box()["width"]
     before = tab.session.camera.actual()
 

@@ -1,7 +1,5 @@
 """Laws of the state, without a server."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from itertools import pairwise
@@ -81,14 +79,9 @@ def test_a_design_with_other_bundles_keeps_the_activations_that_it_can(trunk):
     assert narrow.activation == (-0.4, -0.4, -0.2)
 
 
-@pytest.fixture(scope="module")
-def squeezed(trunk):
-    """A design that its activations would shorten to nothing."""
+def test_a_design_that_would_be_shortened_to_nothing_is_no_state(trunk):
     fiber = FiberArchitecture(name="all", revolution=0.0, extent=6.0)
-    return arm_of(fiber, activation_bounds=(-4.0, 0.0))
-
-
-def test_a_design_that_would_be_shortened_to_nothing_is_no_state(trunk, squeezed):
+    squeezed = arm_of(fiber, activation_bounds=(-4.0, 0.0))
     with pytest.raises(InvalidDesign, match="must keep ζ > 0: narrow the bounds"):
         StudioState(design=squeezed)
     with pytest.raises(InvalidDesign, match="must keep ζ > 0"):
@@ -108,7 +101,6 @@ def test_the_unit_of_the_page_goes_with_every_design_and_is_saved(trunk):
 
 # Laws of going back and forth, without a server
 
-
 START = StudioState(design=designs.minimal_trunk())
 
 
@@ -120,11 +112,10 @@ def posed(state, first):
     return state.replace(activation=(first, 0.0, 0.0))
 
 
-def walked(states, times=None):
+def walked(states):
     history = History()
     for k, (old, new) in enumerate(pairwise(states)):
-        now = 10.0 * k if times is None else times[k]
-        history = history.after(old, new, goes_on=True, now=now)
+        history = history.after(old, new, goes_on=True, now=10.0 * k)
     return history
 
 
@@ -151,30 +142,23 @@ def test_a_change_after_a_step_back_forgets_what_was_undone():
     assert history.step(posed(state, -0.1), back=True)[1] == state
 
 
-def test_changes_in_short_order_are_one_step_if_they_are_of_one_kind():
-    states = [START, *(tapered(START, 0.001 * k) for k in range(1, 6))]
-    history = walked(states, times=[0.1 * k for k in range(5)])
-    assert history.step(states[-1], back=True)[1] == START
-    states = [START, tapered(START, 0.01), posed(tapered(START, 0.01), -0.5)]
-    history = walked(states, times=[0.0, 0.1])
-    assert history.step(states[-1], back=True)[1] == states[1]
-
-
-def test_a_change_that_does_not_go_on_is_a_step_of_its_own():
+def test_changes_in_short_order_that_go_on_are_one_step_if_they_are_of_one_kind():
     one, two = tapered(START, 0.01), tapered(START, 0.02)
     history = History().after(START, one, goes_on=True, now=0.0)
 
-    def before(history, goes_on):
-        return history.after(one, two, goes_on=goes_on, now=0.1).step(two, back=True)[1]
+    def before(history, goes_on=True, now=0.1, to=two):
+        return history.after(one, to, goes_on=goes_on, now=now).step(to, back=True)[1]
 
+    assert before(history) == START
     assert before(history, goes_on=False) == one
-    assert before(history, goes_on=True) == START
-    assert before(replace(history, kind=""), goes_on=True) == one
+    assert before(history, now=10.0) == one
+    assert before(history, to=posed(one, -0.5)) == one
+    assert before(replace(history, kind="")) == one
 
 
 def test_the_view_is_not_undone():
-    looked = tapered(START, 0.01).showing(color="manipulability")
-    history = walked([START, tapered(START, 0.01), looked])
+    looked = STEPS[1].showing(color="manipulability")
+    history = walked([*STEPS[:2], looked])
     back = history.step(looked, back=True)[1]
     assert back.design == START.design
     assert back.appearance == looked.appearance

@@ -1,7 +1,5 @@
 """Laws of the page of plain files: its numbers and surfaces are those that were computed."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json
@@ -19,8 +17,6 @@ from softreach.workspace import reachable_set
 
 pytest.importorskip("matplotlib.pyplot")
 pytest.importorskip("skimage")
-
-_LARGEST = 20e6 / 64  # bytes of a design, that 8 by 8 of them stay below 20 MB
 
 
 def grid(trunk, tapers=(2.0, 4.0), revolutions=(72.0, 108.0)) -> DesignSpace:
@@ -51,7 +47,7 @@ def places(part: dict) -> np.ndarray:
     return low + steps / 65535 * (high - low)
 
 
-def test_numbers_on_the_page_are_those_of_the_reachable_set(written, trunk):
+def test_numbers_on_the_page_are_those_of_the_reachable_set_and_gaps_say_why(written, trunk):
     space = grid(trunk)
     for number in (0, 1):
         reached = reachable_set(space.design(number))
@@ -62,6 +58,9 @@ def test_numbers_on_the_page_are_those_of_the_reachable_set(written, trunk):
             assert error == getattr(reached, f"{name}_error")
         assert numbers["volume"][2].endswith("liters")
         assert numbers["volume"][2].startswith(f"{1e3 * reached.volume:.1f}")
+    gaps = [design["gap"] for design in sheet(written)["designs"][2:]]
+    assert len(gaps) == written.gaps == 2
+    assert all(gap.startswith("taper_deg = 4: leaves no tip") for gap in gaps)
 
 
 def test_places_are_those_of_the_surface_within_a_hundredth_of_the_length(written, trunk):
@@ -79,12 +78,6 @@ def test_places_are_those_of_the_surface_within_a_hundredth_of_the_length(writte
     assert rounding == pytest.approx(step, rel=0.5)
 
 
-def test_gaps_say_why_and_in_degrees(written):
-    gaps = [design["gap"] for design in sheet(written)["designs"] if "gap" in design]
-    assert len(gaps) == written.gaps == 2
-    assert all(gap.startswith("taper_deg = 4: leaves no tip") for gap in gaps)
-
-
 def test_no_file_names_a_host_or_ends_its_script_and_none_is_large(written):
     page = written.page.read_text()
     assert page.count("<script") == 4
@@ -93,7 +86,7 @@ def test_no_file_names_a_host_or_ends_its_script_and_none_is_large(written):
         text = path.read_text()
         assert "://" not in text
         assert "fetch(" not in text
-        assert len(text) < _LARGEST
+        assert len(text) < 20e6 / 64  # that 8 by 8 of them stay below 20 MB
     assert written.size == sum(path.stat().st_size for path in written.page.parent.rglob("*.*"))
 
 

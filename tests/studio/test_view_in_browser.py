@@ -1,45 +1,41 @@
 """What the scene shows, as pixels: the arm in sight from every side, views, lights, pictures."""
 
-from __future__ import annotations
-
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import softreach as sr
+from softreach.rod import as_tip_map
 from softreach.studio.scene.camera import VIEWS, framing
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
-from softreach.support.palette import bundle_color
 from tests.studio.tab import like
 
 BLUE = (0.0, 0.15, 0.64)  # the third bundle's in the light of the scene
-BUNDLES = [bundle_color(0), bundle_color(1), BLUE]
 
 
-def show(tab, **look) -> None:
+def pixels(tab, **look) -> np.ndarray:
     tab.session.update(lambda s: s.showing(**look))
-    tab.settle()
+    return tab.pixels()
 
 
 @pytest.mark.large
 def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
-    show(tab, mouse="none")  # the handle has a blue arrow
-    seen = like(tab.pixels(), BLUE)
-    show(tab, half=False)
-    hidden = like(tab.pixels(), BLUE)
-    show(tab, cloud=False)
-    alone = like(tab.pixels(), BLUE)
+    seen = like(pixels(tab, mouse="none"), BLUE)  # the handle has a blue arrow
+    hidden = like(pixels(tab, half=False), BLUE)
+    alone = like(pixels(tab, cloud=False), BLUE)
     assert seen > 0.9 * alone
     assert hidden < 0.75 * seen
 
 
 @pytest.mark.large
-@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.large)])
+@pytest.mark.parametrize("dark", [False, True])
 def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
     def change(**look) -> np.ndarray:
         """By how much the arm changes each pixel, 0 to 1."""
-        with_arm, without = (pixels_of(tab, arm=shown, **look) for shown in (True, False))
+        with_arm, without = (pixels(tab, arm=shown, **look) for shown in (True, False))
         return np.abs(with_arm - without).max(axis=-1)
 
     look = {"cloud": False, "mouse": "none", "dark": dark}
@@ -48,37 +44,26 @@ def test_the_arm_stands_out_through_the_exact_surface(tab, dark):
     assert (change(surface=True, **look)[of_arm] > 0.08).mean() > 0.9
 
 
-def pixels_of(tab, **look) -> np.ndarray:
-    show(tab, **look)
-    return tab.pixels()
-
-
 @pytest.mark.large
 def test_buttons_look_from_the_front_the_side_and_the_top(tab):
-    def texts() -> set[str]:
-        return {label.text for label in tab.labels() if label.text.endswith("[m]")}
+    def is_seen_along(axis: int) -> bool:
+        camera = tab.session.camera.actual()
+        way = np.subtract(camera.look_at, camera.position)
+        names = {label.text for label in tab.labels() if label.text.endswith("[m]")}
+        others = {f"{other} [m]" for other in "xyz".replace("xyz"[axis], "")}
+        return abs(way[axis]) / np.linalg.norm(way) > 0.99 and names == others
 
     tab.open("View")
     for view, axis in (("front", 1), ("side", 0), ("top", 2)):
         tab.press(view)
-        tab.wait(lambda axis=axis: along(tab, axis) > 0.99, f"the {view} is seen")
-        tab.settle()
-        names = {f"{'xyz'[k]} [m]" for k in range(3) if k != axis}
-        tab.wait(lambda names=names: texts() == names, f"{names} are named")
-
-
-def along(tab, axis: int) -> float:
-    """Cosine between where the eye looks and an axis."""
-    camera = tab.session.camera.actual()
-    way = np.subtract(camera.look_at, camera.position)
-    return abs(way[axis]) / np.linalg.norm(way)
+        tab.wait(lambda axis=axis: is_seen_along(axis), f"the {view} is seen, its axes are named")
 
 
 @pytest.mark.large
 def test_a_saved_picture_is_drawn_anew_over_key_numbers_and_design(tab, tmp_path, monkeypatch):
     from matplotlib.image import imread
 
-    show(tab, cloud=False, surface=True)
+    tab.show_surface()
     camera = tab.session.client.camera
     tab.open("Export")
     tab.choose("picture", "as it is seen (.png)")
@@ -110,3 +95,79 @@ def test_a_view_that_was_kept_on_a_phone_is_framed_anew_from_its_side(tab):
     np.testing.assert_allclose(tab.session.camera.actual().position, wanted.position, atol=1e-6)
     tab.session.restore(StudioState.from_json(kept.to_json()))
     np.testing.assert_allclose(tab.session.camera.actual().position, kept.camera.position)
+
+
+# The tip is dragged: the arm follows on its branch, as far as that leads
+
+
+def pose(tab, activation):
+    tab.session.update(lambda s: s.replace(activation=activation, target=None))
+    tab.settle()
+    tip = sr.tip_positions(tab.session.state.design, [activation])[0]
+    tab.wait(lambda: np.allclose(tab.drawn("/grip").position, tip, atol=1e-4), "the ball is there")
+    tab.page.wait_for_timeout(200)  # until the page has drawn it
+    return tip
+
+
+def around(tab, point):
+    """What the page shows where a point of the scene [L] is, RGB from 0 to 1."""
+    from matplotlib.image import imread
+
+    x, y = tab.screen(point)
+    clip = {"x": x - 4, "y": y - 4, "width": 8, "height": 8}
+    return imread(io.BytesIO(tab.page.screenshot(clip=clip)))[..., :3]
+
+
+@pytest.mark.large
+def test_a_click_on_a_ghost_takes_that_solution(tab):
+    tab.open("Move")
+    arm, scene = tab.session.state.design, tab.session.scene
+    tab.session.aim(np.array([0.2932, 0.0739, 0.0088]))
+    tab.settle()
+    shapes, eye = tab.session.found.answer.activations, tab.session.client.camera.position
+    changes = np.abs(shapes - tab.session.state.activation).max(axis=1)
+    here, other = changes.argmin(), changes.argmax()
+    assert here != other
+    places = as_tip_map(arm).frames(shapes[[other]], np.linspace(0.3, 0.9, 31)).position[0]
+    place = next(p for p in places if scene.ghost_under(eye, p - eye) == other)
+    tab.page.mouse.click(*tab.screen(place))
+    there = tuple(shapes[other])
+    tab.wait(lambda: tab.session.state.activation == there, "the arm is in the other shape")
+    tab.settle()
+    pointing = sr.configuration(arm, there, 2).directors.values[-1, 2]
+    assert scene.pointing @ pointing > 1 - 1e-9
+
+
+@pytest.mark.large
+def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(tab):
+    tab.open("Move")
+    begin = pose(tab, (-0.2, -0.1, -0.1))
+    tab.drag_tip(begin, begin + [0.0, 0.0, 0.35])
+    tab.wait(lambda: tab.session.found.lag and tab.session.found.lag.dragged.gap > 0.02, "a gap")
+    tab.settle()
+    pull = tab.session.found.lag
+    assert tab.drawn("/lag/label").text == f"{pull.dragged.gap:.3g} m short"
+    tab.page.get_by_text(f"This branch ends {pull.dragged.gap:.3g} m short").wait_for()
+    answer = sr.solve_inverse(tab.session.state.design, [pull.wanted])[0]
+    assert len(answer) == 0
+    assert pull.dragged.gap == pytest.approx(answer.gap, abs=1e-5)
+    tab.page.mouse.up()
+    tab.wait(lambda: tab.drawn("/lag") is None, "the drag rests")
+    tab.settle()
+    assert tab.drawn("/gap")
+
+
+@pytest.mark.large
+def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(tab):
+    tab.open("Move")
+    tab.session.look_from("oblique")
+    pose(tab, (-0.7, -0.4, -0.9))
+    tab.wait(lambda: tab.drawn("/arm/0").opacity is None, "an arm beside its tip is solid")
+    begin = pose(tab, (-0.48, -0.16, -1.23))  # the tip behind the body
+    tab.wait(lambda: tab.drawn("/arm/0").opacity == 0.6, "an arm before its tip is not")
+    tab.wait(lambda: around(tab, begin).min() < 0.45, "the ball is seen")  # the body is lighter
+    tab.drag_tip(begin, begin + [0.0, 0.0, 0.02])
+    tab.wait(lambda: tab.session.found.lag, "the arm follows")
+    tab.page.mouse.up()
+    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
+    tab.settle()
