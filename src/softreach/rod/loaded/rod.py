@@ -335,11 +335,13 @@ class LoadedTendons(PulledTendons):
 
     def works(self, inner: Array, which: Works) -> Array:
         z, force, moment = self._known.get(which) or self._loads(which)
-        strains = self.rod.strains(inner, z)
-        turn = (strains.curvature * strains.extension[..., None]).reshape(len(inner), 1, -1)
+        known, works = np.isfinite(inner).all(axis=1), np.full((len(inner), force.shape[1]), np.nan)
+        strains = self.rod.strains(inner[known], z)
+        turn = (strains.curvature * strains.extension[..., None]).reshape(known.sum(), 1, -1)
         # One product for each sample, so that none depends on those beside it.
         work = np.matmul(strains.extension[:, None] - 1.0, force) + np.matmul(turn, moment)
-        return work[:, 0]
+        works[known] = work[:, 0]
+        return works
 
     @lazy
     def _known(self) -> dict[Works, tuple[Array, Array, Array]]:
