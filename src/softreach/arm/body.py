@@ -23,7 +23,7 @@ from softreach.arm.part import Part, faults_under, gathered, kind_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section, Stiffness, name_faults
 from softreach.arm.stations import Located, RigidPiece, Stations, placed
-from softreach.support.arrays import Array, Mask, as_stations, read_only
+from softreach.support.arrays import Array, as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
@@ -232,20 +232,12 @@ class Body:
 
     def stiffness_at(self, z: ArrayLike) -> Stiffness:
         """K0, K1 and K3 at stations Z [m]: those of its section, infinite in rigid pieces."""
-        stiffness = self.section.stiffness_at(self.profile, z)
-        return Stiffness(*(np.where(self._is_rigid(z), np.inf, value) for value in stiffness))
-
-    def resistance_at(self, z: ArrayLike) -> Array:
-        """K1, K2 and K3 [N m²] about the directors at stations Z [m], infinite in rigid pieces."""
-        resistance = self.section.resistance_at(self.profile, z)
-        return np.where(self._is_rigid(z)[..., None], np.inf, resistance)
-
-    def _is_rigid(self, z: ArrayLike) -> Mask:
-        stations, rigid = np.asarray(z, float), np.zeros(np.shape(z), bool)
+        stiffness, stations = self.section.stiffness_at(self.profile, z), np.asarray(z, float)
         for piece in self.rigid_pieces:
             start, end = piece.span(self.length)
-            rigid |= (stations >= start) & ((stations < end) | (end >= self.length))
-        return rigid
+            rigid = (stations >= start) & ((stations < end) | (end >= self.length))
+            stiffness = Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
+        return stiffness
 
     def outline(self, z: ArrayLike) -> Outline:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""

@@ -60,8 +60,8 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
     z, weights, half = quadrature(body_of(arm))
     step = _STEP * half
     slopes = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
-    speed = np.linalg.norm(_tangents(_places(arm, z), slopes, turn, zeta), axis=0)
-    lengths = np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
+    speed, _ = _tangents(_places(arm, z), slopes, turn, zeta)
+    lengths = np.einsum("sb,nsb->nb", weights[:, None] * arm.outline(z).acts, speed)
     if has_guides(arm):
         guides = Guides(body_of(arm))
         force, moment = guides.works.loads_at(z, weights)
@@ -70,11 +70,14 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
     return lengths
 
 
-def _tangents(places: Array, slopes: Array, turn: Array, zeta: Array) -> Array:
-    """dp/dZ of lines in the directors [-], shape (3, n, node, bundle)."""
+def _tangents(
+    places: Array, slopes: Array, turn: Array, zeta: Array
+) -> tuple[Array, tuple[Array, Array, Array]]:
+    """|dp/dZ| of lines and dp/dZ in the directors [-], shape (n, node, bundle) each."""
     (x, y), (dx, dy) = places, slopes
     w1, w2, w3 = (turn[..., k, None] for k in range(3))
-    return np.stack([dx - w3 * y, dy + w3 * x, zeta[..., None] + w1 * y - w2 * x])
+    p1, p2, p3 = dx - w3 * y, dy + w3 * x, zeta[..., None] + w1 * y - w2 * x
+    return np.sqrt(p1**2 + p2**2 + p3**2), (p1, p2, p3)
 
 
 def line_strains(arm: Manipulator) -> Array:
@@ -149,15 +152,15 @@ def pull_error(arm: Manipulator) -> float:
     slopes = np.gradient(places, step, axis=1, edge_order=2)[..., pulls]
     places = places[..., pulls]
     x, y = places
-    resistance = body.resistance_at(z)
+    resistance = body.section.resistance(body.stiffness_at(z))
     shares = np.rint(2.0 * np.random.default_rng(0).random((_SAMPLES, arm.inputs))) / 2.0
     low, high = arm.input_bounds.T
     gamma = Driving(arm).activations(np.unique(low + shares * (high - low), axis=0))
     zeta, eta = 1.0 + gamma @ table.extension.T, 1.0 + gamma @ table.rest_length_factor.T
 
     def moments(omega: Array, zeta: Array) -> Array:
-        along = _tangents(places, slopes, omega, zeta)
-        t1, t2, t3 = along / np.linalg.norm(along, axis=0)
+        speed, along = _tangents(places, slopes, omega, zeta)
+        t1, t2, t3 = (each / speed for each in along)
         moment = np.stack([-y * t3, x * t3, y * t1 - x * t2], axis=-1)
         return np.einsum("nb,nsbk->nsk", gamma[:, pulls], np.where(acts, moment, 0.0))
 

@@ -245,10 +245,10 @@ class Section(Part):
         pair = None if self.measured is None else self.measured.bending_stiffness
         return pair[1] / pair[0] if isinstance(pair, tuple) else 1.0
 
-    def resistance_at(self, profile: Profile, z: ArrayLike) -> Array:
-        """K1, K2 and K3 [N m²] about the directors at stations Z [m], shape (*z.shape, 3)."""
-        _, bending, torsion = self.stiffness_at(profile, z)
-        return np.stack([bending, self.bending_ratio * bending, torsion], axis=-1)
+    def resistance(self, stiffness: Stiffness) -> Array:
+        """K1, K2 and K3 [N m²] about the directors by K1 and K3, one more axis of 3."""
+        first, torsion = stiffness.bending, stiffness.torsion
+        return np.stack([first, self.bending_ratio * first, torsion], axis=-1)
 
     def mass_per_length_at(self, profile: Profile, z: ArrayLike) -> Array:
         """Mass per length [kg/m] at stations Z [m]: what was measured, else by the materials.

@@ -55,8 +55,9 @@ def tables(arm: Body, stations: ArrayLike) -> Tables:
     z = np.atleast_1d(np.asarray(stations, float))
     loads = [Resultants(np.empty((len(z), 0)), np.empty((len(z), 3, 0)))]
     loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
-    axial, resistance = arm.stiffness_at(z).axial, arm.resistance_at(z)
-    extension = np.concatenate([load.force for load in loads], axis=1) / axial[:, None]
+    stiffness = arm.stiffness_at(z)
+    resistance = arm.section.resistance(stiffness)
+    extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
     for k, actuator in enumerate(arm.bundle_actuators):
         if isinstance(actuator, RestStrains):
@@ -190,9 +191,9 @@ class Works:
     def loads_at(self, z: Array, weights: Array) -> tuple[Array, Array]:
         """N and M of the unit loads at nodes, times weights, (node, work) and (node, 3, work)."""
         table = tables(self.arm, z)
-        axial = self.arm.section.stiffness_at(self.arm.profile, z).axial
-        resistance = self.arm.section.resistance_at(self.arm.profile, z)
-        force = table.extension[:, self.columns] * (weights * axial)[:, None]
+        stiffness = self.arm.section.stiffness_at(self.arm.profile, z)
+        resistance = self.arm.section.resistance(stiffness)
+        force = table.extension[:, self.columns] * (weights * stiffness.axial)[:, None]
         moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]
         return force, moment
 

@@ -135,9 +135,8 @@ class MarkerModel:
         columns = law.columns
         stiffness = np.zeros((*table.length.shape, 4))
         if len(columns):
-            resistance = arm.section.resistance_at(arm.profile, table.stations)
-            axial = arm.section.stiffness_at(arm.profile, table.stations).axial
-            stiffness = np.concatenate([resistance, axial[..., None]], axis=-1)
+            own = arm.section.stiffness_at(arm.profile, table.stations)
+            stiffness = np.append(arm.section.resistance(own), own.axial[..., None], axis=-1)
         measures = np.concatenate(
             [table.curvature[..., columns], table.extension[:, :, None, columns]], axis=2
         )
