@@ -116,8 +116,7 @@ class Driving:
     @lazy
     def offsets(self) -> Array:
         """Activation of each bundle of the inner arm at inputs of 0; 1 of the rest shape."""
-        offsets = np.zeros(self.law.arm.bundles)
-        offsets += self.law.rest[0]
+        offsets = self.law.rest[0].copy()
         for drive in self.arm.drives:
             for name, offset in drive.offsets.items():
                 offsets[self.arm.bundle_names.index(name)] += offset

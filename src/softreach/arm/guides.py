@@ -143,13 +143,23 @@ class Guides:
         """1 where the arc of a chord at a place is one of all, shape (chord, place, arc)."""
         return (self._chords.arc[..., None] == np.arange(len(self._edges) - 1)).astype(float)
 
+    @lazy
+    def _onto_tendons(self) -> Array:
+        """The same for the tendon of each chord, shape (chord, place, tendon, arc)."""
+        of_tendon = self._chords.tendon[:, None] == np.arange(len(self.columns))
+        return np.einsum("ct,cja->cjta", of_tendon.astype(float), self._onto)
+
     def _on_arcs(self, values: Array) -> Array:
         """Sums over chords by tendon and arc, (n, chord, place, 4) to (n, tendon, 4 arc)."""
-        n, tendons = len(values), np.arange(len(self.columns))
-        of_tendon = (self._chords.tendon[:, None] == tendons).astype(float)
-        onto = np.einsum("ct,cja->cjta", of_tendon, self._onto)
-        total = _summed(values, onto).reshape(n, 4, len(tendons), -1)
-        return np.moveaxis(total, 1, 3).reshape(n, len(tendons), -1)
+        n, tendons = len(values), len(self.columns)
+        total = _summed(values, self._onto_tendons).reshape(n, 4, tendons, -1)
+        return np.moveaxis(total, 1, 3).reshape(n, tendons, -1)
+
+    @lazy
+    def _softening(self) -> Array:
+        """h/12 in bending of the arcs that each tendon spans, 0 in the rest, (tendon, 4 arc)."""
+        on_arc = self._on_arcs(np.ones((1, *self._chords.arc.shape, 4)))[0]
+        return on_arc * np.kron(np.diff(self._edges) / 12.0, [0.0, 1.0, 1.0, 0.0])
 
     def lengths(self, works: Array) -> Array:
         """ℓ of each guided tendon [m] by the works of arcs, shape (n, tendon)."""
@@ -194,9 +204,7 @@ class Guides:
         slopes, start = self.works.slopes(inner), inner[:, self.loads]
         every = np.broadcast_to(slopes, (len(inner), *slopes.shape[1:]))[..., self.loads]
         own = np.einsum("nii->ni", every)
-        stiffening = np.kron(np.diff(self._edges) / 12.0, [0.0, 1.0, 1.0, 0.0])
-        on_arc = self._on_arcs(np.ones((1, *self._chords.arc.shape, 4)))[0]
-        gain = (inner[:, self.columns] @ on_arc) * stiffening * own  # 1 where an arc buckles
+        gain = (inner[:, self.columns] @ self._softening) * own  # 1 where an arc buckles
         inner, left = inner.copy(), np.flatnonzero((gain < 1.0).all(axis=1))
         settled = np.zeros(len(inner), bool)
         for number in range(_MOST_STEPS):
