@@ -22,7 +22,8 @@ from softreach.atlas.metrics import METRIC_GROUPS, Metric, Need, chosen_metrics
 from softreach.atlas.reading import a_store, contents, open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
-from softreach.rod.tip_map import check_tol, no_equilibrium_message
+from softreach.rod.rods import check_device
+from softreach.rod.tip_map import Device, check_tol, no_equilibrium_message
 from softreach.sampling import check_sampler
 from softreach.support import errors, parallel
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number, plain
@@ -214,6 +215,7 @@ def build_atlas(
     executor: ExecutorLike = None,
     shard: tuple[int, int] = (0, 1),
     durable: bool = False,
+    device: Device = "cpu",
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute the cloud and the metrics of every design (sections 3 and 4), or what is missing.
@@ -249,6 +251,7 @@ def build_atlas(
             share a store.
         durable: Whether a design counts as done only when not even a power cut can lose it; else
             it can damage designs of the last seconds, which the next call notices.
+        device: What computes tips: "cpu", or "cuda" for a GPU, of arms without loads.
         progress: Called with the number of designs done since its last call; None for a bar.
 
     Returns:
@@ -266,6 +269,7 @@ def build_atlas(
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)
     durable = as_flag("durable", durable)
+    check_device(device)
     as_instance("executor", executor, (type(None), Executor, DaskClient), _EXECUTORS)
     progress = None if progress is None else as_progress(progress)
     check_sampler(sampler, n, 0, seed)
@@ -280,6 +284,7 @@ def build_atlas(
         accuracy=as_number("accuracy", accuracy, ACCURACIES),
         metrics=chosen_metrics(metrics),
         keep_clouds=as_flag("keep_clouds", keep_clouds),
+        device=device,
     )
     if space.gaps:
         index, reason = next(iter(space.gaps.items()))

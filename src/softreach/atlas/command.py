@@ -11,6 +11,7 @@ import numpy as np
 from softreach.atlas.metrics import Metric, known_metric
 from softreach.atlas.space import DesignSpace
 from softreach.cloud.curvature import QUANTILES
+from softreach.rod.tip_map import Device
 from softreach.sampling import check_sampler
 from softreach.support.errors import InvalidInput, counted
 
@@ -38,6 +39,8 @@ class Command:
     accuracy: float  # Relative error asked of the exact volumes
     metrics: tuple[Metric, ...]  # As `chosen_metrics` has them
     keep_clouds: bool
+    device: Device = "cpu"
+    """What computes tips; the last digits depend on it."""
     stations: tuple[float, ...] = STATIONS
     """Places at which curvature is measured, over the length of each design."""
     quantiles: tuple[float, ...] = QUANTILES

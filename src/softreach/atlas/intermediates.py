@@ -16,7 +16,7 @@ from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
 from softreach.rod.rods import as_tip_map, with_unstable
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import Device, TipMap, TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 
@@ -34,6 +34,7 @@ class Settings(NamedTuple):
     stations: tuple[float, ...] = (1.0,)  # Over L, where curvatures are taken
     quantiles: tuple[float, ...] = (0.5,)  # Of these
     metrics: tuple[Metric, ...] = ()  # That will be computed
+    device: Device = "cpu"  # Of tips
 
 
 @dataclass(eq=False)
@@ -56,7 +57,7 @@ class Intermediates:
     @cached_property
     def rod(self) -> TipMap:
         """The tip map of the design, to the tolerance of the command."""
-        return as_tip_map(self.arm, self.command.tol)
+        return as_tip_map(self.arm, self.command.tol, device=self.command.device)
 
     @cached_property
     def tips(self) -> Array:

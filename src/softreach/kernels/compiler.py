@@ -48,6 +48,17 @@ def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
     return _dispatcher(function, inline="always", fastmath=FAST)
 
 
+def cuda_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a loop over samples for a GPU, one of them a thread.
+
+    Numba compiles each `inline` part that it calls once more, for that target, from the same source;
+    with NUMBA_ENABLE_CUDASIM=1 the loop runs in Python.
+    """
+    from numba import cuda
+
+    return cuda.jit(function, fastmath=True)
+
+
 def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile with every operation rounded by itself, in the order written.
 

@@ -141,7 +141,7 @@ class InvalidDesign(SoftreachError, ValueError):
 
 
 _EXTRAS = {"matplotlib": "plot", "skimage": "surface", "distributed": "cluster", "viser": "studio"}
-_EXTRAS |= {"jinja2": "report", "optuna": "search", "cmaes": "search"}
+_EXTRAS |= {"numba_cuda": "cuda", "jinja2": "report", "optuna": "search", "cmaes": "search"}
 _EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")
 """Module -> extra of softreach that brings it."""
 

@@ -95,14 +95,17 @@ def nodes_at(work, i):
         work[14 * LANES + i],
     )
     return (
-        _twist(base, work[LANES + i], work[2 * LANES + i], work[3 * LANES + i], at_base),
-        _twist(middle, work[5 * LANES + i], work[6 * LANES + i], work[7 * LANES + i], at_middle),
-        _twist(tip, work[9 * LANES + i], work[10 * LANES + i], work[11 * LANES + i], at_tip),
+        node_twist(base, work[LANES + i], work[2 * LANES + i], work[3 * LANES + i], at_base),
+        node_twist(
+            middle, work[5 * LANES + i], work[6 * LANES + i], work[7 * LANES + i], at_middle
+        ),
+        node_twist(tip, work[9 * LANES + i], work[10 * LANES + i], work[11 * LANES + i], at_tip),
     )
 
 
 @inline
-def _twist(rest_length, u1, u2, u3, length):
+def node_twist(rest_length, u1, u2, u3, length):
+    """A = (ηu, ζ e3) dZ of η dZ, u and ζ dZ."""
     return rest_length * u1, rest_length * u2, rest_length * u3, 0.0, 0.0, length
 
 
