@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import cuda
@@ -66,32 +67,31 @@ def _errors() -> Iterator[dict[str, object]]:
 def _rates() -> Iterator[dict[str, object]]:
     """Tips and slopes a second: kernels alone, with transfers, and on the CPU."""
     for name, arm in ARMS.items():
-        on_cpu, on_gpu = as_tip_map(arm), as_tip_map(arm, device="cuda")
-        gamma = on_cpu.box.from_cube(np.random.default_rng(2).random((_N, arm.inputs)))
-        room = TipOutputs(np.empty((_N, 3)), np.empty((_N, 3, arm.inputs)))
-        rod = on_gpu.rod
-        assert isinstance(rod, CudaRod)
-        rod.prepare()
-        inner = on_gpu.inputs.activations(gamma)
-        given = [cuda.to_device(a) for a in (rod.packed, inner, rod.offset)]
-        tips, moves = cuda.device_array((_N, 3)), cuda.device_array((_N, 3, inner.shape[1]))
-        grid = -(-_N // kernels.THREADS), kernels.THREADS
-
-        def on_card(kernel: Callable[..., object], *made: object) -> Callable[[], None]:
-            def run(kernel: Callable[..., object] = kernel, given: list = given) -> None:
-                kernel[grid](*given, *made)
-                cuda.synchronize()
-
-            return run
-
-        seconds = {
-            "tips a second, kernel": _fastest(on_card(kernels.tips(inner.shape[1]), tips)),
-            "slopes, kernel": _fastest(on_card(kernels.moves(inner.shape[1]), tips, moves)),
-            "tips with transfers": _fastest(lambda: on_gpu.fill(gamma, TipOutputs(room.tips))),
-            "tips, CPU": _fastest(lambda: on_cpu.tips(gamma), 3),
-            "slopes, CPU": _fastest(lambda: on_cpu.tips_and_slopes(gamma), 3),
-        }
+        seconds = _seconds(arm)
         yield {"arm": name, **{what: f"{_N / s:.2g}" for what, s in seconds.items()}}
+
+
+def _seconds(arm: sr.Manipulator) -> dict[str, float]:
+    on_cpu, on_gpu = as_tip_map(arm), as_tip_map(arm, device="cuda")
+    gamma = on_cpu.box.from_cube(np.random.default_rng(2).random((_N, arm.inputs)))
+    out, rod, inner = TipOutputs(np.empty((_N, 3))), on_gpu.rod, on_gpu.inputs.activations(gamma)
+    assert isinstance(rod, CudaRod)
+    rod.prepare()
+    given = [cuda.to_device(a) for a in (rod.packed, inner, rod.offset)]
+    made = cuda.device_array((_N, 3)), cuda.device_array((_N, 3, inner.shape[1]))
+    grid = -(-_N // kernels.THREADS), kernels.THREADS
+
+    def on_card(kernel: Any, count: int) -> None:
+        kernel[grid](*given, *made[:count])
+        cuda.synchronize()
+
+    return {
+        "tips a second, kernel": _fastest(lambda: on_card(kernels.tips(inner.shape[1]), 1)),
+        "slopes, kernel": _fastest(lambda: on_card(kernels.moves(inner.shape[1]), 2)),
+        "tips with transfers": _fastest(lambda: on_gpu.fill(gamma, out)),
+        "tips, CPU": _fastest(lambda: on_cpu.tips(gamma), 3),
+        "slopes, CPU": _fastest(lambda: on_cpu.tips_and_slopes(gamma), 3),
+    }
 
 
 def _cells(count: int) -> Iterator[dict[str, object]]:
