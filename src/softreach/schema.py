@@ -70,7 +70,7 @@ def cloud_dataset(
     import xarray as xr
 
     attrs = {**provenance(arm, frame), "seed": seed, "sampler": sampler, "tol": tol}
-    attrs["device"] = device
+    attrs |= {"device": device}
     variables = _variables(_CLOUD, arm, {"tip": tip, "activation": activation})
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length

@@ -66,11 +66,12 @@ def reached_cells(
     Returns:
         Dataset over the centers x, y, z [m] of cells: `count`; `density` [1/m³], the share of the
         samples per volume; `activation_distance`, the root of the mean square distance between
-        two samples in a cell, as `activation_distance` measures it, NaN where there are fewer than
-        two. `extreme_tip` (extreme, axis) [m] are the corners of the convex hull, of the tip
-        farthest from the middle in each of 262,144 sectors of directions. Attributes: `volume` [m³] of the cells reached, too large by about half a
-        cell all along the border; `convex_volume` [m³] of that hull;
-        `samples_outside` the grid, which is laid around the first 65,536 samples; `device`.
+        two samples in a cell, in the measure of `sr.activation_distance`, NaN where there are fewer
+        than two. `extreme_tip` (extreme, axis) [m] are the corners of the convex hull of the tips
+        that are farthest from the middle, one in each of 262,144 sectors of directions. Attributes:
+        `volume` [m³] of the cells reached, too large by about half a cell all along the border;
+        `convex_volume` [m³] of that hull; `samples_outside` the grid, which is laid around the
+        first 65,536 samples; `device`.
 
     Raises:
         InvalidInput: An argument out of range, or too many cells.

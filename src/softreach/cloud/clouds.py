@@ -84,9 +84,8 @@ def compute_cloud(
         NotPossible: There is no GPU, no driver for it, or the arm has loads.
     """
     report = None if progress is None else as_function("progress", progress)
-    tip_map = with_unstable(
-        all_inputs(as_tip_map(arm, tol, frame=frame, point=point, device=device))
-    )
+    whole = all_inputs(as_tip_map(arm, tol, frame=frame, point=point, device=device))
+    tip_map = with_unstable(whole)
     bundles = tip_map.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)
@@ -110,8 +109,7 @@ def compute_cloud(
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
         parallel.run(tasks(shown))
     made = {"seed": seed, "sampler": sampler, "tol": tip_map.tol, "frame": tip_map.frame}
-    made["device"] = tip_map.device
-    cloud = schema.cloud_dataset(tip_map.arm, activation, tip, **made)
+    cloud = schema.cloud_dataset(tip_map.arm, activation, tip, **made, device=tip_map.device)
     return cloud if status is None else schema.with_status(cloud, status)
 
 

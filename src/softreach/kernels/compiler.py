@@ -51,8 +51,8 @@ def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
 def cuda_kernel(function: Callable[..., Any]) -> Any:
     """Compile a loop over samples for a GPU, one of them a thread.
 
-    Numba compiles each `inline` part that it calls once more, for that target, from the same source;
-    with NUMBA_ENABLE_CUDASIM=1 the loop runs in Python.
+    Numba compiles each `inline` part that it calls once more, for that target and from the same
+    source. With NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_JIT=1 all of it runs in Python.
     """
     from numba import cuda
 

@@ -35,8 +35,8 @@ def device_name() -> str:
 
     if not cuda.is_available():
         raise NotPossible(
-            'device = cuda: this process sees no GPU of NVIDIA with a driver; see what "nvidia-smi" '
-            'prints, or compute on the CPU with device = "cpu"'
+            "device = cuda: this process sees no GPU of NVIDIA with a driver; look at what "
+            'nvidia-smi prints, or compute on the CPU with device = "cpu"'
         )
     return str(cuda.get_current_device().name)
 
@@ -69,8 +69,8 @@ class CudaRod(FreeRod):
         """The rod of an arm, if a GPU can have it."""
         if inner.loads is not None:
             raise NotPossible(
-                "device = cuda: an arm under loads is computed on the CPU, where the search for its "
-                'equilibria carries many rods side by side; leave out the loads, or device = "cuda"'
+                "device = cuda: arms under loads are computed on the CPU, where the search for an "
+                "equilibrium carries many rods side by side; leave out the loads or the device"
             )
         return cls(inner, tol)
 

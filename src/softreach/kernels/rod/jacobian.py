@@ -44,7 +44,7 @@ def _change(rest_length, weights, a):
 
 @inline
 def weights_at(column):
-    """Changes of η dZ, u and ζ dZ at the nodes of a step, base first, from a column of the table."""
+    """Changes of η dZ, u and ζ dZ at the nodes of a step, base first, in a column of its table."""
     t = column
     lengths = (t[12], t[13], t[14]) if len(t) > BEND_ROWS else (t[0], t[4], t[8])
     return (
