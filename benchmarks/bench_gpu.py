@@ -25,12 +25,15 @@ from softreach.cloud.cells import reached_cells
 from softreach.kernels.rod import cuda as kernels
 from softreach.rod.cuda import CudaRod, device_name
 from softreach.rod.rods import as_tip_map
-from softreach.rod.tip_map import TipOutputs
 
+_TRUNK = sr.designs.redundant_trunk()
+_LEFT = _TRUNK.actuators[0].replace(bundles=9)
 ARMS = {
     "paper's trunk, 3 bundles": sr.designs.minimal_trunk(),
     "redundant trunk, 4 bundles": sr.designs.redundant_trunk(),
-    "four segments, 12 tendons": sr.designs.three_tendon_robot(segments=4),
+    "the same, 12 bundles": _TRUNK.replace(actuators=(_LEFT, *_TRUNK.actuators[1:])).with_bounds(
+        [[-0.5, 0.0]] * 12
+    ),
 }
 _N = 2_000_000
 
@@ -74,7 +77,7 @@ def _rates() -> Iterator[dict[str, object]]:
 def _seconds(arm: sr.Manipulator) -> dict[str, float]:
     on_cpu, on_gpu = as_tip_map(arm), as_tip_map(arm, device="cuda")
     gamma = on_cpu.box.from_cube(np.random.default_rng(2).random((_N, arm.inputs)))
-    out, rod, inner = TipOutputs(np.empty((_N, 3))), on_gpu.rod, on_gpu.inputs.activations(gamma)
+    rod, inner = on_gpu.rod, on_gpu.inputs.activations(gamma)
     assert isinstance(rod, CudaRod)
     rod.prepare()
     given = [cuda.to_device(a) for a in (rod.packed, inner, rod.offset)]
@@ -88,7 +91,7 @@ def _seconds(arm: sr.Manipulator) -> dict[str, float]:
     return {
         "tips a second, kernel": _fastest(lambda: on_card(kernels.tips(inner.shape[1]), 1)),
         "slopes, kernel": _fastest(lambda: on_card(kernels.moves(inner.shape[1]), 2)),
-        "tips with transfers": _fastest(lambda: on_gpu.fill(gamma, out)),
+        "tips with transfers": _fastest(lambda: on_gpu.tips(gamma)),
         "tips, CPU": _fastest(lambda: on_cpu.tips(gamma), 3),
         "slopes, CPU": _fastest(lambda: on_cpu.tips_and_slopes(gamma), 3),
     }
@@ -98,7 +101,7 @@ def _cells(count: int) -> Iterator[dict[str, object]]:
     """Volumes of reached cells of two edges, to edge 0 linearly, beside the exact one."""
     arm = sr.designs.minimal_trunk()
     exact, volumes = sr.reachable_set(arm, accuracy=1e-4), list[float]()
-    for share in (0.006, 0.003):
+    for share in (0.008, 0.004):
         begun = time.perf_counter()
         cells = reached_cells(arm, count, cell=share * arm.length, device="cuda")
         seconds = time.perf_counter() - begun
