@@ -14,7 +14,6 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numba import cuda
@@ -84,13 +83,13 @@ def _seconds(arm: sr.Manipulator) -> dict[str, float]:
     made = cuda.device_array((_N, 3)), cuda.device_array((_N, 3, inner.shape[1]))
     grid = -(-_N // kernels.THREADS), kernels.THREADS
 
-    def on_card(kernel: Any, count: int) -> None:
-        kernel[grid](*given, *made[:count])
+    def on_card(derivatives: bool) -> None:
+        kernels.walk(inner.shape[1], derivatives)[grid](*given, *made)
         cuda.synchronize()
 
     return {
-        "tips a second, kernel": _fastest(lambda: on_card(kernels.tips(inner.shape[1]), 1)),
-        "slopes, kernel": _fastest(lambda: on_card(kernels.moves(inner.shape[1]), 2)),
+        "tips a second, kernel": _fastest(lambda: on_card(False)),
+        "slopes, kernel": _fastest(lambda: on_card(True)),
         "tips with transfers": _fastest(lambda: on_gpu.tips(gamma)),
         "tips, CPU": _fastest(lambda: on_cpu.tips(gamma), 3),
         "slopes, CPU": _fastest(lambda: on_cpu.tips_and_slopes(gamma), 3),

@@ -60,11 +60,11 @@ def _uniform(n: int, dim: int, seed: int) -> Draw:
 
 def _counter(n: int, dim: int, seed: int) -> Draw:
     """The numbers that kernels make of the seed and the number of the sample."""
-    from softreach.kernels import counter
+    from softreach.kernels.counting import fill
 
     def draw(first: int, count: int) -> Array:
         points, numbers = np.empty((count, dim)), np.arange(first, first + count, dtype=np.uint64)
-        counter.fill(np.uint64(seed), numbers, points)
+        fill(np.uint64(seed), numbers, points)
         return points
 
     return draw

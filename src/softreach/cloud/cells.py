@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.hull import convex_hull
 from softreach.geometry.lattice import CellGrid
-from softreach.kernels import counter
-from softreach.kernels.cells import PARTS, SECTORS, tally
-from softreach.rod.cuda import check_device_memory
+from softreach.kernels.counting import PARTS, SECTORS, fill, tally
+from softreach.rod.cuda import CudaRod, check_device_memory
 from softreach.rod.inputs import activation_measures
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.tip_map import Device, Frame, TipMap
@@ -26,6 +26,8 @@ from softreach.support.progress import Progress, bar
 
 if TYPE_CHECKING:
     import xarray as xr
+
+__all__ = ["reached_cells"]
 
 _PILOT = 1 << 16  # samples by which the grid is laid
 _MARGIN = 0.02  # of L, of the grid around them
@@ -71,7 +73,7 @@ def reached_cells(
         that are farthest from the middle, one in each of 262,144 sectors of directions. Attributes:
         `volume` [m³] of the cells reached, too large by about half a cell all along the border;
         `convex_volume` [m³] of that hull; `samples_outside` the grid, which is laid around the
-        first 65,536 samples; `device`.
+        first 65,536 samples, or without a stable posture; `device`.
 
     Raises:
         InvalidInput: An argument out of range, or too many cells.
@@ -91,7 +93,7 @@ def reached_cells(
 
 
 class _Tallies:
-    """What is counted, in the layout of the kernels; see `kernels.cells.tally`."""
+    """What is counted, in the layout of the kernels; see `kernels.counting.tally`."""
 
     def __init__(self, tip_map: ArmMap, grid: CellGrid) -> None:
         self.tip_map, self.grid = tip_map, grid
@@ -108,7 +110,7 @@ class _Tallies:
         self.best = np.zeros(SECTORS**2, np.uint64)  # distance over the farthest, in 32 bits
         self.extreme = np.zeros(SECTORS**2, np.int64)  # the sample there
 
-    def keep(self, ranks: Array, first: int) -> None:
+    def keep(self, ranks: NDArray[Any], first: int) -> None:
         """Keep the farthest sample of each sector, from the ranks of a block."""
         far, number = ranks >> np.uint64(32), (ranks & np.uint64(0xFFFFFFFF)).astype(np.int64)
         better = far > self.best
@@ -124,7 +126,7 @@ class _Tallies:
         distance = np.sqrt(2.0 * (spread * several / (several - 1.0)).clip(0.0))
         numbers = np.unique(self.extreme[self.best > 0])
         cube = np.empty((len(numbers), self.tip_map.box.bundles))
-        counter.fill(np.uint64(seed), numbers.astype(np.uint64), cube)
+        fill(np.uint64(seed), numbers.astype(np.uint64), cube)
         tips = self.tip_map.tips(self.tip_map.box.from_cube(cube))
         hull = convex_hull(tips)
         variables = {
@@ -178,7 +180,9 @@ def _on_gpu(t: _Tallies, n: int, seed: int, progress: Progress) -> None:
     from softreach.kernels.rod import cuda as kernels
 
     check_device_memory(t.counts.nbytes + t.sums.nbytes)
-    given = (_table_of_cube(t.tip_map), t.tip_map.rod.offset, _rows_of_pose(t.tip_map))
+    rod = t.tip_map.rod
+    assert isinstance(rod, CudaRod)
+    given = (_table_of_cube(t.tip_map, rod.packed), rod.offset, _rows_of_pose(t.tip_map))
     table, start, pose = map(cuda.to_device, given)
     about = [cuda.to_device(values) for values in (t.weights, t.place, t.shape)]
     counts, sums = cuda.to_device(t.counts), cuda.to_device(t.sums)
@@ -196,8 +200,8 @@ def _on_gpu(t: _Tallies, n: int, seed: int, progress: Progress) -> None:
     sums.copy_to_host(t.sums)
 
 
-def _table_of_cube(tip_map: ArmMap) -> Array:
-    """The table of the rod in coordinates of the unit cube, of which γ is an affine function."""
+def _table_of_cube(tip_map: ArmMap, packed: Array) -> Array:
+    """The packed table of the rod in coordinates of the cube, of which γ is an affine function."""
     driving = tip_map.inputs.driving
     if driving is not None and not driving.is_affine:
         raise NotPossible(
@@ -206,7 +210,7 @@ def _table_of_cube(tip_map: ArmMap) -> Array:
         )
     dim = tip_map.box.bundles
     ends = tip_map.box.from_cube(np.concatenate([np.zeros((1, dim)), np.eye(dim)]))
-    gamma, packed = tip_map.inputs.activations(ends), tip_map.rod.packed
+    gamma = tip_map.inputs.activations(ends)
     columns, rest = packed[..., :-1] @ (gamma[1:] - gamma[0]).T, packed[..., :-1] @ gamma[0]
     return np.concatenate([columns, (packed[..., -1] + rest)[..., None]], axis=-1)
 

@@ -56,7 +56,7 @@ def cuda_kernel(function: Callable[..., Any]) -> Any:
     """
     from numba import cuda
 
-    vars(config)["CUDA_LOW_OCCUPANCY_WARNINGS"] = 0  # of small blocks, which are right
+    setattr(config, "CUDA_LOW_OCCUPANCY_WARNINGS", 0)  # noqa: B010  (small blocks are right)
     return cuda.jit(function, fastmath=True)
 
 

@@ -111,14 +111,10 @@ class CudaRod(FreeRod):
 
         from softreach.kernels.rod import cuda as kernels
 
-        n, bundles = gamma.shape
-        outputs = [tips] if moves is None else [tips, moves]
-        kernel = (kernels.tips if moves is None else kernels.moves)(bundles)
+        kernel = kernels.walk(gamma.shape[1], moves is not None)
+        outputs = [tips, np.empty((0, 3, 0)) if moves is None else moves]
         given = [cuda.to_device(np.ascontiguousarray(a)) for a in (self.packed, gamma, start)]
-        made = [cuda.device_array(a.shape) for a in outputs]
-        kernel[-(-n // kernels.THREADS), kernels.THREADS](*given, *made)
-        for source, target in zip(made, outputs, strict=True):
-            if target.flags.c_contiguous:
-                source.copy_to_host(target)
-            else:
-                target[:] = source.copy_to_host()
+        made = [cuda.device_array(values.shape) for values in outputs]
+        kernel[-(-len(gamma) // kernels.THREADS), kernels.THREADS](*given, *made)
+        for source, target in zip(made, outputs[: 1 + (moves is not None)], strict=False):
+            target[...] = source.copy_to_host()

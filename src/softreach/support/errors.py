@@ -153,7 +153,9 @@ class MissingExtra(SoftreachError, ImportError):
         names = dict.fromkeys(name.replace("skimage", "scikit-image") for name in modules)
         extras = ",".join(dict.fromkeys(_EXTRAS[name] for name in modules))
         them = "them" if len(names) > 1 else "it"
-        remedy = f"pip install 'softreach[{extras}]', or in a clone with: make setup"
+        remedy = f"pip install 'softreach[{extras}]'"
+        if extras != "cuda":  # which is no part of [all]
+            remedy += ", or in a clone with: make setup"
         super().__init__(f"this needs {' and '.join(names)}; install {them} with: {remedy}")
 
 

@@ -9,18 +9,19 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
+import numba.cuda
 import numpy as np
-from numba import cuda, float64
+from numba import float64
 
-from softreach.kernels.cells import PARTS, cell_of, rank_of, sector_of
 from softreach.kernels.compiler import cuda_kernel, inline
-from softreach.kernels.counter import uniform
+from softreach.kernels.counting import PARTS, cell_of, rank_of, sector_of, uniform
 from softreach.kernels.rod.jacobian import step_column, weights_at
 from softreach.kernels.rod.magnus import exponent
 from softreach.kernels.rod.tips import BEND_ROWS, node_twist
 from softreach.kernels.rod.twist import act
 from softreach.kernels.vector import combination, cross, minus, plus
 
+cuda: Any = numba.cuda  # without types
 THREADS = 128
 """Threads of a block."""
 
@@ -55,43 +56,16 @@ def _nodes(table, k, gamma, bundles):
     return (base, middle, tip), (at_base, at_middle, at_tip)
 
 
-@inline
-def _walk(table, k, gamma, bundles, point):
-    """Carry a point across step k, toward the base."""
-    nodes, _ = _nodes(table, k, gamma, bundles)
-    return act(exponent(nodes[0], nodes[1], nodes[2]), point)
-
-
 @lru_cache
-def tips(bundles: int) -> Any:
-    """Kernel (table, γ (n, bundle), point in the frame of the tip, tips (n, 3))."""
+def walk(bundles: int, derivatives: bool) -> Any:
+    """Kernel (table, γ (n, bundle), point in the frame of the tip, tips (n, 3), moves).
 
-    @cuda_kernel
-    def tips(table, gamma, start, out):
-        i = cuda.grid(1)
-        if i >= gamma.shape[0]:
-            return
-        g = cuda.local.array(bundles, float64)
-        for j in range(bundles):
-            g[j] = gamma[i, j]
-        point = start[0], start[1], start[2]
-        for k in range(table.shape[0] - 1, -1, -1):
-            point = _walk(table, k, g, bundles, point)
-        out[i, 0], out[i, 1], out[i, 2] = point
-
-    return tips
-
-
-@lru_cache
-def moves(bundles: int) -> Any:
-    """Kernel (table, γ, point, tips (n, 3), moves).
-
-    Moves are twists (v, ω) of the tip's frame, shape (n, 6, bundle), or the derivatives v + ω × r
-    of tips, shape (n, 3, bundle): theory (29) and (31).
+    Moves, where derivatives are wanted, are twists (v, ω) of the tip's frame, shape (n, 6, bundle),
+    or derivatives v + ω × r of the tips, shape (n, 3, bundle): theory (29) and (31).
     """
 
     @cuda_kernel
-    def moves(table, gamma, start, out, moved):
+    def walk(table, gamma, start, tips, moves):
         i = cuda.grid(1)
         if i >= gamma.shape[0]:
             return
@@ -105,28 +79,30 @@ def moves(bundles: int) -> Any:
         for k in range(table.shape[0] - 1, -1, -1):
             nodes, lengths = _nodes(table, k, g, bundles)
             omega = exponent(nodes[0], nodes[1], nodes[2])
-            for j in range(bundles):
-                c = columns[j]
-                xi = c[0], c[1], c[2], c[3], c[4], c[5]
-                xi = step_column(nodes, lengths, weights_at(table[k, :, j]), omega, xi)
-                c[0], c[1], c[2], c[3], c[4], c[5] = xi
             point = act(omega, point)
-        out[i, 0], out[i, 1], out[i, 2] = point
-        for j in range(bundles):
-            w = columns[j, 0], columns[j, 1], columns[j, 2]
-            v = columns[j, 3], columns[j, 4], columns[j, 5]
-            if moved.shape[1] == 3:
-                v = plus(v, cross(w, point))
-            moved[i, 0, j], moved[i, 1, j], moved[i, 2, j] = v
-            if moved.shape[1] == 6:
-                moved[i, 3, j], moved[i, 4, j], moved[i, 5, j] = w
+            if derivatives:
+                for j in range(bundles):
+                    c = columns[j]
+                    xi = c[0], c[1], c[2], c[3], c[4], c[5]
+                    xi = step_column(nodes, lengths, weights_at(table[k, :, j]), omega, xi)
+                    c[0], c[1], c[2], c[3], c[4], c[5] = xi
+        tips[i, 0], tips[i, 1], tips[i, 2] = point
+        if derivatives:
+            for j in range(bundles):
+                w = columns[j, 0], columns[j, 1], columns[j, 2]
+                v = columns[j, 3], columns[j, 4], columns[j, 5]
+                if moves.shape[1] == 3:
+                    v = plus(v, cross(w, point))
+                else:
+                    moves[i, 3, j], moves[i, 4, j], moves[i, 5, j] = w
+                moves[i, 0, j], moves[i, 1, j], moves[i, 2, j] = v
 
-    return moves
+    return walk
 
 
 @lru_cache
 def cells(dim: int) -> Any:
-    """Kernel that draws samples from a counter and does with them what `kernels.cells.tally` does.
+    """Kernel that draws samples by their numbers and counts them as `kernels.counting.tally`.
 
     Its table is in coordinates of the unit cube; `pose` has the rows of the base's rotation and its
     place [m]; `first` is the number of the first of `count` samples.
@@ -144,7 +120,8 @@ def cells(dim: int) -> Any:
             square += weights[j] * x[j] * x[j]
         point = start[0], start[1], start[2]
         for k in range(table.shape[0] - 1, -1, -1):
-            point = _walk(table, k, x, dim, point)
+            nodes, _ = _nodes(table, k, x, dim)
+            point = act(exponent(nodes[0], nodes[1], nodes[2]), point)
         point = plus(combination(point, pose), (pose[3, 0], pose[3, 1], pose[3, 2]))
         v = minus(point, (grid[4], grid[5], grid[6]))
         cuda.atomic.max(ranks, sector_of(v), rank_of(v, grid[7], i))

@@ -1,7 +1,8 @@
-"""Samples counted where their tips lie: the cells of a grid, and sectors of directions.
+"""Samples drawn by their numbers, and counted where their tips lie: in cells and in sectors.
 
-The parts serve the loops of every device. Sums are of whole numbers, so that they depend neither on
-the order of the samples nor on blocks and threads.
+Number i of a seed is that of SplitMix64 [Steele2014], whose state after i steps is the seed plus i
+times an odd constant, so that it needs no number before it. Sums are of whole numbers. So neither
+the device nor blocks, threads and the order of samples change a result.
 """
 
 from __future__ import annotations
@@ -17,6 +18,20 @@ SECTORS = 512
 """Sectors of directions along each side of the square that the octahedral map unfolds."""
 PARTS = 1 << 20
 """Parts into which a number within [0, 1) is cut before it is summed."""
+_STEP = np.uint64(0x9E3779B97F4A7C15)
+_FIRST = np.uint64(0xBF58476D1CE4E5B9)
+_SECOND = np.uint64(0x94D049BB133111EB)
+_27, _30, _31, _11 = np.uint64(27), np.uint64(30), np.uint64(31), np.uint64(11)
+_UNIT = 2.0**-53
+
+
+@inline
+def uniform(seed, i):
+    """Number i [-] of a seed, both uint64."""
+    z = seed + (i + np.uint64(1)) * _STEP
+    z = (z ^ (z >> _30)) * _FIRST
+    z = (z ^ (z >> _27)) * _SECOND
+    return np.float64((z ^ (z >> _31)) >> _11) * _UNIT
 
 
 @inline
@@ -49,6 +64,15 @@ def rank_of(v, farthest, sample):
     """Distance over `farthest` in the upper 32 bits, the number of a sample in the lower ones."""
     far = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / farthest
     return (np.uint64(min(far, 1.0) * 4294967295.0) << np.uint64(32)) | np.uint64(sample)
+
+
+@kernel
+def fill(seed, numbers, out):
+    """Put the points of the unit cube with these numbers into place, shape (n, dim)."""
+    n, dim = out.shape
+    for i in range(n):
+        for j in range(dim):
+            out[i, j] = uniform(seed, numbers[i] * np.uint64(dim) + np.uint64(j))
 
 
 @kernel
