@@ -7,6 +7,7 @@ otherwise must not be there.
 import os
 import subprocess
 import sys
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -38,6 +39,7 @@ def _arms():
     }
 
 
+@patch.object(cells, "_PILOT", 100)
 def _results(device):
     """Everything that a device computes, by name."""
     results = {}
@@ -62,7 +64,6 @@ def _results(device):
 
 
 if __name__ == "__main__":
-    cells._PILOT = 100
     with np.errstate(over="ignore"):  # whole numbers of a counter wrap around
         np.savez(sys.argv[1], **_results("cuda"))
 
@@ -87,8 +88,7 @@ def on_cuda(request, tmp_path_factory):
     return np.load(file)
 
 
-def test_a_gpu_computes_what_the_cpu_computes(on_cuda, monkeypatch):
-    monkeypatch.setattr(cells, "_PILOT", 100)
+def test_a_gpu_computes_what_the_cpu_computes(on_cuda):
     on_cpu = _results("cpu")
     assert set(on_cuda) == set(on_cpu)
     for name, values in on_cpu.items():
