@@ -1,141 +1,133 @@
-"""A wanted direction of the tip: compromises with position and change, by Newton in the box."""
+"""Poses: a place and a direction of the tip as rows of one search, by Gauss-Newton in the box.
+
+Rows are (tip - target)/L and w q, where the rotation vector q = (θ - cone)+ (e × d3)/|e × d3| says
+how far the direction d3 is from the cone around the wanted e: theory (40). Both vanish at a pose
+that meets its goals, next to which steps gain twice as many digits each.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from softreach.inverse.request import Request
-from softreach.inverse.roots import descend
 from softreach.kernels.box.bounded_descent import box_steps
-from softreach.rod.inputs import ActivationBox
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index
 
-Evaluate = Callable[[Index, Array], tuple[Array, Array]]
-"""(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
-
-_MOST_NEWTON_STEPS = 80
-_DIFFERENCE = 1e-6  # step of the differences of gradients, in ranges
-_STEP_TOL = 1e-10  # step at which a search has converged, in ranges
+_MOST_STEPS = 120
+_STEP_TOL = 1e-12  # step at which a search has converged, in ranges
 _VALUE_TOL = 1e-14  # relative increase of a value that is rounding
-_LARGEST_DAMPING = 1e8  # at which a search stagnates
-
-_PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
-"""Rising; with a lower first one a small miss would buy a large change of activation."""
-
-
-def compromises(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
-    """Least |tip - target|²/L² + w² |d3 - direction|² from starts (n, m): where, and half of it."""
-    return minimize(partial(objective, tip_map, request, 1.0, None), start, tip_map.box)
+_LEAST_DAMPING, _LARGEST_DAMPING = 1e-12, 1e8  # parts of the largest curvature
+_PULLS = (1e-2, 1e-4, 1e-7, 0.0)
+"""Falling weights of ½|γ - near|² beside the goals, so that of all poses that of least change is
+found."""
 
 
-def constrained_minima(tip_map: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
-    """Minimize ½|γ - near|² + ½ w²|d3 - direction|² subject to tip = target, from starts (n, m).
+class Poses(NamedTuple):
+    """Ends of searches."""
 
-    Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], with inner searches in the box,
-    then descent to the target; activations and what they miss [m].
-    """
-    gamma, residual = start.copy(), np.full(len(start), np.inf)
-    slopes = tip_map.tips_and_slopes(gamma)[1] / tip_map.length
-    slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
-    # λ for which γ - near + Jᵀλ is least: that of a solution if the start is one.
-    inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
-    multiplier = -np.einsum("nij,nj->ni", inverse, gamma - request.near)
-    for penalty in _PENALTIES:
-        rows = np.flatnonzero(residual > 0.1 * request.residual)
-        if not len(rows):
-            break
-        part = request.of(rows)
-        lagrangian = partial(objective, tip_map, part, penalty, multiplier[rows])
-        gamma[rows] = minimize(lagrangian, gamma[rows], tip_map.box)[0]
-        error = (tip_map.tips_and_slopes(gamma[rows])[0] - part.targets) / tip_map.length
-        multiplier[rows] += penalty * error  # theory (40)
-        residual[rows] = np.linalg.norm(error, axis=1) * tip_map.length
-    ends = descend(tip_map, request.targets, gamma, request.residual)
-    return ends.gamma, ends.distance
+    gamma: Array  # activations [-], (n, m)
+    merit: Array  # half the sum of the squared rows, (n,)
+    miss: Array  # |tip - target|, or L times the angle to the cone if that is more [m], (n,)
 
 
-def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> tuple[Array, Array]:
-    """Minimize function i from start i, shape (n, m), by damped Newton within the bounds.
+def compromises(tip_map: TipMap, request: Request, start: Array) -> Poses:
+    """Local minima of |tip - target|²/L² + w² |q|² from starts (n, m), one for each target."""
+    return _descended(tip_map, request, start, (0.0,))
 
-    Activations of local minima, and the functions there (n,); Hessians are of gradients.
-    """
+
+def nearest_poses(tip_map: TipMap, request: Request, start: Array) -> Poses:
+    """Poses that meet their goals with little change from `near`, from starts (n, m)."""
+    return _descended(tip_map, request, start, _PULLS)
+
+
+def direction_errors(tip_map: TipMap, request: Request, target: Index, gamma: Array) -> Array:
+    """Angles between the tips' directions and those wanted for some targets [rad], shape (n,)."""
+    if request.direction is None:
+        return np.full(len(gamma), np.nan)
+    if not len(gamma):
+        return np.empty(0)
+    return _angles(tip_map.tip_directions(gamma), request.direction[target])[0]
+
+
+def goal_rows(
+    tip_map: TipMap, request: Request, which: Index, gamma: Array
+) -> tuple[Array, Array, Array]:
+    """Rows (n, 6), their derivatives (n, 6, m) and the miss [m] at activations (n, m)."""
+    assert request.direction is not None
+    motions, wanted = tip_map.tip_motions(gamma), request.direction[which]
+    away = (motions.tips - request.targets[which]) / tip_map.length
+    angle, axis = _angles(motions.directions, wanted)
+    excess = (angle - request.cone).clip(0.0)
+    turn = motions.rotations - motions.directions[:, :, None] * np.einsum(
+        "ni,nij->nj", motions.directions, motions.rotations
+    )[:, None]
+    if request.cone:  # along the cone nothing is wanted
+        turn = axis[:, :, None] * np.einsum("ni,nij->nj", axis, turn)[:, None]
+    turn *= (excess > 0.0)[:, None, None] if request.cone else 1.0
+    weight = request.direction_weight
+    rows = np.concatenate([away, weight * excess[:, None] * axis], axis=1)
+    slopes = np.concatenate([motions.slopes / tip_map.length, weight * turn], axis=1)
+    miss = tip_map.length * np.maximum(np.linalg.norm(away, axis=1), excess)
+    return rows, slopes, miss
+
+
+def _angles(directions: Array, wanted: Array) -> tuple[Array, Array]:
+    """Angles [rad], and the unit vectors around which directions are turned from those wanted."""
+    cross = np.cross(wanted, directions)
+    sine = np.linalg.norm(cross, axis=1)
+    axis = cross / np.where(sine > 0.0, sine, 1.0)[:, None]
+    return np.arctan2(sine, np.einsum("ni,ni->n", directions, wanted)), axis
+
+
+def _descended(
+    tip_map: TipMap, request: Request, start: Array, pulls: tuple[float, ...]
+) -> Poses:
+    """Descend from start i to target i with each of the pulls toward `near`, one after another."""
+    gamma = tip_map.box.clip(start)
+    for pull in pulls:
+        gamma = _gauss_newton(tip_map, request, gamma, pull)
+    rows, _, miss = goal_rows(tip_map, request, np.arange(len(gamma)), gamma)
+    return Poses(gamma, 0.5 * _squares(rows), np.nan_to_num(miss, nan=np.inf))
+
+
+def _gauss_newton(tip_map: TipMap, request: Request, start: Array, pull: float) -> Array:
+    """Damped Gauss-Newton steps for ½|rows|² + ½ pull |γ - near|² within the bounds."""
+    box = tip_map.box
     low, high, scales = box.low.copy(), box.high.copy(), box.scales
-    gamma, damping = start.copy(), np.zeros(len(start))
+    gamma, damping = start.copy(), np.full(len(start), 1e-3)
     active = np.arange(len(start))
-    value, gradient, hessian = _expanded(evaluate, active, gamma, scales, active >= 0)
+    value, gradient, hessian = _model(tip_map, request, active, gamma, pull)
     active = active[np.isfinite(value)]
-    for _ in range(_MOST_NEWTON_STEPS):
+    for _ in range(_MOST_STEPS):
         if not len(active):
             break
         trial, damped = np.empty((len(active), start.shape[1])), damping[active]
         box_steps(gamma[active], gradient[active], hessian[active], damped, low, high, trial)
-        still = (np.abs(trial - gamma[active]) / scales).max(axis=1, initial=0.0) <= _STEP_TOL
-        ahead = _expanded(evaluate, active, trial, scales, ~still)
-        accepted = ahead[0] <= value[active] + _VALUE_TOL * np.abs(value[active])
+        step = (np.abs(trial - gamma[active]) / scales).max(axis=1, initial=0.0)
+        ahead = _model(tip_map, request, active, trial, pull)
+        accepted = ahead[0] <= value[active] * (1.0 + _VALUE_TOL)
         taken = active[accepted]
         gamma[taken] = trial[accepted]
         value[taken], gradient[taken], hessian[taken] = (part[accepted] for part in ahead)
-        eased = np.where(damped > 1e-6, 0.1 * damped, 0.0)
-        damping[active] = np.where(accepted, eased, np.maximum(10 * damped, 1e-3))
-        active = active[~still & (damping[active] < _LARGEST_DAMPING)]
-    return gamma, value
+        eased = np.maximum(0.1 * damped, _LEAST_DAMPING)
+        damping[active] = np.where(accepted, eased, np.maximum(10.0 * damped, 1e-6))
+        active = active[(step > _STEP_TOL) & (damping[active] < _LARGEST_DAMPING)]
+    return gamma
 
 
-def objective(
-    tip_map: TipMap,
-    request: Request,
-    penalty: float,
-    multiplier: Array | None,
-    which: Index,
-    gamma: Array,
-) -> tuple[Array, Array]:
-    """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
-
-    Theory (40), with the penalty μ and multipliers λ (n, 3); without these and the change it is a
-    compromise. Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,).
-    """
-    assert request.direction is not None
-    motions, wanted = tip_map.tip_motions(gamma), request.direction[which]
-    miss = (motions.tips - request.targets[which]) / tip_map.length
-    force, value = penalty * miss, 0.5 * penalty * _squares(miss)
-    if multiplier is not None:
-        force += multiplier[which]
-        value += np.einsum("ni,ni->n", multiplier[which], miss)
-    gradient = np.einsum("ni,nij->nj", force, motions.slopes / tip_map.length)
-    if multiplier is not None:
-        change = gamma - request.near[which]
-        value += 0.5 * _squares(change)
-        gradient += change
-    squared_weight = request.direction_weight**2
-    value += 0.5 * squared_weight * _squares(motions.directions - wanted)
-    # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
-    turn = np.cross(motions.directions, wanted)
-    gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
-    return value, gradient
-
-
-def _expanded(
-    evaluate: Evaluate, which: Index, gamma: Array, scales: Array, curved: Mask
+def _model(
+    tip_map: TipMap, request: Request, which: Index, gamma: Array, pull: float
 ) -> tuple[Array, Array, Array]:
-    """Values, gradients and, where `curved`, Hessians by differences of these, in one call."""
-    n, m = gamma.shape
-    k = int(curved.sum())
-    displaced = np.repeat(gamma[curved, None], m, axis=1)
-    displaced[:, np.arange(m), np.arange(m)] += _DIFFERENCE * scales
-    every = np.concatenate([which, np.repeat(which[curved], m)])
-    value, gradient = evaluate(every, np.concatenate([gamma, displaced.reshape(k * m, m)]))
-    change = gradient[n:].reshape(k, m, m) - gradient[:n][curved, None]
-    hessian = np.full((n, m, m), np.nan)
-    hessian[curved] = change / (_DIFFERENCE * scales)[:, None]
-    torn = np.isfinite(value[:n]) & curved & np.isnan(hessian).any(axis=(1, 2))
-    # Next to where a function ends, steps down of a tenth of the ranges.
-    size = np.abs(gradient[:n][torn] * scales).max(axis=1, initial=0.0)
-    hessian[torn] = (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(m)
-    return value[:n], gradient[:n], hessian
+    """Value (n,), gradient (n, m) and the Hessian without the curvature of rows, (n, m, m)."""
+    rows, slopes, _ = goal_rows(tip_map, request, which, gamma)
+    change = gamma - request.near[which]
+    value = 0.5 * _squares(rows) + 0.5 * pull * _squares(change)
+    gradient = np.einsum("ni,nij->nj", rows, slopes) + pull * change
+    hessian = slopes.transpose(0, 2, 1) @ slopes + pull * np.eye(gamma.shape[1])
+    return value, gradient, hessian
 
 
 def _squares(rows: Array) -> Array:

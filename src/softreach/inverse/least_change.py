@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.inverse.direction import constrained_minima
+from softreach.inverse.direction import nearest_poses
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Reached, descend, first_of_each, reach
@@ -51,12 +51,11 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     The others are nearest to random activations, and apart: fewer than `family` where searches end
     at what is known. Numbers of targets, activations, and the best place for every target.
     """
-    known = _in_blocks(prepared, replace(request, direction=None))
+    search = _in_blocks if request.direction is None else _posed
+    known = search(prepared, request)
     reached = np.flatnonzero(known.residual <= request.residual)
     solved = request.of(reached)
     first = known.gamma[reached]
-    if request.direction is not None:
-        first = _turned(prepared, solved, first)
     families = _Families(first, request.family, prepared.tip_map.box.scales)
     box, rng = prepared.tip_map.box, np.random.default_rng(request.seed)
     # One sequence for all targets, so that a target's family does not depend on its neighbors.
@@ -66,9 +65,10 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
         rows = np.flatnonzero(families.counts < request.family)
         if not len(rows):
             break
-        another = replace(solved.of(rows), near=np.tile(near, (len(rows), 1)), direction=None)
-        other = _in_blocks(prepared, another, families.members[rows, 0]).gamma
-        families.add(rows, other, None if request.direction is not None else solved.near[rows])
+        another = replace(solved.of(rows), near=np.tile(near, (len(rows), 1)))
+        other = search(prepared, another, families.members[rows, 0])
+        met = other.residual <= request.residual
+        families.add(rows[met], other.gamma[met], solved.near[rows[met]])
     return np.repeat(reached, families.counts), families.members[families.is_member], known
 
 
@@ -212,26 +212,21 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     return owner, start
 
 
-def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:
-    """The best compromise of change and direction that keeps the position, from several starts."""
-    count = len(known)
+def _posed(prepared: PreparedMap, request: Request, known: Array | None = None) -> Reached:
+    """The pose of least change that meets its goals, from several starts, or the nearest one.
+
+    Its residual [m] holds L times the angle by which the direction misses, if that is more.
+    """
+    count, tip_map = len(request.targets), prepared.tip_map
+    at_place = _in_blocks(prepared, replace(request, direction=None), known).gamma
     owner, start = _starts(prepared, request)
-    owner, start = np.concatenate([np.arange(count), owner]), np.concatenate([known, start])
-    gamma, residual = constrained_minima(prepared.tip_map, request.of(owner), start)
-    cost = _cost(prepared.tip_map, request.of(owner), gamma)
-    cost = np.where(residual <= request.residual, cost, np.inf)
-    cost = np.concatenate([cost, _cost(prepared.tip_map, request, known)])
-    gamma, owner = np.concatenate([gamma, known]), np.concatenate([owner, np.arange(count)])
-    return gamma[first_of_each(owner, cost, count)]
-
-
-def _cost(tip_map: TipMap, request: Request, gamma: Array) -> Array:
-    """|γ - near|² + w² |d3 - direction|², shape (n,)."""
-    cost = np.linalg.norm(gamma - request.near, axis=1) ** 2
-    if request.direction is not None and len(gamma):
-        error = tip_map.tip_directions(gamma) - request.direction
-        cost += (request.direction_weight * np.linalg.norm(error, axis=1)) ** 2
-    return cost
+    begun = [at_place] if known is None else [at_place, known]
+    owner = np.concatenate([*[np.arange(count)] * len(begun), owner])
+    ends = nearest_poses(tip_map, request.of(owner), np.concatenate([*begun, start]))
+    change = np.linalg.norm(ends.gamma - request.near[owner], axis=1)
+    worth = np.where(ends.miss > request.residual, 1e100 * (1.0 + ends.merit), change)
+    best = first_of_each(owner, worth, count)
+    return Reached(ends.gamma[best], ends.miss[best])
 
 
 class Minima(NamedTuple):

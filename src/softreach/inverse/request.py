@@ -21,6 +21,10 @@ RESIDUALS = Range(1e-13, 1e-2)
 """|tip - target| that can be asked for, in L; below, rounding of the tips decides."""
 
 
+ANGLE_TOL = 1e-6
+"""Error of the tips' directions [rad], by which a direction may miss its cone."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Request:
     """Targets, and which activations to prefer where there is a choice."""
@@ -30,10 +34,16 @@ class Request:
     reach_tol: float  # |tip - target| at which a target counts as reached [m], `residual` at least
     near: Array  # activations of the free bundles to stay near to [-], (t, dimension)
     direction: Array | None = None  # wanted tip tangents, unit vectors, (t, 3)
-    direction_weight: float = 0.0  # of |d3 - direction| against |γ - near| or a distance in L
+    cone: float = 0.0  # angle from `direction` that is allowed [rad]
+    direction_weight: float = 0.1  # of an angle [rad] against a distance in L
     family: int = 1  # activations wanted for each target where there are infinitely many
     seed: int = 0  # seed of the random activations that the others stay near to
     from_rest: bool = False  # True for postures that activations lead to from rest, and no others
+
+    @property
+    def direction_tol(self) -> float:
+        """Angle at which a direction counts as met [rad]: that of the cone and of rounding."""
+        return self.cone + ANGLE_TOL
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""

@@ -56,6 +56,8 @@ class Solution:
     """Each activation that reaches the target [unit of each], shape (k, bundles); k = 0 if none."""
     residuals: Array
     """|tip - target| [m], shape (k,)."""
+    direction_errors: Array
+    """Angles between the tip's direction and that wanted [rad], NaN if none is, shape (k,)."""
     conditions: Array
     """Condition numbers of ∂r/∂γ of the free bundles, infinite on a fold, shape (k,)."""
     margins: Array
@@ -71,6 +73,8 @@ class Solution:
     """An activation that leads there [unit of each], shape (bundles,)."""
     gap: float
     """|nearest - target| [m]."""
+    direction_gap: float
+    """Angle between the tip's direction there and that wanted [rad]; NaN if none is."""
     gap_bound: float
     """A proved lower bound of the distance to all tips within the bounds [m], more than their
     error; 0 if nothing is proved."""
@@ -95,7 +99,7 @@ class Solution:
         place = ", ".join(f"{x:.6g}" for x in self.target)
         outcome = self.status.name.lower().replace("_", " ")
         if not len(self):
-            near = f"nearest point {self.gap:.3g} m away"
+            near = f"nearest point {self.gap:.3g} m away{_off(self.direction_gap)}"
             return f"<Solution for ({place}) m: {outcome}, {near}>"
         count, worst = counted(len(self), "activation"), self.residuals.max()
         summary = f"{count}, largest residual {worst:.1e} m"
@@ -121,6 +125,7 @@ class Solution:
         lines = [f"target {shown.place(self.target)}: {status}"]
         for k, gamma in enumerate(self.activations):
             quality = f"residual {shown.rounded(self.residuals[k], digits='.1e')}"
+            quality += _off(self.direction_errors[k])
             if gamma.size:
                 quality += f", condition {self.conditions[k]:.3g}, margin {self.margins[k]:.3g}"
             if self.sheets[k]:
@@ -130,9 +135,13 @@ class Solution:
             least = shown.rounded(self.gap_bound)
             bound = f", proved to be at least {least}" if self.gap_bound else ""
             nearest, gap = shown.place(self.nearest), shown.rounded(self.gap)
-            lines.append(f"nearest {nearest}, {gap} away{bound}")
+            lines.append(f"nearest {nearest}, {gap} away{_off(self.direction_gap)}{bound}")
             lines.append(f"reached by {activation_text(arm, self.nearest_activation, names)}")
         return "\n  ".join(lines)
+
+
+def _off(angle: float) -> str:
+    return "" if np.isnan(angle) else f", direction {np.degrees(angle):.3g}° off"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,6 +156,8 @@ class Solutions(Sequence[Solution]):
     """Shape (n, bundles) [unit of each]."""
     residuals: Array
     """Shape (n,) [m]."""
+    direction_errors: Array
+    """Shape (n,) [rad]."""
     conditions: Array
     """Shape (n,) [-]."""
     margins: Array
@@ -161,6 +172,8 @@ class Solutions(Sequence[Solution]):
     """Shape (t, bundles) [unit of each]."""
     gaps: Array
     """Shape (t,) [m]."""
+    direction_gaps: Array
+    """Shape (t,) [rad]."""
     gap_bounds: Array
     """Proved lower bounds of the distance to all tips, 0 if nothing is proved, shape (t,) [m]."""
     offsets: Index
@@ -260,6 +273,7 @@ _COLUMNS: dict[str, tuple[str, tuple[str, ...], dict[str, str]]] = {
     "statuses": ("status", ("target",), {"units": "1", "meanings": _MEANINGS}),
     "activations": ("activation", ("solution", "bundle"), {}),
     "residuals": ("residual", ("solution",), {"units": "m"}),
+    "direction_errors": ("direction_error", ("solution",), {"units": "rad"}),
     "conditions": ("condition", ("solution",), {"units": "1"}),
     "margins": ("margin", ("solution",), {"units": "1"}),
     "leans": ("leans", ("solution",), {}),
@@ -267,6 +281,7 @@ _COLUMNS: dict[str, tuple[str, tuple[str, ...], dict[str, str]]] = {
     "nearest": ("nearest", ("target", "axis"), {"units": "m"}),
     "nearest_activations": ("nearest_activation", ("target", "bundle"), {}),
     "gaps": ("gap", ("target",), {"units": "m"}),
+    "direction_gaps": ("direction_gap", ("target",), {"units": "rad"}),
     "gap_bounds": ("gap_bound", ("target",), {"units": "m"}),
 }
 """Fields of `Solutions` in the order of those of `Solution`, as they are stored."""

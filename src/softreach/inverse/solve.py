@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch, with_other_sheets
-from softreach.inverse.direction import compromises
+from softreach.inverse.direction import compromises, direction_errors
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
@@ -26,10 +26,11 @@ from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
-from softreach.support.arrays import Array, Index, as_directions, as_points, joined, rows
+from softreach.support.arrays import Array, Index, Mask, as_directions, as_points, joined, rows
 from softreach.support.errors import Range
 from softreach.workspace.search import CLOSELY, nearest_tips
 
+_WEIGHTS = Range(0.0, 1e6, open_low=True)
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
 _BRANCH_BLOCK = 131_072  # where all roots are searched, which is done in smaller sets
@@ -43,6 +44,7 @@ def solve_inverse(
     within: float = 0.0,
     near: ArrayLike | None = None,
     direction: ArrayLike | None = None,
+    cone: float = 0.0,
     direction_weight: float = 0.1,
     family: int = 1,
     seed: int = 0,
@@ -77,11 +79,12 @@ def solve_inverse(
         near: With more than three free bundles: the activation to stay near to [unit of each],
             shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
             each activation counts in its own range.
-        direction: Wanted tip tangents d3, shape (3,) or (t, 3), of any length. With more than
-            three free bundles the freedom left by the position goes to least
-            |γ - near|² + w² |d3 - direction|²; with three or fewer the position yields too:
-            least |tip - target|²/L² + w² |d3 - direction|².
-        direction_weight: w [-].
+        direction: Wanted tip tangents d3, shape (3,) or (t, 3), of any length. A target then
+            counts as reached only where the direction is met as well: by one of all solutions of
+            three free bundles, or by a search for both with more.
+        cone: Angle from `direction` that is allowed [rad]; a millionth more is rounding.
+        direction_weight: w [-] where no activation meets both: `nearest` has least
+            |tip - target|²/L² + w² θ² with the angle θ beyond the cone.
         family: With more than three free bundles: how many activations to give for each target,
             the others being those nearest to random activations and apart by a thousandth of a
             range; fewer where no more of them are found.
@@ -115,7 +118,8 @@ def solve_inverse(
         reach_tol=max(residual, prepared.whole.tol * length, within),
         near=as_activations("near", preferred, box, len(points)) / measures[box.free],
         direction=unit,
-        direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
+        cone=as_number("cone", cone, Range(0.0, np.pi, unit="rad")),
+        direction_weight=as_number("direction_weight", direction_weight, _WEIGHTS),
         family=as_integer("family", family, 1, 10_000),
         seed=as_integer("seed", seed, 0, 2**63),
         from_rest=as_flag("from_rest", from_rest),
@@ -123,8 +127,8 @@ def solve_inverse(
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
         solve = _by_least_change
-    elif prepared.dimension == 3 and request.direction is None:
-        solve, size = _by_branches, _BRANCH_BLOCK
+    elif prepared.dimension == 3:
+        solve, size = _by_branches, _BRANCH_BLOCK if request.direction is None else _BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
     return solutions.in_units_of(measures)
@@ -134,6 +138,8 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     roots = every_branch(prepared, request)
     if not request.from_rest:
         roots = with_other_sheets(prepared, request, roots)
+    if request.direction is not None:
+        return _by_distance(prepared, request, roots)
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     none = no_roots(prepared.tip_map)
@@ -151,11 +157,16 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     return _solutions(prepared, request, roots, closest, bounds)
 
 
-def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
-    none = no_roots(prepared.tip_map)
-    roots = every_branch(prepared, request) if prepared.dimension == 3 else none
-    closest = _closest(prepared, request, np.arange(len(request.targets)), roots)
-    return _solutions(prepared, request, none, closest)
+def _by_distance(
+    prepared: PreparedMap, request: Request, every: Roots | None = None
+) -> Solutions:
+    """The nearest place or pose, but where one of all roots points the way that is wanted."""
+    every = no_roots(prepared.tip_map) if every is None else every
+    roots = rows(every, _pointing(prepared, request, every))
+    missing = roots.missing(len(request.targets))
+    known = rows(every, np.isin(every.target, missing))
+    closest = _closest(prepared, request, missing, known)
+    return _solutions(prepared, request, roots, closest)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
@@ -163,8 +174,9 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     roots = roots_at(tip_map, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
     left, start = request.targets[missing], best.gamma[missing]
-    ends = nearest_tips(tip_map, start, left, request.residual, CLOSELY)
-    closest = roots_at(tip_map, request.targets, missing, ends.gamma)
+    if request.direction is None:
+        start = nearest_tips(tip_map, start, left, request.residual, CLOSELY).gamma
+    closest = roots_at(tip_map, request.targets, missing, start)
     return _solutions(prepared, request, roots, closest)
 
 
@@ -174,12 +186,12 @@ def _closest(prepared: PreparedMap, request: Request, chosen: Index, known: Root
     if not len(chosen):
         return no_roots(tip_map)
     target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
-    target = np.concatenate([target, known.target])
+    target = np.concatenate([target, np.searchsorted(chosen, known.target)])
     start = np.concatenate([start, known.gamma])
     if request.direction is None:
         gamma, _, left = nearest_tips(tip_map, start, targets[target], request.residual, CLOSELY)
     else:
-        gamma, left = compromises(tip_map, request.of(chosen[target]), start)
+        gamma, left, _ = compromises(tip_map, request.of(chosen[target]), start)
     best = first_of_each(target, left, len(chosen))
     return roots_at(tip_map, request.targets, chosen, gamma[best])
 
@@ -189,8 +201,7 @@ def _gap_bounds(prepared: PreparedMap, request: Request, closest: Roots) -> Arra
     gap = closest.residual
     bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.reach_tol)
     # Where the position yields to a direction, the gap says nothing of what can be reached.
-    yielding = request.direction is not None and prepared.dimension <= 3
-    if len(out) and not yielding and (prepared.proves or not prepared.dimension):
+    if len(out) and request.direction is None and (prepared.proves or not prepared.dimension):
         gaps = request.targets[closest.target[out]], gap[out], request.reach_tol
         bounds[out] = gap_bounds(prepared.tip_map, prepared.coarse_cells, *gaps)
     # Within the error of the tips, what is true of them need not be true of the arm.
@@ -209,6 +220,7 @@ def _solutions(
     if bounds is None:
         bounds = _gap_bounds(prepared, request, closest)
     hit = closest.residual <= request.reach_tol
+    hit &= _pointing(prepared, request, closest)
     roots = roots.joined(rows(closest, hit))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual
@@ -232,6 +244,7 @@ def _solutions(
         offsets=np.searchsorted(roots.target, np.arange(count + 1)),
         activations=activations,
         residuals=roots.residual,
+        direction_errors=_direction_errors(prepared, request, roots),
         conditions=conditions(roots.slope),
         margins=tip_map.box.margin(roots.gamma),
         leans=leans,
@@ -240,5 +253,23 @@ def _solutions(
         nearest=np.where((best.residual > request.residual)[:, None], best.tip, request.targets),
         nearest_activations=whole.box.with_fixed(best.gamma),
         gaps=best.residual,
+        direction_gaps=_direction_errors(prepared, request, best),
         gap_bounds=proved_gaps,
     )
+
+
+def _pointing(prepared: PreparedMap, request: Request, roots: Roots) -> Mask:
+    """Mask of the roots whose tips point within the cone; all, where no direction is wanted."""
+    if request.direction is None:
+        return np.ones(len(roots.target), bool)
+    return _direction_errors(prepared, request, roots) <= request.direction_tol
+
+
+def _direction_errors(prepared: PreparedMap, request: Request, roots: Roots) -> Array:
+    """Angles between the tips' directions and those wanted [rad], each on its own sheet."""
+    errors = np.full(len(roots.target), np.nan)
+    for sheet, each in enumerate([prepared, *(prepared.sheets if roots.sheet.any() else ())]):
+        on = np.flatnonzero(roots.sheet == sheet)
+        known = request, roots.target[on], roots.gamma[on]
+        errors[on] = direction_errors(each.tip_map, *known)
+    return errors
