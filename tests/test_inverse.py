@@ -8,7 +8,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse import Status, branches, prepared_map, solve_inverse
 from softreach.inverse.path import PathStatus, track_path
 from softreach.rod import as_tip_map
-from softreach.rod.kinematics import configuration, tip_positions
+from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidInput
 from softreach.workspace import reachable_set
 from tests.laws import in_box, miss_of_original
@@ -231,35 +231,72 @@ def test_fewer_bundles_come_as_near_as_a_dense_cloud(trunk, kept):
     assert (back.statuses == Status.REACHED).all()
 
 
-def direction_error(arm: Manipulator, gamma: np.ndarray, wanted: np.ndarray) -> float:
-    d3 = configuration(arm, gamma, [arm.length]).directors.values[0, 2]
-    return float(np.linalg.norm(d3 - wanted))
+def direction_of(arm: Manipulator, gamma: np.ndarray) -> np.ndarray:
+    return as_tip_map(arm).tip_directions(gamma[None])[0]
 
 
 def test_a_direction_trades_against_the_position_of_three_bundles_unless_it_is_met(trunk):
     gamma = in_box(trunk, 1, seed=0)[0]
     target = tip_positions(trunk, gamma[None])
     wanted = np.array([1.0, 0.0, 0.0])
-    errors = []
+    errors, gaps = [], []
     for weight in (1e-3, 0.1, 10.0):
         solution = solve_inverse(trunk, target, direction=wanted, direction_weight=weight)[0]
-        errors.append(direction_error(trunk, solution.nearest_activation, wanted))
+        assert solution.status is Status.NOT_FOUND
+        d3 = direction_of(trunk, solution.nearest_activation)
+        assert solution.direction_gap == pytest.approx(np.arccos(d3 @ wanted), abs=1e-6)
+        errors.append(solution.direction_gap)
+        gaps.append(solution.gap)
     assert errors[0] > errors[1] > errors[2]
-    met = configuration(trunk, gamma, [trunk.length]).directors.values[0, 2]
+    assert gaps[0] < gaps[1] < gaps[2]
+    met = direction_of(trunk, gamma)
     solution = solve_inverse(trunk, target, direction=3 * met)[0]
-    assert np.abs(solution.nearest_activation - gamma).max() < 1e-4
+    assert solution.status is Status.REACHED
+    assert np.abs(solution.activations - gamma).max() < 1e-6
 
 
-def test_four_bundles_keep_the_position_and_turn_toward_the_direction():
+@pytest.mark.parametrize("cone", [0.0, 0.2])
+def test_a_pose_that_some_activation_has_is_met_exactly_with_no_more_change(cone):
+    """Five rows and six tendons: places and directions of known activations, half of them slack."""
+    arm = designs.three_tendon_robot(segments=2)
+    known = in_box(arm, 20, seed=3)
+    known[:, [0, 3]] = arm.input_bounds[[0, 3], 0]
+    rod, ranges = as_tip_map(arm), np.ptp(arm.input_bounds, axis=1)
+    given = {"direction": rod.tip_directions(known), "cone": cone}
+    solutions = solve_inverse(arm, rod.tips(known), **given)
+    assert (solutions.statuses == Status.REACHED).all()
+    assert solutions.residuals.max() <= 1e-10 * arm.length
+    reached = np.einsum("ni,ni->n", rod.tip_directions(solutions.activations), given["direction"])
+    assert np.arccos(reached.clip(-1, 1)).max() <= cone + 2e-7  # as far as arccos can tell
+    assert np.degrees(solutions.direction_errors - cone).max() <= 1e-6
+    change, of_known = (np.linalg.norm(x / ranges, axis=1) for x in (solutions.activations, known))
+    assert (change <= of_known + 1e-6).all()
+
+
+def test_a_family_of_poses_meets_the_direction_each():
+    arm = designs.three_tendon_robot(segments=2)
+    known = in_box(arm, 4, seed=1)
+    rod = as_tip_map(arm)
+    wanted = rod.tip_directions(known)
+    solutions = solve_inverse(arm, rod.tips(known), direction=wanted, family=5)
+    assert solutions.counts.max() > 1
+    owner = np.repeat(np.arange(4), solutions.counts)
+    assert solutions.residuals.max() <= 1e-10 * arm.length
+    off = np.linalg.norm(np.cross(rod.tip_directions(solutions.activations), wanted[owner]), axis=1)
+    assert off.max() <= 1e-8
+
+
+def test_a_direction_that_no_pose_has_is_not_reached():
     arm = designs.redundant_trunk()
     target = tip_positions(arm, in_box(arm, 1, seed=8))
-    wanted = np.array([0.0, 0.6, 0.8])
+    solution = solve_inverse(arm, target, direction=(0.0, 0.6, 0.8))[0]
+    assert solution.status is Status.NOT_FOUND
+    assert len(solution) == 0
+    assert solution.direction_gap > 0.1
+    assert "° off" in str(solution)
+    wide = solve_inverse(arm, target, direction=(0.0, 0.6, 0.8), cone=np.pi)[0]
     free = solve_inverse(arm, target)[0]
-    turned = solve_inverse(arm, target, direction=wanted, direction_weight=30.0)[0]
-    assert turned.residuals[0] <= 1e-10
-    assert direction_error(arm, turned.activations[0], wanted) < direction_error(
-        arm, free.activations[0], wanted
-    )
+    assert np.allclose(wide.activations, free.activations, atol=1e-6)
 
 
 # Following paths on one branch of solutions

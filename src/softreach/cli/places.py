@@ -21,6 +21,8 @@ def solve(
     target: Signed = None,
     targets: Path | None = None,
     within: str | None = None,
+    direction: Signed = None,
+    cone: str | None = None,
     family: Whole | None = None,
     changes: Changes = UNCHANGED,
     unit: options.Unit = None,
@@ -37,22 +39,29 @@ def solve(
         target: Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.
         targets: CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.
         within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
+        direction: Direction x,y,z of the tip that each target needs, of any length.
+        cone: Angle from it that is allowed: 5deg, 0.1rad (0deg).
         family: Number of solutions for each target, with more than three free bundles (1).
     """
-    from softreach.inverse.request import length_in, position_in
+    from softreach.inverse.request import angle_in, direction_in, length_in, position_in
 
     if (target is None) == (targets is None):
         raise NotPossible("give either --target or --targets")
     arm = design_from(design, changes, unit)
     if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
         options.refuse("on up to three free bundles, where all solutions are found", family=family)
+    if direction is None:
+        options.refuse("without --direction", cone=cone)
     if targets is None:
         points = [position_in("target", target or "", arm.length)]
     else:
         points = options.points_in("targets", targets, arm)
     reach = 0.0 if within is None else length_in("within", within, arm.length)
     count = 1 if family is None else family
-    solutions = sr.solve_inverse(arm, points, within=reach, family=count)
+    wanted = None if direction is None else direction_in("direction", direction)
+    angle = 0.0 if cone is None else angle_in("cone", cone)
+    pose = {"direction": wanted, "cone": angle}
+    solutions = sr.solve_inverse(arm, points, within=reach, family=count, **pose)
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
         known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]

@@ -7,14 +7,20 @@ that meets its goals, next to which steps gain twice as many digits each.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from softreach.inverse.request import Request
 from softreach.kernels.box.bounded_descent import box_steps
+from softreach.rod.inputs import ActivationBox
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
+
+Model = Callable[[Index, Array], tuple[Array, Array, Array]]
+"""(which functions, activations (n, m)) -> values (n,), gradients (n, m), Hessians (n, m, m)."""
 
 _MOST_STEPS = 120
 _STEP_TOL = 1e-12  # step at which a search has converged, in ranges
@@ -61,9 +67,11 @@ def goal_rows(
     away = (motions.tips - request.targets[which]) / tip_map.length
     angle, axis = _angles(motions.directions, wanted)
     excess = (angle - request.cone).clip(0.0)
-    turn = motions.rotations - motions.directions[:, :, None] * np.einsum(
-        "ni,nij->nj", motions.directions, motions.rotations
-    )[:, None]
+    turn = (
+        motions.rotations
+        - motions.directions[:, :, None]
+        * np.einsum("ni,nij->nj", motions.directions, motions.rotations)[:, None]
+    )
     if request.cone:  # along the cone nothing is wanted
         turn = axis[:, :, None] * np.einsum("ni,nij->nj", axis, turn)[:, None]
     turn *= (excess > 0.0)[:, None, None] if request.cone else 1.0
@@ -82,24 +90,39 @@ def _angles(directions: Array, wanted: Array) -> tuple[Array, Array]:
     return np.arctan2(sine, np.einsum("ni,ni->n", directions, wanted)), axis
 
 
-def _descended(
-    tip_map: TipMap, request: Request, start: Array, pulls: tuple[float, ...]
-) -> Poses:
+def _descended(tip_map: TipMap, request: Request, start: Array, pulls: tuple[float, ...]) -> Poses:
     """Descend from start i to target i with each of the pulls toward `near`, one after another."""
     gamma = tip_map.box.clip(start)
     for pull in pulls:
-        gamma = _gauss_newton(tip_map, request, gamma, pull)
+        gamma, _ = minimize(partial(pose_model, tip_map, request, pull), gamma, tip_map.box)
     rows, _, miss = goal_rows(tip_map, request, np.arange(len(gamma)), gamma)
     return Poses(gamma, 0.5 * _squares(rows), np.nan_to_num(miss, nan=np.inf))
 
 
-def _gauss_newton(tip_map: TipMap, request: Request, start: Array, pull: float) -> Array:
-    """Damped Gauss-Newton steps for ½|rows|² + ½ pull |γ - near|² within the bounds."""
-    box = tip_map.box
+def pose_model(
+    tip_map: TipMap, request: Request, pull: float, which: Index, gamma: Array
+) -> tuple[Array, Array, Array]:
+    """½|rows|² + ½ pull |γ - near|² at activations (n, m) of searches `which` (n,).
+
+    Values (n,), gradients (n, m) and Hessians (n, m, m) without the curvature of rows.
+    """
+    rows, slopes, _ = goal_rows(tip_map, request, which, gamma)
+    change = gamma - request.near[which]
+    value = 0.5 * _squares(rows) + 0.5 * pull * _squares(change)
+    gradient = np.einsum("ni,nij->nj", rows, slopes) + pull * change
+    hessian = slopes.transpose(0, 2, 1) @ slopes + pull * np.eye(gamma.shape[1])
+    return value, gradient, hessian
+
+
+def minimize(model: Model, start: Array, box: ActivationBox) -> tuple[Array, Array]:
+    """Minimize function i from start i, shape (n, m), by damped Newton within the bounds.
+
+    Activations of local minima, and the functions there (n,).
+    """
     low, high, scales = box.low.copy(), box.high.copy(), box.scales
     gamma, damping = start.copy(), np.full(len(start), 1e-3)
     active = np.arange(len(start))
-    value, gradient, hessian = _model(tip_map, request, active, gamma, pull)
+    value, gradient, hessian = model(active, gamma)
     active = active[np.isfinite(value)]
     for _ in range(_MOST_STEPS):
         if not len(active):
@@ -107,27 +130,15 @@ def _gauss_newton(tip_map: TipMap, request: Request, start: Array, pull: float) 
         trial, damped = np.empty((len(active), start.shape[1])), damping[active]
         box_steps(gamma[active], gradient[active], hessian[active], damped, low, high, trial)
         step = (np.abs(trial - gamma[active]) / scales).max(axis=1, initial=0.0)
-        ahead = _model(tip_map, request, active, trial, pull)
-        accepted = ahead[0] <= value[active] * (1.0 + _VALUE_TOL)
+        ahead = model(active, trial)
+        accepted = ahead[0] <= value[active] + _VALUE_TOL * np.abs(value[active])
         taken = active[accepted]
         gamma[taken] = trial[accepted]
         value[taken], gradient[taken], hessian[taken] = (part[accepted] for part in ahead)
         eased = np.maximum(0.1 * damped, _LEAST_DAMPING)
         damping[active] = np.where(accepted, eased, np.maximum(10.0 * damped, 1e-6))
         active = active[(step > _STEP_TOL) & (damping[active] < _LARGEST_DAMPING)]
-    return gamma
-
-
-def _model(
-    tip_map: TipMap, request: Request, which: Index, gamma: Array, pull: float
-) -> tuple[Array, Array, Array]:
-    """Value (n,), gradient (n, m) and the Hessian without the curvature of rows, (n, m, m)."""
-    rows, slopes, _ = goal_rows(tip_map, request, which, gamma)
-    change = gamma - request.near[which]
-    value = 0.5 * _squares(rows) + 0.5 * pull * _squares(change)
-    gradient = np.einsum("ni,nij->nj", rows, slopes) + pull * change
-    hessian = slopes.transpose(0, 2, 1) @ slopes + pull * np.eye(gamma.shape[1])
-    return value, gradient, hessian
+    return gamma, value
 
 
 def _squares(rows: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from softreach.rod.inputs import ActivationBox
 from softreach.support.arrays import Array, Index, as_floats, check_finite
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.quantity import unit_names
+from softreach.support.quantity import numbers_in, read_quantity, unit_names
 from softreach.support.units import TYPED, lengths_in
 
 _HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\])])")
@@ -91,6 +92,22 @@ def length_in(name: str, text: str, length: float) -> float:
     if values is None or not 0.0 <= values[0] < np.inf:
         raise InvalidInput(name, text or "''", f"a length in m, or with {TYPED}, L")
     return values[0]
+
+
+def direction_in(name: str, text: str) -> list[float]:
+    """A direction from x,y,z."""
+    values = numbers_in(text, 3)
+    if values is None or not any(values):
+        raise InvalidInput(name, text or "''", "three comma-separated numbers x,y,z, not all 0")
+    return values
+
+
+def angle_in(name: str, text: str) -> float:
+    """An angle [rad] from what was typed, from 0 to half a turn, with its unit."""
+    with suppress(ValueError):
+        if 0.0 <= (angle := read_quantity(text, "rad")) <= np.pi:
+            return angle
+    raise InvalidInput(name, text or "''", "an angle from 0deg to 180deg, in deg or rad")
 
 
 def _header_unit(word: str, line: str, source: str) -> str:

@@ -157,9 +157,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     return _solutions(prepared, request, roots, closest, bounds)
 
 
-def _by_distance(
-    prepared: PreparedMap, request: Request, every: Roots | None = None
-) -> Solutions:
+def _by_distance(prepared: PreparedMap, request: Request, every: Roots | None = None) -> Solutions:
     """The nearest place or pose, but where one of all roots points the way that is wanted."""
     every = no_roots(prepared.tip_map) if every is None else every
     roots = rows(every, _pointing(prepared, request, every))
