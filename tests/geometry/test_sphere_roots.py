@@ -19,7 +19,6 @@ from softreach.geometry.sphere_maps import (
 )
 from softreach.geometry.surface import unit_scale
 from softreach.kernels.points.bowyer_watson import triangulate
-from softreach.kernels.points.expansions import scratch
 from softreach.kernels.points.predicates import (
     collinear,
     insphere,
@@ -28,6 +27,7 @@ from softreach.kernels.points.predicates import (
     orient,
     orient_exact,
     orient_filter,
+    scratch,
 )
 from softreach.kernels.points.triangulation import FACES, FEW
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points

@@ -19,9 +19,8 @@ from softreach.geometry.delaunay import Delaunay, lies_on_curve
 from softreach.geometry.hull import Hull
 from softreach.geometry.surface import compact_surface, surface_area, unit_scale
 from softreach.kernels.points import alpha as kernels
-from softreach.kernels.points.bowyer_watson import triangulate
-from softreach.kernels.points.expansions import scratch
-from softreach.kernels.points.spatial_sort import insertion_order
+from softreach.kernels.points.bowyer_watson import insertion_order, triangulate
+from softreach.kernels.points.predicates import scratch
 from softreach.support import parallel
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 from softreach.support.lazy import lazy

@@ -8,8 +8,7 @@ from functools import partial
 import numpy as np
 
 from softreach.geometry.surface import unit_scale
-from softreach.kernels.points.bowyer_watson import triangulate
-from softreach.kernels.points.spatial_sort import insertion_order
+from softreach.kernels.points.bowyer_watson import insertion_order, triangulate
 from softreach.support.arrays import Points
 
 _SAMPLED = 512

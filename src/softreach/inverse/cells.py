@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.branches.space_tree import SpaceTree, sort_into_children
+from softreach.kernels.branches.candidates import SpaceTree, sort_into_children
 from softreach.kernels.image.activation_mesh import (
     ActivationMesh,
     face_planes,

@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.cells import ImageLeaves, TornCells, activation_cells, image_tree
 from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Seeds, face_seeds, seeds
-from softreach.kernels.branches.space_tree import SpaceTree
+from softreach.kernels.branches.candidates import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.rods import as_tip_map, coarsened, free_bundles, measured_bundles
 from softreach.rod.tip_map import Frame, TipMap

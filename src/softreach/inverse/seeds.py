@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.kernels.branches.spread import MOST_IN_BINS, choose_apart, choose_in_bins
+from softreach.kernels.box.sequential_projection import MOST_IN_BINS, choose_apart, choose_in_bins
 from softreach.rod.tip_map import TipMap, no_equilibrium
 from softreach.sampling import sample_cube
 from softreach.support import parallel

@@ -14,8 +14,8 @@ from scipy.ndimage import binary_dilation
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from softreach.kernels.box.simplices import corner_steps
-from softreach.kernels.image.contour import stretches
+from softreach.kernels.image.activation_mesh import corner_steps
+from softreach.kernels.image.raster import stretches
 from softreach.rod.tip_map import Held, TipMap, no_equilibrium
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.lazy import lazy

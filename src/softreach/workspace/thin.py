@@ -10,7 +10,7 @@ from softreach.arm.base import Base
 from softreach.geometry.flat import Plane, are_inside, convex_edges, enclosed_area, plane_of
 from softreach.geometry.hull import convex_hull
 from softreach.geometry.surface import Surface, compact_surface, surface_area
-from softreach.kernels.box.simplices import chains
+from softreach.kernels.image.activation_mesh import chains
 from softreach.rod.rods import ArmMap, refined
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
