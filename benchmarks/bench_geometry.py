@@ -103,8 +103,7 @@ def _alpha_volume(shape: AlphaComplex) -> float:
 
 
 def _shape(points: np.ndarray) -> AlphaComplex:
-    from softreach.geometry.alpha_shape import AlphaComplex
-    from softreach.geometry.delaunay import delaunay
+    from softreach.geometry.alpha_shape import AlphaComplex, delaunay
 
     return AlphaComplex(triangulation=delaunay(points))
 

@@ -13,8 +13,8 @@ from tools.materials import page_with_table
 
 import softreach as sr
 from softreach.arm import designs
-from softreach.arm.bending import sharpest_bending
 from softreach.arm.material import material_names, material_record, named_material
+from softreach.rod.bending import sharpest_bending
 from softreach.support.errors import InvalidInput
 from tests.laws import in_box
 

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import Delaunay, delaunay
+from softreach.geometry.alpha_shape import AlphaComplex, Delaunay, delaunay
 from softreach.geometry.sphere_maps import (
     icosphere,
     is_axisymmetric,

@@ -12,8 +12,7 @@ from softreach import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.driving import extension_range
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.cells import activation_cells
-from softreach.inverse.seeds import Seeds
+from softreach.inverse.prepared import Seeds, activation_cells
 from softreach.kernels.image import raster
 from softreach.kernels.image.activation_mesh import (
     ActivationMesh,

@@ -12,8 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.atlas.command import Command
 from softreach.atlas.metrics import Metric, Need
 from softreach.cloud.curvature import stream_statistics
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay
+from softreach.geometry.alpha_shape import AlphaComplex, delaunay
 from softreach.geometry.hull import convex_hull
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus

@@ -7,7 +7,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from softreach.arm.bending import bending_stations
 from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
@@ -16,7 +15,7 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.parts import LIMIT_UNITS, Keep
 from softreach.requirements.regions import HalfSpace
-from softreach.rod.bending import bending_over_bounds, some_corners, worst_inputs
+from softreach.rod.bending import bending_over_bounds, bending_stations, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import InvalidLoads, TipMap
