@@ -13,7 +13,7 @@ from tools.materials import page_with_table
 
 import softreach as sr
 from softreach.arm import designs
-from softreach.arm.material import material_names, material_record, named_material
+from softreach.arm.section import material_names, material_record, named_material
 from softreach.rod.bending import sharpest_bending
 from softreach.support.errors import InvalidInput
 from tests.laws import in_box

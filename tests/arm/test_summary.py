@@ -25,7 +25,7 @@ from softreach.arm import (
     Tendon,
     designs,
 )
-from softreach.arm.actuators.sector import ring_integrals
+from softreach.arm.actuators.fiber import ring_integrals
 from softreach.arm.driving import extension_range
 from softreach.arm.tables import check_extension, tables
 from softreach.requirements import Limits, Requirements

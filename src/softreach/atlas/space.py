@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.design_file import document_of
+from softreach.arm.design_reader import document_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import (
     Parameter,

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.material import named_material
 from softreach.arm.number import fields_of
 from softreach.arm.parameters import Parameter, changed, parameters_by_every_name, unknown_parameter
+from softreach.arm.section import named_material
 from softreach.arm.tables import check_extension
 from softreach.support.arguments import as_given, as_mapping, plain
 from softreach.support.arrays import Array
