@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.stations import Marker
 from softreach.arm.tables import Tables, check_extension, strain_stations, tables
-from softreach.kernels.rod import frames
+from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import slopes as derivatives
 from softreach.kernels.rod import tips as rod
 from softreach.rod.inputs import ActivationBox
@@ -174,7 +174,7 @@ class FreeRod(ArmRod):
         if has_offset and slopes is not None and twists is None:
             twists = np.empty((len(gamma), 6, gamma.shape[1]))
         if twists is not None:
-            derivatives.jacobians(self._table, gamma, tips, twists)
+            jacobian.jacobians(self._table, gamma, tips, twists)
         elif slopes is not None:
             derivatives.slopes(self._table, gamma, tips, slopes)
         else:
