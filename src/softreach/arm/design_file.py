@@ -290,7 +290,9 @@ def degrees_text(angle: float) -> str:
     return repr(math.degrees(angle))
 
 
-_NAMES = {kind: name for kinds in KINDS.values() for name, kind in kinds.items()}
+_NAMES: Mapping[type, str] = {
+    kind: name for kinds in KINDS.values() for name, kind in kinds.items()
+}
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
 

@@ -28,7 +28,6 @@ from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput, Range, check_installed, warn
 from softreach.support.progress import Progress, as_progress, silent
-from softreach.workspace import grid as grids
 from softreach.workspace import measure
 from softreach.workspace.cells import (
     CLIMBERS,
@@ -37,7 +36,15 @@ from softreach.workspace.cells import (
     searched_set,
     shifted_lattice,
 )
-from softreach.workspace.grid import LiftedGrid, all_postures
+from softreach.workspace.grid import (
+    LiftedGrid,
+    all_postures,
+    box_slopes,
+    cube_grid,
+    grid_ticks,
+    grid_tips,
+    product_of,
+)
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.measure import Estimate, climbed_hull, grid_faces, named, signed_volume
 from softreach.workspace.reachable import SIZES, ReachableSet
@@ -253,12 +260,12 @@ def thin_set(tip_map: TipMap) -> ReachableSet:
     """The reachable set of a tip map with fewer than three free bundles."""
     m = tip_map.box.dimension
     if m == 0:
-        point = Surface(vertices=grids.grid_tips(tip_map, 1), faces=np.zeros((1, 3), np.int32))
+        point = Surface(vertices=grid_tips(tip_map, 1), faces=np.zeros((1, 3), np.int32))
         return ReachableSet(tip_map=tip_map, cells=1, mesh=point)
     n = _CELLS[m]
     # kinks are on lines of the grid
-    ticks = None if tip_map.supports_unstable else grids.grid_ticks(tip_map, n)
-    grid = grids.LiftedGrid.of(tip_map, n, ticks=ticks)
+    ticks = None if tip_map.supports_unstable else grid_ticks(tip_map, n)
+    grid = LiftedGrid.of(tip_map, n, ticks=ticks)
     corners = grid.cells[:, chains(m, m)].reshape(-1, m + 1)
     faces = np.pad(corners, [(0, 0), (0, 2 - m)], mode="edge")
     vertices, faces = compact_surface(grid.tips, faces)
@@ -280,7 +287,7 @@ def by_nodes(tip_map: TipMap) -> Estimate:
     box, tip_map, values = tip_map.box, refined(tip_map, _TOL), list[float]()
     for nodes in _NODES:
         x, w = np.polynomial.legendre.leggauss(nodes)
-        places, weights = (grids.product_of([each / 2.0] * box.dimension) for each in (1.0 + x, w))
+        places, weights = (product_of([each / 2.0] * box.dimension) for each in (1.0 + x, w))
         slopes = tip_map.tips_and_slopes(box.from_free_cube(places))[1][:, :, box.free]
         with np.errstate(invalid="ignore"):
             sizes = np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
@@ -289,7 +296,7 @@ def by_nodes(tip_map: TipMap) -> Estimate:
     return Estimate(values[0], abs(values[0] - values[1]))
 
 
-def _measure(tip_map: TipMap, grid: grids.LiftedGrid) -> Estimate:
+def _measure(tip_map: TipMap, grid: LiftedGrid) -> Estimate:
     """Length or area of the image, by Gauss nodes where it is one smooth sheet, else by cells.
 
     What these err by, O(1/n²), is removed. Where the map has kinks, or sheets end, it is O(1/n):
@@ -303,13 +310,13 @@ def _measure(tip_map: TipMap, grid: grids.LiftedGrid) -> Estimate:
     return Estimate(fine + removed, max(map(abs, changes)))
 
 
-def _size(grid: grids.LiftedGrid) -> float:
+def _size(grid: LiftedGrid) -> float:
     if grid.is_lifted.ndim == 2:
         return surface_area(grid.tips, grid.cells[:, chains(2, 2)].reshape(-1, 3))
     return float(np.linalg.norm(np.diff(grid.tips[grid.cells], axis=1), axis=-1).sum())
 
 
-def _convex_volume(grid: grids.LiftedGrid) -> Estimate:
+def _convex_volume(grid: LiftedGrid) -> Estimate:
     """Volume of the convex hull of mapped vertices [m³]."""
     # A grid with a quarter of the cells along each axis differs by 15 times the error O(1/n²).
     tips = (each.tips[np.isfinite(each.tips[:, 0])] for each in (grid, grid.coarser(4)))
@@ -395,7 +402,7 @@ def _smooth(tip_map: TipMap, flat: TipMap, area: Estimate) -> Estimate:
     """The area of two bundles that do not fold by Gauss nodes, as far as the outline agrees."""
     if tip_map.box.dimension != 2 or tip_map.supports_unstable or not tip_map.is_smooth:
         return area
-    sign = np.linalg.det(grids.box_slopes(flat, grids.cube_grid(_SIGNS, 2))[1][:, :2])
+    sign = np.linalg.det(box_slopes(flat, cube_grid(_SIGNS, 2))[1][:, :2])
     smooth = by_nodes(tip_map)
     folds = sign.min() * sign.max() <= 0.0 or abs(smooth.value - area.value) > area.error
     return area if folds else smooth
