@@ -27,7 +27,9 @@ from softreach.support.lazy import lazy
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
 
-LIBRARY_HINT = "the page Materials of the guide lists them, and so does arm.material_names()"
+LIBRARY_HINT = (
+    "the page Materials of the guide lists them, and so does softreach.arm.material_names()"
+)
 """Places where the names of materials are listed."""
 
 

@@ -1,7 +1,7 @@
 """The two signs that a Delaunay triangulation rests on, always right.
 
 Each predicate first evaluates its determinant in floating point and returns the sign where the
-rounding error cannot reach it; otherwise the determinant is expanded exactly [Shewchuk 1997].
+rounding error cannot reach it; otherwise the determinant is expanded exactly [Shewchuk1997].
 
 An expansion is an exact sum of floats, ordered by size, that do not overlap in their bits. Here it
 is a pair ``(start, length)`` into one scratch array ``w``, so that no memory is allocated; every
