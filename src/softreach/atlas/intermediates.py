@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.command import Command
 from softreach.atlas.metrics import Metric, Need
+from softreach.atlas.space import Command
 from softreach.cloud.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay

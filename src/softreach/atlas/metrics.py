@@ -15,7 +15,7 @@ from softreach.cloud.curvature import QUANTITIES
 from softreach.cloud.volume import flat_areas
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.support import plugins
-from softreach.support.arguments import as_given, as_instance, as_text
+from softreach.support.arguments import as_function, as_given, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError, warn
 
@@ -69,13 +69,12 @@ class Metric:
             raise InvalidInput("name of the metric", self.name, "letters, digits and underscores")
         for field in ("unit", "meaning", "nan_if"):
             as_text(f"{field} of metric {self.name}", getattr(self, field))
-        as_instance(f"needs of metric {self.name}", self.needs, (tuple, list), "a tuple")
-        object.__setattr__(self, "needs", tuple(self.needs))
-        if not all(isinstance(need, Need) for need in self.needs):
+        as_function(f"compute of metric {self.name}", self.compute)
+        needs = self.needs if isinstance(self.needs, tuple | list) else (self.needs,)
+        if not all(isinstance(need, Need) for need in needs):
             allowed = f"some of Need.{', Need.'.join(Need.__members__)}"
             raise InvalidInput(f"needs of metric {self.name}", self.needs, allowed)
-        if not callable(self.compute):
-            raise InvalidInput(f"compute of metric {self.name}", self.compute, "a function")
+        object.__setattr__(self, "needs", tuple(needs))
         if self.over not in ((), PROFILE):
             raise InvalidInput(f"over of metric {self.name}", self.over, f"() or {PROFILE}")
 
@@ -107,15 +106,9 @@ class Metric:
 
         Two metrics with equal values here are the same to a store.
         """
-        return {
-            "name": self.name,
-            "unit": self.unit,
-            "meaning": self.meaning,
-            "needs": [need.name for need in self.needs],
-            "over": list(self.over),
-            "nan_if": self.nan_if,
-            "compute": place_of(self.compute),
-        }
+        plain = {name: getattr(self, name) for name in ("name", "unit", "meaning")}
+        plain |= {"needs": [need.name for need in self.needs], "over": list(self.over)}
+        return plain | {"nan_if": self.nan_if, "compute": place_of(self.compute)}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -156,9 +149,8 @@ def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
         same = chosen.setdefault(metric.name, metric) == metric
         if not same or _KNOWN.get(metric.name, metric) != metric:
             raise InvalidInput("name of a metric", metric.name, "the name of one metric only")
-    order = list(_KNOWN)
-    own = sorted(name for name in chosen if name not in _KNOWN)
-    return tuple(chosen[name] for name in [*order, *own] if name in chosen)
+    order = dict.fromkeys([*_KNOWN, *sorted(chosen)])
+    return tuple(chosen[name] for name in order if name in chosen)
 
 
 def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:

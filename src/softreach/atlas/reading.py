@@ -16,9 +16,9 @@ from zarr.storage import StoreLike, StorePath  # noqa: TID253
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import from_written, written_name
-from softreach.atlas.command import Command
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.metrics import Need
+from softreach.atlas.space import Command
 from softreach.atlas.store import ABOUT, DAMAGED, EXPLAINED, KNOWN, OF, PER_DESIGN, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, stored_names, with_status
@@ -280,12 +280,9 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
         return chunk.array != "status" and bool(of_designs[store.number(chunk)])
 
     store.opened.required = required
-    names = ("metrics", "curvature") if command.profiles else ("metrics",)
-    tables = {
-        name: read(name) if known.any() else np.full(store.array(name).shape, np.nan)
-        for name in names
-        if metrics
-    }
+    names = ("metrics", "curvature")[: 1 + bool(command.profiles)] if metrics else ()
+    lacks = {name: np.full(store.array(name).shape, np.nan) for name in names if not known.any()}
+    tables = lacks or {name: read(name) for name in names}
     for index in tips_of if command.keep_clouds else ():
         if known[index]:
             read("tip", place_of(index))
@@ -344,8 +341,8 @@ def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
 def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
     names = ("todo", "done", "failed", "gaps", "unstable", "damaged")  # in the order of the status
     counts: Any = zip(names, np.bincount(status, minlength=len(names)).tolist(), strict=True)
-    told = {"tips_verified": tips_verified, "messages": messages}
-    return AtlasStatus(designs=status.size, **dict(counts), **told)
+    known = {"tips_verified": tips_verified, "messages": messages}
+    return AtlasStatus(designs=status.size, **dict(counts), **known)
 
 
 def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
@@ -391,8 +388,7 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     """Status, messages, and the metrics that were read."""
     command, shape, dims = store.command, store.command.space.shape, store.command.space.dims
     texts = np.full(command.space.size, "", dtype=object)
-    for index, message in content.messages.items():
-        texts[index] = message
+    texts[[*content.messages]] = [*content.messages.values()]
     variables: dict[str, Any] = {
         "status": (dims, content.status.reshape(shape), ABOUT["status"]),
         "message": (dims, texts.reshape(shape), ABOUT["message"]),

@@ -37,12 +37,8 @@ class Deviations:
 
     arm: Manipulator
     parameters: tuple[Parameter, ...]
+    names: tuple[str, ...]
     sigmas: Array  # Standard deviation of each [its unit], shape (parameters,)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
-        return tuple(parameter.name for parameter in self.parameters)
 
     def made(self, change: Array) -> Manipulator:
         """The arm with changes of its parameters; parts that share one change alike."""
@@ -65,7 +61,8 @@ def deviations_of(arm: Manipulator, sigmas: Mapping[str, Any]) -> Deviations:
     for name, parameter in known.items():
         if parameter.whole or not np.isfinite(parameter.values(arm)).all():
             raise InvalidInput("sigmas", name, "a number that can change a little, not a count")
-    return Deviations(arm, tuple(known.values()), np.array([given[name] for name in known]))
+    names, parts = zip(*known.items(), strict=True)
+    return Deviations(arm, parts, names, np.array([given[name] for name in names]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,19 +194,13 @@ class FirstOrder:
 
     def of_set(self, name: str, unit: str, sense: float) -> Spread:
         """A number of the set, by its gradient."""
-        nominal = float(getattr(self.solid, name))
-        slopes, errors = (getattr(self.gradient, part) for part in (name, f"{name}_error"))
-        deviation = float(np.linalg.norm(slopes * self.deviations.sigmas))
-        return Spread(
-            name=name,
-            unit=unit,
-            nominal=nominal,
-            mean=nominal,
-            deviation=deviation,
-            quantile=nominal - sense * _NORMAL * deviation,
-            error=float(np.linalg.norm(errors * self.deviations.sigmas)),
-            sense=sense,
-        )
+        mean = float(getattr(self.solid, name))
+        slopes = (getattr(self.gradient, part) for part in (name, f"{name}_error"))
+        widths = (float(np.linalg.norm(each * self.deviations.sigmas)) for each in slopes)
+        known = dict(zip(("deviation", "error"), widths, strict=True))
+        low = mean - sense * _NORMAL * known["deviation"]
+        of = {"name": name, "unit": unit, "sense": sense}
+        return Spread(nominal=mean, mean=mean, quantile=low, **known, **of)
 
     def depths(self, places: Array, within: float) -> Iterator[tuple[Array, Array]]:
         """Depth of places within reach [m], and how the boundary there moves, by payloads."""

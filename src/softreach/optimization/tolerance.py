@@ -214,7 +214,6 @@ class Tolerance:
 
 def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -> Tolerance:
     """Numbers to first order, and of arms that are made with the first of the changes."""
-    deviations = first.deviations
     of_set = first.of_set("volume", "m3", 1.0), first.of_set("unreachability", "1", -1.0)
     spreads = [first.kept(), *of_set, *(first.covered(*region) for region in first.regions)]
     made: list[tuple[list[float], list[Mask]]] = []
@@ -230,10 +229,10 @@ def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -
     each = zip(spreads, values, errors.tolist(), strict=True)
     kept, volume, unreachability, *regions = (x.with_made(own, error) for x, own, error in each)
     return Tolerance(
-        arm=deviations.arm,
-        parameters=deviations.names,
-        units=tuple(each.unit for each in deviations.parameters),
-        sigmas=deviations.sigmas,
+        arm=first.deviations.arm,
+        parameters=first.deviations.names,
+        units=tuple(each.unit for each in first.deviations.parameters),
+        sigmas=first.deviations.sigmas,
         kept=kept,
         volume=volume,
         unreachability=unreachability,
@@ -315,9 +314,8 @@ def _starts(first: FirstOrder, target: Target) -> list[Array]:
     rows = [solutions.nearest_activations]
     for number in range(int(solutions.counts.max(initial=0))):
         has = solutions.counts > number
-        row = solutions.nearest_activations.copy()
+        rows.append(row := solutions.nearest_activations.copy())
         row[has] = solutions.activations[solutions.offsets[:-1][has] + number]
-        rows.append(row)
     known = [np.nan_to_num(box.to_cube(row)[:, box.free], nan=0.5) for row in rows]
     grid = sample_cube("sobol", _STARTS, box.dimension)
     return [*known, *(np.tile(start, (len(places), 1)) for start in grid)]
@@ -328,14 +326,14 @@ def _reached(arm: Manipulator, first: FirstOrder, target: Target, starts: list[A
     places = target.points[_tried(target)]
     within, held = max(target.within, TOL * arm.length), np.ones(len(places), bool)
     for laden in first.needs.under_payloads(arm):
-        rod, gaps = as_tip_map(laden), np.full(len(places), np.inf)
-        for start in starts:
-            left = np.flatnonzero(gaps > within)
-            if len(left):
-                gamma = rod.box.from_free_cube(start[left])
-                nearest = nearest_tips(rod, gamma, places[left], within)
-                gaps[left] = np.fmin(gaps[left], nearest.distance)
-        held &= gaps <= within
+        rod, left = as_tip_map(laden), np.arange(len(places))
+        for start in starts if len(places) else ():
+            gamma = rod.box.from_free_cube(start[left])
+            gaps = nearest_tips(rod, gamma, places[left], within).distance
+            left = left[~(gaps <= within)]
+            if not len(left):
+                break
+        held[left] = False
     return held
 
 
