@@ -19,6 +19,7 @@ from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
+from softreach.workspace import reachable_set
 
 _BLOCK = 65_536  # samples at a time, where not all of them are needed at once
 _TOL = 1e-6  # of tips, in L
@@ -97,18 +98,8 @@ def _convex_volume(of: Intermediates) -> float:
     return convex_hull(of[Need.TIPS]).volume
 
 
-def _reachable_set(of: Intermediates) -> Any:
-    if of.known_set is not None:
-        return of.known_set()
-    from softreach.workspace import reachable_set
-
-    return reachable_set(of.rod, accuracy=of.command.accuracy)
-
-
 def _strain_statistics(of: Intermediates) -> Any:
-    rod, cube = of.rod, of.cube
-    if rod.supports_unstable:
-        cube = cube[of.stable]
+    rod, cube = of.rod, _stable(of, of.cube)
     blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
     stations = np.array(of.command.stations) * rod.length
     return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
@@ -124,6 +115,8 @@ _COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
     Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
     Need.ALPHA_COMPLEX: lambda of: AlphaComplex(triangulation=delaunay(of[Need.TIPS])),
     Need.CONVEX_VOLUME: _convex_volume,
-    Need.REACHABLE_SET: _reachable_set,
+    Need.REACHABLE_SET: lambda of: (
+        of.known_set() if of.known_set else reachable_set(of.rod, accuracy=of.command.accuracy)
+    ),
     Need.STRAIN_STATISTICS: _strain_statistics,
 }

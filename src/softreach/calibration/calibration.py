@@ -16,12 +16,11 @@ from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.errors import PlacementErrors, misses, with_products
-from softreach.calibration.fit import exchanged_columns, fitted
+from softreach.calibration.fit import FEWEST_RUNS, exchanged_columns, fitted, uncertainty
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel, marker_stations
 from softreach.calibration.result import Calibration, Rival
-from softreach.calibration.uncertainty import FEWEST_RUNS, uncertainty
 from softreach.rod.summary import design_warnings
 from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Mask
@@ -182,15 +181,11 @@ def _warn_of_numbers(result: Calibration) -> None:
     own = [n.name for n in fit.free.numbers if n.prior is not None]
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:
-            warn(
-                f"{name} became {ratio:.3g} times what the design says: check the order of "
-                "the inputs, then hold this number or give it a prior"
-            )
+            more = "check the order of the inputs, then hold this number or give it a prior"
+            warn(f"{name} became {ratio:.3g} times what the design says: {more}")
     if len(vague := names[~(result.uncertainty.told | fit.at_bound)]):
-        warn(
-            f"the data does not determine {', '.join(vague)}: standard deviation infinite; hold "
-            "it, give it a prior, or measure more"
-        )
+        more = "standard deviation infinite; hold it, give it a prior, or measure more"
+        warn(f"the data does not determine {', '.join(vague)}: {more}")
     before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}
     for text in design_warnings(result.arm):
         if re.sub(r"[\d.]+", "", text) not in before:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ class PlacementErrors(NamedTuple):
     """Number of places."""
 
     def text(self, length: float) -> str:
-        """Of the command line: "median 3.1, mean 4.0, rms 5.2, 95 % below 9.9 mm (1.4 % of L)"."""
+        """In words: "rms 5.2 mm (1.4 % of L), median 3.1, mean 4.0, 95 % below 9.9"."""
         median, mean, rms, most = (f"{1e3 * value:.3g}" for value in self[:4])
         share = 100.0 * self.rms / length
         return f"rms {rms} mm ({share:.2g} % of L), median {median}, mean {mean}, 95 % below {most}"
@@ -47,9 +46,9 @@ def misses(residuals: Array) -> PlacementErrors:
     distance = distance[np.isfinite(distance)]
     if not len(distance):
         return PlacementErrors(np.nan, np.nan, np.nan, np.nan, 0)
-    rms, most = float(np.sqrt((distance**2).mean())), float(np.quantile(distance, 0.95))
-    median, mean = float(np.median(distance)), float(distance.mean())
-    return PlacementErrors(median, mean, rms, most, len(distance))
+    numbers = np.median(distance), distance.mean(), np.sqrt((distance**2).mean())
+    most = np.quantile(distance, 0.95)
+    return PlacementErrors(*map(float, (*numbers, most)), len(distance))
 
 
 class Repeatability(NamedTuple):
@@ -86,8 +85,7 @@ def repeatability(data: Measurements, residuals: Array) -> Repeatability:
     return Repeatability(np.nan, 0)
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """Limitation of a fit."""
 
     limit: str

@@ -78,10 +78,9 @@ class FreeNumbers:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest values; those that are excluded by a hair."""
-        return (
-            np.array([_inside(n.range.low, n.range.open_low, n.scale) for n in self.numbers]),
-            np.array([_inside(n.range.high, n.range.open_high, -n.scale) for n in self.numbers]),
-        )
+        low = [n.range.low + 1e-6 * n.scale * n.range.open_low for n in self.numbers]
+        high = [n.range.high - 1e-6 * n.scale * n.range.open_high for n in self.numbers]
+        return np.array(low), np.array(high)
 
     def made(self, values: Array) -> Manipulator:
         """The arm with these values; raises InvalidDesign if there is none."""
@@ -140,10 +139,8 @@ def free_numbers(
         # All arms on the way have a rest shape, were it of the size of rounding.
         arm = arm.replace(rest=RestShape(curvature_x=_UNSEEN / arm.length))
     priors = {} if prior is None else as_mapping("prior", prior, lambda _, value: value)
-    numbers = tuple(
-        replace(number, prior=_prior(number, priors.pop(number.name, None)))
-        for number in _each(arm, given)
-    )
+    each = ((number, priors.pop(number.name, None)) for number in _each(arm, given))
+    numbers = tuple(replace(number, prior=_prior(number, known)) for number, known in each)
     names = [number.name for number in numbers]
     if priors:
         raise InvalidInput("prior", next(iter(priors)), f"a free number: {', '.join(names)}")
@@ -252,7 +249,3 @@ def _prior(number: FreeNumber, given: Any) -> tuple[float, float] | None:
     if len(values) > 2 or not (0 < width < math.inf and math.isfinite(mean)):
         raise InvalidInput(f"prior of {number.name}", given, "a width above 0, or (mean, width)")
     return float(mean), float(width)
-
-
-def _inside(bound: float, is_open: bool, scale: float) -> float:
-    return bound + 1e-6 * scale if is_open and math.isfinite(bound) else bound

@@ -188,12 +188,10 @@ def plan_poses(
 
 def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
     known = marker_names(arm)
-    if given is None:
-        return known
-    names = as_names("markers", given)
+    names = known if given is None else as_names("markers", given)
     wrong = [name for name in names if name not in known or names.count(name) > 1]
-    if wrong or not names:
-        allowed, value = f"of {', '.join(known)}, each once", wrong[0] if wrong else "none"
+    for value in wrong or ([] if names else ["none"]):
+        allowed = f"of {', '.join(known)}, each once"
         raise InvalidInput("markers", value, allowed, did_you_mean(value, known))
     return names
 

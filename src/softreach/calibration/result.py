@@ -22,11 +22,10 @@ from softreach.calibration.errors import (
     misses,
     repeatability,
 )
-from softreach.calibration.fit import Fit, robust_width, started
+from softreach.calibration.fit import Fit, Uncertainty, robust_width, started
 from softreach.calibration.free_numbers import POSE, SCALE, free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
-from softreach.calibration.uncertainty import Uncertainty
 from softreach.support.arguments import as_flag, as_integer
 from softreach.support.arrays import Array, Index, Mask, as_rows
 from softreach.support.errors import counted

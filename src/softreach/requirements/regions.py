@@ -28,7 +28,6 @@ _STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
 """1/g, 1/g² and 1/g³ with g⁴ = g + 1: steps of a sequence that fills the cube evenly."""
 _BLOCK = 65_536  # points at once
 _MOST_PLACES = 1_000_000
-_MOST_FACES = 5_000_000  # of a file
 _MOST_BYTES = 256_000_000
 _FILES = (".stl", ".ply", ".obj", ".off", ".glb")
 _EMPTIEST = 1e-4  # share of its bounding box that a region fills at least, to draw places from it
@@ -299,11 +298,7 @@ class Mesh(Region):
         check_installed("trimesh")
         trimesh = import_module("trimesh")
         try:
-            scene: Any = trimesh.load(name, force="scene")
-            parts = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
-            if (count := sum(len(getattr(part, "faces", ())) for part in parts)) > _MOST_FACES:
-                raise ValueError(f"{count:,} triangles are more than {_MOST_FACES:,}")
-            mesh: Any = scene.to_mesh()
+            mesh: Any = trimesh.load(name, force="scene").to_mesh()
             mesh.merge_vertices()
             import_module("trimesh.repair").fix_winding(mesh)
             vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
