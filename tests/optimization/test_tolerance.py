@@ -8,7 +8,7 @@ import pytest
 from softreach.arm import Base, Manipulator, designs
 from softreach.arm.parameters import changed, find_parameter, find_parameters
 from softreach.optimization import Tolerance, tolerance
-from softreach.optimization.deviations import Spread, deviations_of
+from softreach.optimization.tolerance import Spread, deviations_of
 from softreach.requirements import Box, Requirements, Target
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidInput, NotPossible

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from zarr.storage import MemoryStore, StoreLike  # noqa: TID253  (imported where stores are)
 
-from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metrics import METRIC_GROUPS, Metric, Need, chosen_metrics
+from softreach.atlas.metrics import METRIC_GROUPS, Intermediates, Metric, Need, chosen_metrics
 from softreach.atlas.reading import a_store, contents, open_atlas, over_length
 from softreach.atlas.space import Command, DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore

@@ -16,8 +16,7 @@ from zarr.storage import StoreLike, StorePath  # noqa: TID253
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import from_written, written_name
-from softreach.atlas.intermediates import activations_of
-from softreach.atlas.metrics import Need
+from softreach.atlas.metrics import Need, activations_of
 from softreach.atlas.space import Command
 from softreach.atlas.store import ABOUT, DAMAGED, EXPLAINED, KNOWN, OF, PER_DESIGN, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
@@ -181,8 +180,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """
     opened = opened_atlas(atlas, metrics=False)
     command = command_of(opened)
-    kept = [name for name in ("status", "number", "tip") if name in opened]
-    row = _nearest(opened[kept], at)
+    row = _nearest(opened[[name for name in ("status", "number", "tip") if name in opened]], at)
     if (status := int(row["status"])) not in KNOWN:
         raise InvalidInput("design", at, "done", f"its status is {status}")
     arm = command.space.design(int(row["number"]))
@@ -242,8 +240,7 @@ class Contents(NamedTuple):
     """Contents of an atlas but its tips, each chunk checked."""
 
     status: NDArray[np.uint8]  # DAMAGED for designs of which a chunk is, shape (designs,)
-    messages: dict[int, str]
-    """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
+    messages: dict[int, str]  # As `AtlasStatus` has them
     tables: dict[str, Any]  # Arrays `metrics` and `curvature`; fill values where they are damaged
 
     def warn_of_damage(self, then: str) -> None:
@@ -385,7 +382,6 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
 
 
 def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
-    """Status, messages, and the metrics that were read."""
     command, shape, dims = store.command, store.command.space.shape, store.command.space.dims
     texts = np.full(command.space.size, "", dtype=object)
     texts[[*content.messages]] = [*content.messages.values()]

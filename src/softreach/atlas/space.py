@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from importlib.metadata import version
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -65,14 +65,6 @@ def column(name: str, values: ArrayLike) -> tuple[float, ...]:
     return tuple(np.atleast_1d(array if array.dtype.kind in "iu" else floats).tolist())
 
 
-class _Survey(NamedTuple):
-    """What is known of a space once each of its designs has been made."""
-
-    gaps: dict[int, str]  # Combinations that no arm can have: number -> why not
-    bundles: int  # The largest number of bundles of any design; 0 if there is no design
-    length_range: tuple[float, float]  # Length of the shortest and of the longest design [m]
-
-
 @dataclass(frozen=True, kw_only=True)
 class DesignSpace:
     """Designs that differ from a base in named parameters, by `grid`, `listed` or `sampled`.
@@ -90,8 +82,6 @@ class DesignSpace:
     """Name and values [SI units] of every parameter."""
     layout: Layout = "grid"
     """Every combination (grid), or the values taken together, one of each (list)."""
-    known: _Survey | None = field(default=None, repr=False, compare=False)
-    """What a store says of the designs but its gaps, so that reading it makes none."""
 
     def __post_init__(self) -> None:
         base = a_manipulator("base", self.base)
@@ -226,21 +216,22 @@ class DesignSpace:
     @property
     def gaps(self) -> Mapping[int, str]:
         """Combinations that no arm can have: number -> why not."""
-        return self._survey.gaps
-
-    @property
-    def bundles(self) -> int:
-        """The largest number of bundles of any design; 0 if there is no design."""
-        return (self.known or self._survey).bundles
-
-    @property
-    def length_range(self) -> tuple[float, float]:
-        """Length of the shortest and of the longest design [m]."""
-        return (self.known or self._survey).length_range
+        return self._survey[0]
 
     @cached_property
-    def _survey(self) -> _Survey:
-        """Each design is made once, which takes about 2 ms."""
+    def bundles(self) -> int:
+        """The largest number of bundles of any design; 0 if there is no design."""
+        return max((count for count, _ in self._survey[1]), default=0)
+
+    @cached_property
+    def length_range(self) -> tuple[float, float]:
+        """Length of the shortest and of the longest design [m]."""
+        lengths = [length for _, length in self._survey[1]] or [math.nan]
+        return min(lengths), max(lengths)
+
+    @cached_property
+    def _survey(self) -> tuple[dict[int, str], list[tuple[int, float]]]:
+        """Gaps, and inputs and length of all others; each is made once, which takes about 2 ms."""
         gaps: dict[int, str] = {}
         sizes: list[tuple[int, float]] = []
         with bar("looking at all designs", self.size) as shown:
@@ -252,8 +243,7 @@ class DesignSpace:
                 else:
                     sizes.append((arm.inputs, arm.length))
                 shown(1)
-        bundles, lengths = zip(*sizes, strict=True) if sizes else ((0,), (math.nan,))
-        return _Survey(gaps, max(bundles), (min(lengths), max(lengths)))
+        return gaps, sizes
 
     def to_dict(self) -> dict[str, Any]:
         """The space in plain values, from which `from_dict` makes an equal one."""
@@ -264,11 +254,10 @@ class DesignSpace:
     @classmethod
     def from_dict(cls, space: Mapping[str, Any]) -> Self:
         """The space that `to_dict` described; its base design is read when it is asked for."""
-        bundles, shortest, longest = space["extent"]
+        bundles, *lengths = space["extent"]  # so that reading a store makes no design
         made = object.__new__(cls)
-        known = _Survey({}, bundles, (shortest, longest)) if bundles else None
-        vars(made).update(layout=space["layout"], known=known, written=space["design"])
-        vars(made)["parameters"] = _plain(space["parameters"])
+        vars(made).update(layout=space["layout"], written=space["design"], bundles=bundles)
+        vars(made).update(parameters=_plain(space["parameters"]), length_range=tuple(lengths))
         return made
 
     def __getattr__(self, name: str) -> Any:

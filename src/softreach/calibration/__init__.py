@@ -1,7 +1,5 @@
 """Calibration: the arm on the bench from measured poses, and which poses to measure."""
 
-from __future__ import annotations
-
 from softreach.calibration.calibration import calibrate, leave_one_run_out
 from softreach.calibration.errors import PlacementErrors, Repeatability, Verdict
 from softreach.calibration.fit import Uncertainty

@@ -1,14 +1,12 @@
 """Calibration: from measured poses to the arm on the bench, and laws without a rod beside it."""
 
-from __future__ import annotations
-
 import datetime as dt
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -254,7 +252,7 @@ class _Arcs(NamedTuple):
     offsets: Array
 
     @classmethod
-    def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:
+    def of(cls, arm: Manipulator, data: Measurements) -> Self:
         ends = [part.span(arm.length)[1] for part in arm.actuators]
         ends = np.unique(np.round([*ends, arm.length], 9))
         middles = 0.5 * (np.append(0.0, ends[:-1]) + ends)

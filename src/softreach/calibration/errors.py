@@ -1,7 +1,5 @@
 """Errors of predicted places, what the data repeats, and what the residuals speak of."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Least squares of measured places: robust, bounded, with priors; how sure the numbers are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations

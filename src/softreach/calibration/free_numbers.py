@@ -1,14 +1,12 @@
 """Free numbers of a calibration: parameters of the design, the pose of its base, what is tied."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -124,7 +122,7 @@ class FreeNumbers:
             result.append((factor / step, made))
         return result
 
-    def started_at(self, values: Mapping[str, float]) -> FreeNumbers:
+    def started_at(self, values: Mapping[str, float]) -> Self:
         """The same with other values to start from."""
         numbers = (replace(n, start=float(values.get(n.name, n.start))) for n in self.numbers)
         return replace(self, numbers=tuple(numbers))

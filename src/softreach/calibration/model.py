@@ -4,11 +4,9 @@ Tables are differentiated by differences of fourth order, which are good to ten 
 equilibrium; all that follows from them, how the arm moves, is the linear response of the rod.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +85,7 @@ class MarkerModel:
     names: tuple[str, ...]  # Of the markers that were measured
 
     @classmethod
-    def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
+    def of(cls, free: FreeNumbers, data: Measurements) -> Self:
         """The model of measured poses."""
         return cls(free, data.inputs, data.marker_names)
 
@@ -114,7 +112,6 @@ class MarkerModel:
     def _by_differences(
         self, arm: Manipulator, scale: float, neighbors: list[Neighbors]
     ) -> Prediction:
-        """Places and their derivatives by those of the neighbors."""
         slopes = np.zeros((len(self.inputs), len(self.names), 3, len(neighbors)))
         for k, each in enumerate(neighbors):
             for factor, other in each:

@@ -184,5 +184,4 @@ class _Program:
         return np.zeros(len(unknowns))
 
     def _asked(self, parts: str, of: Callable[[Sequence[Part]], Array], unknowns: Array) -> Array:
-        """Values or derivatives of the "equations" or "inequalities"."""
         return of(getattr(self.point(unknowns), parts))

@@ -10,8 +10,7 @@ from softreach.arm.body import load_number, mass
 from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import ends_over, quadrature, tables
-from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metrics import Need, known_metric
+from softreach.atlas.metrics import Intermediates, Need, known_metric
 from softreach.requirements.parts import LIMIT_UNITS
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.rods import as_tip_map

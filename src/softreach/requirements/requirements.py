@@ -297,7 +297,6 @@ class _Reader(toml.FaultReader):
         return self._made(Target, raw, path, values)
 
     def _beside(self, name: str, instead: str) -> Path:
-        """Path of a file that lies beside the text, if that has a place."""
         if self.folder is not None:
             return self.folder / name
         allowed = f"part of the text: other files are not sent along; write {instead}"
