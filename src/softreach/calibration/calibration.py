@@ -162,7 +162,7 @@ def leave_one_run_out(
         out = table.runs == number
         if out.any() and not out.all():
             others = calibrate(arm, table.of(~out), free=free, **{"rivals": False, **options})
-            errors[name] = misses(others.residuals_on(table.of(out)))
+            errors[name] = others.errors_on(table.of(out))
     return errors
 
 
@@ -231,8 +231,7 @@ def constant_curvature(
     """
     from scipy.optimize import least_squares
 
-    arcs = _Arcs.of(arm, train)
-    seen = np.isfinite(train.places)
+    arcs, seen = _Arcs.of(arm, train), np.isfinite(train.places)
 
     def residuals(values: Array) -> Array:
         progress(0)  # which may end the fit
@@ -285,9 +284,8 @@ class _Arcs(NamedTuple):
         rest = values[6 : 6 + 2 * count].reshape(count, 2)
         slopes = np.zeros((count, inputs.shape[1], 2))
         slopes[self.acts] = values[6 + 2 * count :].reshape(-1, 2)
-        x = inputs / self.scale
-        place = np.broadcast_to(values[:3], (len(x), 3))
-        frame = np.broadcast_to(Rotation.from_rotvec(values[3:6]).as_matrix(), (len(x), 3, 3))
+        x, frame = inputs / self.scale, Rotation.from_rotvec(values[3:6]).as_matrix()
+        place, frame = np.tile(values[:3], (len(x), 1)), np.tile(frame, (len(x), 1, 1))
         result, begin = np.empty((len(x), len(self.markers), 3)), 0.0
         own = np.searchsorted(self.ends[:-1], self.markers, "right")  # arc of each marker
         for k, end in enumerate(self.ends):

@@ -48,9 +48,7 @@ class Fit:
 def started(model: MarkerModel, places: Array) -> FreeNumbers:
     """Numbers to start from: the pose that puts predicted places on measured ones [Kabsch1976]."""
     free = model.free
-    turning = [name for name in POSE[3:] if name in free.names]
-    moving = [name for name in POSE[:3] if name in free.names]
-    if not moving:
+    if not {*POSE[:3]} & {*free.names}:
         return free
     each = model.predict(free.start).places
     predicted, measured = each.reshape(-1, 3), places.reshape(-1, 3)
@@ -59,10 +57,9 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
         return free
     predicted, measured = predicted[known], measured[known]
     start = np.array(free.arm.base.position)
-    if len(turning) < 3 or len(moving) < 3:
+    if {*POSE} - {*free.names}:
         shift = np.median(measured - predicted, axis=0)
-        moved = zip(POSE[:3], start + shift, strict=True)
-        return free.started_at({name: place for name, place in moved if name in moving})
+        return free.started_at(dict(zip(POSE[:3], start + shift, strict=True)))
     _refuse_exchanged(model, each, places)
     rotation, scale, place = _kabsch(free, predicted - start, measured)
     from scipy.spatial.transform import Rotation
@@ -89,7 +86,7 @@ def _miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
     if known.sum() < 3:
         return np.inf
     predicted, measured = predicted[known], measured[known]
-    if set(POSE) <= set(free.names):
+    if not {*POSE} - {*free.names}:
         rotation, scale, shift = _kabsch(free, predicted, measured)
         off = scale * predicted @ rotation.T + shift - measured
     else:
@@ -352,8 +349,6 @@ class Uncertainty:
     are left to say how well, or which is at a bound; shape (number,)."""
     freedom: Array
     """Degrees of freedom of the interval of each number, shape (number,)."""
-    clusters: str
-    """"run" or "sample": what shares errors."""
 
     @property
     def sigma(self) -> Array:
@@ -380,16 +375,14 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     Numbers at a bound are held there, and the variance of the others is as if they were known. The
     noise is the standard deviation of a coordinate [m], against which priors are weighed.
     """
-    slopes = fit.prediction.slopes
-    free = ~fit.at_bound
-    count = len(fit.values)
+    slopes, free, count = fit.prediction.slopes, ~fit.at_bound, len(fit.values)
     scale = np.maximum(fit.free.scale, 0.1 * np.abs(fit.values))
     weight = np.sqrt(fit.weights)[..., None]
     seen = (fit.weights > 0) & np.isfinite(slopes).all(axis=(2, 3))
     rows = np.where(seen[..., None, None], weight[..., None] * slopes * scale, 0.0)
     miss = np.where(seen[..., None], weight * fit.residuals, 0.0)
     by_run = len(data.run_names) >= max(FEWEST_RUNS, 2 * count)
-    keys = data.runs if by_run else np.arange(len(data))
+    keys = data.runs if by_run else np.arange(len(data))  # what shares errors
     rows = rows.reshape(len(data), -1, count)[:, :, free]
     miss = miss.reshape(len(data), -1)
     squares = np.einsum("nrp,nrq->pq", rows, rows)
@@ -412,8 +405,7 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     told[free] = (np.abs(dropped) < 1e-3).all(axis=1) & (shown + prior > _SEEN * np.diag(expected))
     told &= ~fit.at_bound & (np.diag(whole) <= _VAGUE**2)
     whole[~told] = whole[:, ~told] = 0.0
-    by = "run" if by_run else "sample"
-    return Uncertainty(whole * np.outer(scale, scale), told, degrees, by)
+    return Uncertainty(whole * np.outer(scale, scale), told, degrees)
 
 
 def _bent(fit: Fit, seen: Mask, scale: Array) -> Array:
@@ -424,9 +416,8 @@ def _bent(fit: Fit, seen: Mask, scale: Array) -> Array:
     """
     slopes, weight = fit.prediction.slopes, fit.weights
     square = np.where(seen, (fit.residuals**2).sum(axis=2), 0.0)
-    share = np.divide(
-        weight * (1.0 - weight**2), square, out=np.zeros_like(square), where=square > 0
-    )
+    lost = weight * (1.0 - weight**2)
+    share = np.divide(lost, square, out=np.zeros_like(square), where=square > 0)
     along = np.einsum("nma,nmap->nmp", np.where(seen[..., None], fit.residuals, 0.0), slopes)
     along = np.where(seen[..., None], along * scale, 0.0)
     return np.einsum("nm,nmp,nmq->pq", share, along, along)

@@ -376,11 +376,6 @@ class Tolerance:
         """All that is but one number, regions last."""
         return self.kept, self.volume, self.unreachability, *self.regions
 
-    @property
-    def worst_parameter(self) -> str:
-        """The parameter whose deviation costs most."""
-        return self.parameters[int(self.costs.argmax())]
-
     def to_dataset(self) -> xr.Dataset:
         """All numbers, labeled: to first order and of arms made."""
         import xarray as xr

@@ -306,15 +306,13 @@ def _covered(rules: PoseRules, target: Target, places: Array, sets: Sets, step: 
         return np.zeros(len(places), bool)
     if reached.dimension == 3 and not target.within:
         return reached.contains(places)
-    rod = reached.tip_map
-    least = rod.tol * rod.length if reached.dimension < 3 else 0.0
+    least = reached.tip_map.tol * reached.tip_map.length if reached.dimension < 3 else 0.0
     return reached.distance(places) <= max(target.within, least)
 
 
 def _largest(values: Array) -> tuple[int, int]:
     """Payload and place of the largest value, by their numbers."""
-    load, place = np.unravel_index(int(values.argmax()), values.shape)
-    return int(load), int(place)
+    return divmod(int(values.argmax()), values.shape[1])
 
 
 def _under(payload: float | None) -> str:

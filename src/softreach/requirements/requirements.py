@@ -435,10 +435,10 @@ class _Reader(toml.FaultReader):
             return "the length L of the arm is not known here: give m, cm or mm"
         if symbol or not unit:
             return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
-        units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
-        hint = "" if unit != "m" or self.length is not None else "; L is not known here"
-        key = f"{name}_{unit.lower()}{hint}"
-        return f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under {key}'
+        more, hint = ("", "; L is not known here") if self.length is None else (", L", "")
+        more, hint = (more, hint) if unit == "m" else ("", "")
+        how = f'({", ".join(unit_names(unit))}{more}), such as "{_EXAMPLES[unit]}"'
+        return f"must have its unit {how}, or stand under {name}_{unit.lower()}{hint}"
 
 
 def _keys(name: str, unit: str) -> dict[str, str]:
