@@ -164,32 +164,27 @@ def read_measurements(
         places, chosen = places[:, seen], {k: x for k, x in chosen.items() if k not in lost}
     _refuse_far(arm, places, [triples[start] for start in chosen.values()])
     _refuse_inputs(arm, values, sources)
-    run_names, runs, taken = _runs_and_order(table, run, order)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
         inputs=values,
         places=places,
         input_names=tuple(sources),
         marker_names=tuple(chosen),
-        runs=runs,
-        run_names=run_names,
-        order=taken,
         rows=np.arange(len(values)),
         source=source,
         digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
+        **_runs_and_order(table, run, order),
     )
 
 
-def _runs_and_order(
-    table: pd.DataFrame, run: str | None, order: str | None
-) -> tuple[tuple[str, ...], NDArray[np.intp], NDArray[np.intp]]:
+def _runs_and_order(table: pd.DataFrame, run: str | None, order: str | None) -> dict[str, Any]:
     """Names of runs, the run of each sample, and samples run by run in the order of each."""
     every = np.full(len(table), "all") if run is None else table[run].to_numpy(object)
     names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
     taken = np.arange(len(table))
     if order is not None and table[order].dtype.kind in "iuf":  # names of samples say nothing
         taken = np.lexsort((_numbers(table, order, gaps=True), begins[runs])).astype(np.intp)
-    return tuple(names.tolist()), runs, taken
+    return {"run_names": tuple(names.tolist()), "runs": runs, "order": taken}
 
 
 def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:

@@ -69,8 +69,7 @@ class PosePlan:
             noise: Standard deviation of a coordinate of a marker [m]: of the measurement, and of
                 all that the model does not have.
         """
-        noise = as_number("noise", noise, Range(0.0, 1.0, "m", True))
-        scale = self.free.scale
+        noise, scale = as_number("noise", noise, Range(0.0, 1.0, "m", True)), self.free.scale
         inverse = np.linalg.inv(self.information * np.outer(scale, scale))
         widths = noise * scale * np.sqrt(np.diag(inverse))
         return dict(zip(self.names, widths.tolist(), strict=True))
@@ -216,8 +215,7 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
     near = np.zeros(len(slopes), int)  # chosen poses that each candidate is too near to
     chosen: list[int] = []
     for _ in range(n):
-        best = _best(slopes, total, near)
-        chosen.append(best)
+        chosen.append(best := _best(slopes, total, near))
         near += _within(at, best, room)
         total = total + each[best]
     for _ in range(_ROUNDS):
@@ -225,9 +223,9 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
         for place, old in enumerate(chosen):
             near -= _within(at, old, room)
             rest = total - each[old]
-            best = _best(slopes, rest, near)
+            chosen[place] = best = _best(slopes, rest, near)
             near += _within(at, best, room)
-            chosen[place], total = best, rest + each[best]
+            total = rest + each[best]
         if np.linalg.slogdet(total)[1] - before < _GAIN:
             break
     return np.array(chosen, np.intp)

@@ -313,16 +313,13 @@ class Point:
                 share = self.design.share(number, region)
                 slope = partial(self.design.share_slope, number, region)
                 yield self._limit(target.name, -1.0, share, target.share, slope)
-        limits = [
-            (name, sense, limit)
-            for name, ends in needs.measures.items()
-            for sense, limit in zip((-1.0, 1.0), ends, strict=True)
-            if name in SETS and limit is not None
-        ]
-        given = needs.limits.given
-        for name, sense, limit in limits + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
-            slope = partial(self.design.slope, name)
-            yield self._limit(name, sense, self.design.value(name), limit, slope)
+        ends = [(name, needs.measures[name]) for name in needs.measures if name in SETS]
+        ends += [(name, (None, needs.limits.given.get(name))) for name in OF_ARM]
+        for name, pair in ends:
+            for sense, limit in zip((-1.0, 1.0), pair, strict=True):
+                if limit is not None:
+                    slope = partial(self.design.slope, name)
+                    yield self._limit(name, sense, self.design.value(name), limit, slope)
         for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
             if k != self.goal:
                 scale = abs(floor) or 1.0

@@ -5,6 +5,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import Any, Literal, get_args
@@ -112,12 +113,11 @@ class Study:
         """Let a sampler that begins at one place begin where the best of the known designs are."""
         if self.kind != "cma" or len(self.candidates) < _WARM:
             return
-        complete = (self._optuna.trial.TrialState.COMPLETE,)
         options = {"n_startup_trials": 0, "warn_independent_sampling": False}
-        make = self._optuna.samplers.CmaEsSampler
         with _quiet():
-            trials = self._study.get_trials(states=complete)
-            self._study.sampler = make(source_trials=trials, seed=self.seed + 1, **options)
+            trials = self._study.get_trials(states=(self._optuna.trial.TrialState.COMPLETE,))
+            make = partial(self._optuna.samplers.CmaEsSampler, source_trials=trials)
+            self._study.sampler = make(seed=self.seed + 1, **options)
 
     def _created(self, storage: Any) -> Any:
         samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
