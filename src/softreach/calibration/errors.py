@@ -164,9 +164,8 @@ def _explained(data: Measurements, residuals: Array) -> tuple[float, float | Non
     same all over the samples, and beyond that of last commands drawn by chance. The second is None
     where too few samples follow each other in a run.
     """
-    order = data.order
+    order, moving = data.order, np.ptp(data.inputs, axis=0) > 0
     flat = residuals.reshape(len(residuals), -1)[order]
-    moving = np.ptp(data.inputs, axis=0) > 0
     x, runs = data.inputs[order][:, moving], data.runs[order]
     known = np.isfinite(flat).all(axis=1) & np.append(False, runs[1:] == runs[:-1])
     if known.sum() < 10 * (1 + 3 * x.shape[1]):

@@ -36,7 +36,7 @@ Neighbors = list[tuple[float, Manipulator | Base | float]]
 """Arms around one, their bases or scales of data alone, with the factors of a derivative."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class FreeNumber:
     """A number that a fit may change."""
 
@@ -157,10 +157,9 @@ def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
                 axis = POSE.index(each)
                 start = arm.base.position[axis] if axis < 3 else 0.0
                 unit, scale = ("m", 1e-2 * arm.length) if axis < 3 else ("rad", 0.02)
-                allowed = Range(unit=unit)
-                yield FreeNumber(name=each, unit=unit, start=start, range=allowed, scale=scale)
+                yield FreeNumber(each, unit, start, Range(unit=unit), scale)
         elif name == SCALE:
-            yield FreeNumber(name=SCALE, unit="1", start=1.0, range=Range(1e-3, 1e3), scale=0.02)
+            yield FreeNumber(SCALE, "1", 1.0, Range(1e-3, 1e3), 0.02)
         elif "*" in name:
             known = parameters(arm)
             hits = [key for key in known if fnmatchcase(key, name.replace("[", "[[]"))]
@@ -222,8 +221,7 @@ def _of_parameters(arm: Manipulator, name: str) -> FreeNumber:
     start = float(np.mean(values)) if values else typical
     if paths[0].rpartition(".")[2] in _PLACES:
         allowed = allowed._replace(high=arm.length)
-    scale = max(0.1 * abs(start), 1e-2 * typical)
-    return FreeNumber(name=name, unit=first.unit, start=start, range=allowed, scale=scale)
+    return FreeNumber(name, first.unit, start, allowed, max(0.1 * abs(start), 1e-2 * typical))
 
 
 def _moved(base: Base, pose: Mapping[str, float]) -> Base:

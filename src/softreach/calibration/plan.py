@@ -20,7 +20,7 @@ from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support.arguments import as_integer, as_names, as_number
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput, NotPossible, Range, did_you_mean
+from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.files.text import write_table
 
 if TYPE_CHECKING:
@@ -158,7 +158,12 @@ def plan_poses(
     numbers = free_numbers(arm, free)
     candidates = as_integer("candidates", candidates, 2, 200_000)
     n, seed = as_integer("n", n, 1, candidates), as_integer("seed", seed)
-    names, (low, high) = _markers(arm, markers), arm.input_bounds.T
+    known, (low, high) = marker_names(arm), arm.input_bounds.T
+    names = known if markers is None else as_names("markers", markers)
+    if not names or {*names} - {*known} or len({*names}) < len(names):
+        raise InvalidInput(
+            "markers", ", ".join(names) or "none", f"of {', '.join(known)}, each once"
+        )
     moving = low < high
     cube = _candidates(int(moving.sum()), candidates, seed)
     inputs = np.tile(low, (len(cube), 1))
@@ -183,16 +188,6 @@ def plan_poses(
     np.random.default_rng(seed).shuffle(chosen)
     identifiable(numbers, own := slopes[chosen].reshape(-1, len(numbers)))
     return PosePlan(numbers, names, inputs[chosen], own.T @ own)
-
-
-def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
-    known = marker_names(arm)
-    names = known if given is None else as_names("markers", given)
-    wrong = [name for name in names if name not in known or names.count(name) > 1]
-    for value in wrong or ([] if names else ["none"]):
-        allowed = f"of {', '.join(known)}, each once"
-        raise InvalidInput("markers", value, allowed, did_you_mean(value, known))
-    return names
 
 
 def _candidates(dim: int, count: int, seed: int) -> Array:
