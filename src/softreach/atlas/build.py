@@ -169,8 +169,10 @@ def _finish(store: AtlasStore, index: int, needed: Intermediates, values: Values
         tips = needed.tips if store.command.keep_clouds else None
     except Exception as error:
         return _fail(store, index, error)
-    unstable = UNSTABLE, no_equilibrium_message(len(needed.stable))
-    store.write(index, values, tips, *(() if needed.stable.any() else unstable))
+    stable, why = needed.stable, ""
+    if not stable.any():
+        why = no_equilibrium_message(len(stable))
+    store.write(index, values, tips, UNSTABLE if why else DONE, why)
     return index, ""
 
 

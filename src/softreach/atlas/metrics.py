@@ -24,7 +24,7 @@ from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.sampling import sample_cube
 from softreach.support import plugins
-from softreach.support.arguments import as_function, as_given, as_text
+from softreach.support.arguments import as_function, as_given, as_instance, as_text
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, SoftreachError, warn
 from softreach.workspace import reachable_set
@@ -83,11 +83,11 @@ class Metric:
         for what in ("unit", "meaning", "nan_if"):
             as_text(f"{what} of metric {self.name}", getattr(self, what))
         as_function(f"compute of metric {self.name}", self.compute)
-        needs = self.needs if isinstance(self.needs, tuple | list) else (self.needs,)
-        if not all(isinstance(need, Need) for need in needs):
+        as_instance(f"needs of metric {self.name}", self.needs, (tuple, list), "a tuple")
+        if not all(isinstance(need, Need) for need in self.needs):
             allowed = f"some of Need.{', Need.'.join(Need.__members__)}"
             raise InvalidInput(f"needs of metric {self.name}", self.needs, allowed)
-        object.__setattr__(self, "needs", tuple(needs))
+        object.__setattr__(self, "needs", tuple(self.needs))
         if self.over not in ((), PROFILE):
             raise InvalidInput(f"over of metric {self.name}", self.over, f"() or {PROFILE}")
 

@@ -31,7 +31,7 @@ from softreach.arm.tables import check_extension
 from softreach.atlas.metrics import Metric, known_metric
 from softreach.cloud.curvature import QUANTILES
 from softreach.sampling import check_sampler, sample_cube
-from softreach.support.arguments import as_integer, as_one_of
+from softreach.support.arguments import as_instance, as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite
 from softreach.support.errors import InvalidDesign, InvalidInput, counted
 from softreach.support.progress import bar
@@ -420,14 +420,11 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     except InvalidDesign as error:
         raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
     for key in document:
-        if key not in _KEYS:
-            raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
+        as_one_of("key", key, _KEYS)
     base = design_from(str(document.get("design", "minimal_trunk")))
     table, layout = document.get("parameters", {}), document.get("layout", "grid")
-    if not isinstance(table, dict):
-        raise InvalidInput("parameters", table, "a table of parameters and their values")
-    if layout not in _LAYOUTS:
-        raise InvalidInput("layout", layout, f"one of {', '.join(_LAYOUTS)}")
+    as_instance("parameters", table, dict, "a table of parameters and their values")
+    as_one_of("layout", layout, _LAYOUTS)
     values: dict[str, list[float]] = {}
     for key, value in flat_keys(table):
         name, numbers = parse_parameter(base, key, value)

@@ -44,9 +44,9 @@ def misses(residuals: Array) -> PlacementErrors:
     distance = distance[np.isfinite(distance)]
     if not len(distance):
         return PlacementErrors(np.nan, np.nan, np.nan, np.nan, 0)
-    numbers = np.median(distance), distance.mean(), np.sqrt((distance**2).mean())
-    most = np.quantile(distance, 0.95)
-    return PlacementErrors(*map(float, (*numbers, most)), len(distance))
+    rms, most = float(np.sqrt((distance**2).mean())), float(np.quantile(distance, 0.95))
+    median, mean = float(np.median(distance)), float(distance.mean())
+    return PlacementErrors(median, mean, rms, most, len(distance))
 
 
 class Repeatability(NamedTuple):

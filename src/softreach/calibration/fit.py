@@ -130,14 +130,12 @@ def _exchanges(model: MarkerModel) -> Iterator[_Order]:
         parts = np.split(inputs, np.cumsum(counts)[:-1])
         turned = np.concatenate([[*part[:1], *part[:0:-1]] for part in parts])
         yield _Order("the senses in which bundles are counted", turned, columns)
-    for j, k in combinations(range(3), 2):
-        text = f"the axes {'xyz'[j]} and {'xyz'[k]}"
-        yield _Order(text, inputs, _exchanged(columns, each[:, j], each[:, k]))
-    for j, k in combinations(range(len(names)), 2):
-        order = _exchanged(columns, each[j], each[k])
-        yield _Order(f"the markers {names[j]} and {names[k]}", inputs, order)
-    for j, k in combinations(range(len(columns)), 2) if len(names) > 1 else ():
-        yield _Order(f"the columns {words[j]} and {words[k]}", inputs, _exchanged(columns, j, k))
+    groups = [("axes", "xyz", each.T), ("markers", names, each)]
+    groups += [("columns", words, columns[:, None])] if len(names) > 1 else []
+    for kind, known, places in groups:
+        for j, k in combinations(range(len(known)), 2):
+            order = _exchanged(columns, places[j], places[k])
+            yield _Order(f"the {kind} {known[j]} and {known[k]}", inputs, order)
 
 
 def _exchanged(order: NDArray[np.intp], here: Any, there: Any) -> NDArray[np.intp]:
@@ -282,9 +280,9 @@ class _Problem:
         from scipy.optimize import least_squares
 
         loss = _loss(int(self.seen.sum()), self.width)
-        scales: Any = {"bounds": self.bounds, "x_scale": self.model.free.scale, "loss": loss}
-        ends: Any = {"ftol": fine, "xtol": fine, "gtol": 1e-14, "max_nfev": _MOST}
-        return least_squares(self.residuals, values, self.slopes, **scales, **ends)
+        scales: Any = {"jac": self.slopes, "bounds": self.bounds, "x_scale": self.model.free.scale}
+        ends: Any = {"loss": loss, "ftol": fine, "xtol": fine, "gtol": 1e-14, "max_nfev": _MOST}
+        return least_squares(self.residuals, values, **scales, **ends)
 
 
 def _loss(count: int, width: float | None) -> str | Callable[[Array], Array]:

@@ -356,7 +356,7 @@ class _Reader(toml.FaultReader):
                 self._refuse(path, table, "must be a table with at_least, at_most or both")
             else:
                 unit = metric.unit if metric.unit in _EXAMPLES else ""
-                ends = dict.fromkeys(("at_least", "at_most"), unit)
+                ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
                 values = self._numbers(table, path, ends, plain=True)
                 measures[name] = tuple(map(values.get, ends))
         return measures
