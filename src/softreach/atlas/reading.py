@@ -277,9 +277,8 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
         return chunk.array != "status" and bool(of_designs[store.number(chunk)])
 
     store.opened.required = required
-    names = ("metrics", "curvature")[: 1 + bool(command.profiles)] if metrics else ()
-    lacks = {name: np.full(store.array(name).shape, np.nan) for name in names if not known.any()}
-    tables = lacks or {name: read(name) for name in names}
+    names = ["metrics", *["curvature"] * bool(command.profiles)] if metrics else []
+    tables = {x: read(x) if known.any() else np.full(store.array(x).shape, np.nan) for x in names}
     for index in tips_of if command.keep_clouds else ():
         if known[index]:
             read("tip", place_of(index))

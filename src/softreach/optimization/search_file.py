@@ -197,10 +197,10 @@ class _Reader(FaultReader):
     def _add(self, path: str, given: Any, table: dict[str, Any], name: str, value: Any) -> None:
         """Take the value of a parameter, the first of its name, if a search may have it."""
         if name in table:
-            return self._refuse(path, None, "is given twice")
+            self._refuse(path, None, "is given twice")
+            return
         of_free = {**self.free, name: value} if table is self.free else {}
         choices = {**self.choices, name: value} if table is self.choices else self.choices
         make = partial(free_parameters, self._bases, of_free, choices)
         if self._tried(path, given, make) is not WRONG:
             table[name] = value
-        return None

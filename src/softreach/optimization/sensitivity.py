@@ -255,9 +255,9 @@ def _ends(problem: Problem, point: Point) -> Iterator[tuple[Array, Multiplier]]:
         for end, sign, word in ((0.0, -1.0, "low"), (1.0, 1.0, "high")):
             if abs(place - end) <= _AT_END:
                 worth = Multiplier("", 0.0, "")
-                for real in reals[j : j + 1]:
-                    gain = 1.0 / (real.high - real.low)
-                    worth = Multiplier(f"{word} end of {real.name}", gain, real.unit)
+                if j < len(reals):
+                    gain = 1.0 / (reals[j].high - reals[j].low)
+                    worth = Multiplier(f"{word} end of {reals[j].name}", gain, reals[j].unit)
                 yield sign * row, worth
 
 

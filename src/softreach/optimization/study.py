@@ -188,9 +188,8 @@ def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
     """Designs evenly spread over all ranges and choices, after the one that the user has."""
     from scipy.stats import qmc
 
-    if (start := problem.parameters.start()) is not None:
-        yield start
-    free = problem.parameters.free
+    free, start = problem.parameters.free, problem.parameters.start()
+    yield from [] if start is None else [start]
     sampler = qmc.Sobol(len(free), rng=np.random.default_rng(seed))
     for place in sampler.random_base2(math.ceil(math.log2(max(count, 1))))[:count]:
         yield {each.name: each.at(float(x)) for each, x in zip(free, place, strict=True)}
