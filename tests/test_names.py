@@ -18,7 +18,8 @@ import softreach as sr
 from softreach.support.lazy import lazy
 
 NAMED = """
-    arm arm.designs arm.parameters atlas calibration cloud cloud.curvature cloud.dexterity
+    arm arm.designs arm.parameters atlas calibration cloud cloud.cells cloud.curvature
+    cloud.dexterity
     support.errors exchange.activefilaments export forces inverse inverse.path workspace.payload
     plot optimization requirements cloud.redundancy rest rod stiffness cloud.volume workspace
 """

@@ -35,7 +35,7 @@ def test_blocks_only_cut_the_sequence(sampler, dim, size):
     assert whole.max() <= 1
 
 
-@pytest.mark.parametrize("sampler", ["uniform", "boundary", "sobol"])
+@pytest.mark.parametrize("sampler", ["uniform", "boundary", "counter", "sobol"])
 def test_seeds_make_sequences(sampler):
     first, again, other = (sample_cube(sampler, 256, 3, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first, again)
@@ -76,7 +76,10 @@ def test_the_grid_holds_both_ends_and_every_combination():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("halton", 10, 3, 0), "sampler = 'halton': must be one of uniform, boundary, sobol, grid"),
+        (
+            ("halton", 10, 3, 0),
+            "sampler = 'halton': must be one of uniform, boundary, counter, sobol, grid",
+        ),
         (("sobol", 400_000, 3, 0), "262144 or 524288"),
         (("grid", 400_000, 3, 0), r"73\^3 = 389017 or 74\^3 = 405224"),
         (("uniform", 0, 3, 0), "n = 0: must be a whole number, 1 or more"),
@@ -108,11 +111,11 @@ def test_the_activations_fill_the_box(cloud, trunk):
     assert (np.ptp(gamma, axis=0) > 0.999 * width).all()
 
 
-@pytest.mark.parametrize("sampler", ["uniform", "boundary", "sobol", "grid"])
+@pytest.mark.parametrize("sampler", ["uniform", "boundary", "counter", "sobol", "grid"])
 def test_a_cloud_depends_on_its_arguments_alone(trunk, sampler, monkeypatch):
     first = sr.compute_cloud(trunk, n=32**3, seed=1, sampler=sampler)
     monkeypatch.setenv("SOFTREACH_NUM_THREADS", "1")
-    monkeypatch.setattr("softreach.cloud.clouds.BLOCK", 1_000)
+    monkeypatch.setattr("softreach.rod.tip_map.BLOCK", 1_000)
     assert sr.compute_cloud(trunk, n=32**3, seed=1, sampler=sampler).identical(first)
 
 

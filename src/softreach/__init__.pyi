@@ -13,6 +13,7 @@ from .calibration import calibrate as calibrate
 from .cloud import compute_cloud as compute_cloud, curvature as curvature, dexterity as dexterity
 from .cloud import open_cloud as open_cloud, redundancy as redundancy, save_cloud as save_cloud
 from .cloud import volume as volume
+from .cloud.cells import reached_cells as reached_cells
 from .cloud.redundancy import activation_distance as activation_distance
 from .cloud.volume import concave_hull as concave_hull, convex_hull as convex_hull
 from .export import cloud_table as cloud_table

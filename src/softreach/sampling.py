@@ -29,6 +29,7 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
     """All n points at once [-], shape (n, dim).
 
     Samplers are `uniform` (the paper's), `boundary` (uniform, a fifth of the points on the faces),
+    `counter` (uniform; each point follows from seed and number alone, on every device),
     `sobol` (scrambled, n a power of two) and `grid` (n a dim-th power, ends included).
     """
     n, seed = check_sampler(sampler, n, dim, seed)
@@ -55,6 +56,18 @@ def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
 def _uniform(n: int, dim: int, seed: int) -> Draw:
     rng = np.random.default_rng(seed)
     return lambda first, count: rng.random((count, dim))
+
+
+def _counter(n: int, dim: int, seed: int) -> Draw:
+    """The numbers that kernels make of the seed and the number of the sample."""
+    from softreach.kernels.counting import fill
+
+    def draw(first: int, count: int) -> Array:
+        points, numbers = np.empty((count, dim)), np.arange(first, first + count, dtype=np.uint64)
+        fill(np.uint64(seed), numbers, points)
+        return points
+
+    return draw
 
 
 def _boundary(n: int, dim: int, seed: int) -> Draw:
@@ -123,6 +136,7 @@ def _root(n: int, dim: int) -> int:
 SAMPLERS: dict[str, Sampler] = {
     "uniform": Sampler(_uniform, lambda n, dim: None),
     "boundary": Sampler(_boundary, lambda n, dim: None),
+    "counter": Sampler(_counter, lambda n, dim: None),
     "sobol": Sampler(_sobol, _power_of_two),
     "grid": Sampler(_grid, _whole_power),
 }

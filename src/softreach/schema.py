@@ -64,11 +64,13 @@ def cloud_dataset(
     sampler: str,
     tol: float,
     frame: str = "world",
+    device: str = "cpu",
 ) -> xr.Dataset:
     """A reachability cloud: tips and activations with everything needed to make them again."""
     import xarray as xr
 
     attrs = {**provenance(arm, frame), "seed": seed, "sampler": sampler, "tol": tol}
+    attrs |= {"device": device}
     variables = _variables(_CLOUD, arm, {"tip": tip, "activation": activation})
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length

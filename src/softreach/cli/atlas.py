@@ -48,6 +48,7 @@ def build(
     shard: Shard = "0/1",
     changes: Changes = UNCHANGED,
     durable: options.Durable = False,
+    device: options.Device = "cpu",
     json: options.AsJson = False,
 ) -> None:
     """Compute the clouds and the metrics of all designs.
@@ -68,6 +69,7 @@ def build(
         keep_clouds: Store the tips.
         scheduler: Dask scheduler: tcp://host:port
         scheduler_file: Dask scheduler file.
+        device: What computes tips: cpu, or cuda for a GPU, of arms without loads.
     """
     first, _, count = shard.partition("/")
     if not (shard.isascii() and first.isdigit() and count.isdigit() and len(shard) < 20):
@@ -85,6 +87,7 @@ def build(
         executor=_executor(scheduler, scheduler_file),
         shard=(int(first), int(count)),
         durable=durable,
+        device=device,
     )
     status(store, json=json)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
@@ -99,6 +99,7 @@ Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyp
 AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "--json")]
 _UNIT = "Unit of lengths: m, cm, mm, in or L. If left out: that of the design file, else m or mm."
 Unit = Annotated[str | None, _output(_UNIT)]
+Device = Literal["cpu", "cuda"]
 Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
@@ -128,7 +129,7 @@ class Sampling:
     Attributes:
         n: Number of samples: 400000 if left out.
         seed: Seed of the sampler: 0 if left out.
-        sampler: uniform (if left out), boundary, sobol or grid.
+        sampler: uniform (if left out), boundary, counter, sobol or grid.
     """
 
     n: Annotated[Whole | None, Parameter(name=("--n", "-n"))] = None

@@ -200,6 +200,7 @@ def cloud(
     *,
     sampling: options.Sampling = options.SAMPLING,
     tol: Number = 1e-6,
+    device: options.Device = "cpu",
     changes: Changes = UNCHANGED,
     out: options.Out = None,
     output: options.Output = options.DEFAULT,
@@ -210,6 +211,7 @@ def cloud(
 
     Args:
         tol: Largest tip error, in L.
+        device: What computes tips: cpu, or cuda for a GPU, of arms without loads.
         out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
     from softreach.cloud.clouds import CLOUD_STORE
@@ -219,7 +221,7 @@ def cloud(
     options.check_output(out, CLOUD_STORE, output.overwrite)
     arguments = sampling.arguments
     start = perf_counter()
-    dataset = sr.compute_cloud(arm, **arguments, tol=tol)
+    dataset = sr.compute_cloud(arm, **arguments, tol=tol, device=device)
     seconds = perf_counter() - start
     sr.save_cloud(dataset, out, overwrite=output.overwrite)
     rows: Rows = {
@@ -227,6 +229,7 @@ def cloud(
         "sampler": (arguments["sampler"], ""),
         "seed": (arguments["seed"], ""),
         "steps per arm": (sr.rod.as_tip_map(arm, tol).steps, ""),
+        "device": (dataset.attrs["device"], ""),
         "time to compute": (round(seconds, 3), "s"),
         **load_rows(arm),
         **{

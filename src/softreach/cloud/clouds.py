@@ -13,7 +13,7 @@ import numpy as np
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import all_inputs, as_tip_map, with_unstable
-from softreach.rod.tip_map import BLOCK, Frame, TipMap, TipOutputs
+from softreach.rod.tip_map import Device, Frame, TipMap, TipOutputs
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
@@ -49,6 +49,7 @@ def compute_cloud(
     tol: float = 1e-6,
     frame: Frame = "world",
     point: str | None = None,
+    device: Device = "cpu",
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Sample the activation box and compute the tip of each sample (section 3).
@@ -67,6 +68,7 @@ def compute_cloud(
             straight arm. The attributes hold it, and the pose of the base.
         point: Name of the marker that counts as the tip, such as that of a tool; by default that
             of the design. Of a tip map its own counts.
+        device: What computes tips: "cpu", or "cuda" for a GPU, of arms without loads.
         progress: Called with the number of samples done since its last call; by default a bar is
             shown on a terminal when the cloud is large.
 
@@ -78,9 +80,12 @@ def compute_cloud(
     Raises:
         InvalidInput: An argument out of range, or more samples than fit into memory; the message
             says what to use instead.
+        MissingExtra: `softreach[cuda]` is not installed.
+        NotPossible: There is no GPU, no driver for it, or the arm has loads.
     """
     report = None if progress is None else as_function("progress", progress)
-    tip_map = with_unstable(all_inputs(as_tip_map(arm, tol, frame=frame, point=point)))
+    whole = all_inputs(as_tip_map(arm, tol, frame=frame, point=point, device=device))
+    tip_map = with_unstable(whole)
     bundles = tip_map.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_memory("n", n, 8 * (bundles + 3) * n)
@@ -96,15 +101,15 @@ def compute_cloud(
             progress(rows.stop - rows.start)
 
     def tasks(progress: Progress | None) -> Iterator[Callable[[], object]]:
-        cubes = cube_blocks(sampler, n, bundles, seed, BLOCK)
-        for rows, cube in zip(parallel.blocks(n, BLOCK), cubes, strict=True):
+        cubes = cube_blocks(sampler, n, bundles, seed, tip_map.block)
+        for rows, cube in zip(parallel.blocks(n, tip_map.block), cubes, strict=True):
             tip_map.box.from_cube(cube, out=activation[rows])
             yield partial(fill, rows, progress)
 
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
         parallel.run(tasks(shown))
     made = {"seed": seed, "sampler": sampler, "tol": tip_map.tol, "frame": tip_map.frame}
-    cloud = schema.cloud_dataset(tip_map.arm, activation, tip, **made)
+    cloud = schema.cloud_dataset(tip_map.arm, activation, tip, **made, device=tip_map.device)
     return cloud if status is None else schema.with_status(cloud, status)
 
 

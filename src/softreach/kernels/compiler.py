@@ -48,6 +48,18 @@ def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
     return _dispatcher(function, inline="always", fastmath=FAST)
 
 
+def cuda_kernel(function: Callable[..., Any]) -> Any:
+    """Compile a loop over samples for a GPU, one of them a thread.
+
+    Numba compiles each `inline` part that it calls once more, for that target and from the same
+    source. With NUMBA_ENABLE_CUDASIM=1 and NUMBA_DISABLE_JIT=1 all of it runs in Python.
+    """
+    from numba import cuda
+
+    setattr(config, "CUDA_LOW_OCCUPANCY_WARNINGS", 0)  # noqa: B010  (small blocks are right)
+    return cuda.jit(function, fastmath=True)
+
+
 def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile with every operation rounded by itself, in the order written.
 

@@ -57,8 +57,7 @@ class PoseRules:
     keeps: tuple[Keep, ...]
     limits: dict[str, float]
     tolerance: float  # Error that is allowed in how far a region is missed [m]
-    known_rod: TipMap | None = None
-    """Tip map of the arm, if it is to be another than to the usual tolerance."""
+    known_rod: TipMap | None = None  # Tip map of the arm, if it is another than the usual one
 
     @property
     def rooms(self) -> tuple[Array, Array]:
@@ -98,8 +97,7 @@ class PoseRules:
 
     def _kept(self, gamma: Array, levels: Sequence[int] = _LEVELS) -> tuple[Array, Array]:
         """Distances by which regions are missed [m], and what may come on top, (n, keep) each."""
-        value = np.empty((len(gamma), len(self.keeps)))
-        error = np.zeros_like(value)
+        value, error = np.zeros((2, len(gamma), len(self.keeps)))
         left: dict[int, Index] = {}
         for column, keep in enumerate(self.keeps):
             if keep.of == "tip":
@@ -165,9 +163,7 @@ class Body(NamedTuple):
 
     center: Array  # Shape (n, station, 3) [m]
     tangent: Array  # Shape (n, station, 3)
-    radius: Array
-    """Of what is widest before activation, body, tendons and the disks that hold these, shape
-    (n, station) [m]."""
+    radius: Array  # Of the widest before activation: body, tendons, their disks; (n, station) [m]
     between: Array
     """Farthest that a point of the body is from those of the two sections that it lies between,
     both ways together [m], shape (n, station - 1)."""

@@ -16,7 +16,7 @@ from softreach.arm.lines import lengths_of_strains
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import quadrature
 from softreach.rod.rods import ArmMap, as_tip_map, with_unstable
-from softreach.rod.tip_map import Frame, Frames, Strains, TipMap
+from softreach.rod.tip_map import Device, Frame, Frames, Strains, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import Array, as_floats
@@ -30,7 +30,12 @@ _LINES_TOGETHER = 256  # samples
 
 
 def tip_positions(
-    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
+    arm: Manipulator | TipMap,
+    activations: ArrayLike,
+    tol: float = 1e-6,
+    *,
+    frame: Frame = "world",
+    device: Device = "cpu",
 ) -> Array:
     """Tip positions of many activations: theory (25), by sixth-order Magnus integration.
 
@@ -41,6 +46,7 @@ def tip_positions(
         tol: Largest tip error, in L; it decides the number of steps.
         frame: Frame of the tips: that of the "world", or of the "base", whose z is along the
             straight arm.
+        device: What computes them: "cpu", or "cuda" for a GPU, of arms without loads.
 
     Returns:
         Tips [m], shape (n, 3).
@@ -49,13 +55,20 @@ def tip_positions(
         InvalidInput: Activations of another shape, not finite, or such that there is no arm
             (ζ <= 0) or none that the steps follow; or a `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+        MissingExtra: `softreach[cuda]` is not installed.
+        NotPossible: There is no GPU, no driver for it, or the arm has loads.
     """
-    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
+    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame, device=device))
     return tip_map.tips(tip_map.check_activations("activations", activations))
 
 
 def tip_jacobian(
-    arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6, *, frame: Frame = "world"
+    arm: Manipulator | TipMap,
+    activations: ArrayLike,
+    tol: float = 1e-6,
+    *,
+    frame: Frame = "world",
+    device: Device = "cpu",
 ) -> Array:
     """Spatial twist of the tip per unit of each activation: the exact derivative of the tip.
 
@@ -67,14 +80,17 @@ def tip_jacobian(
         activations: γ [-], shape (n, bundles).
         tol: As for `tip_positions`, whose derivative this is to rounding.
         frame: As for `tip_positions`; v is the velocity of what passes its origin.
+        device: As for `tip_positions`.
 
     Returns:
         Jacobians, shape (n, 6, bundles), linear rows first.
 
     Raises:
         InvalidInput: As for `tip_positions`.
+        MissingExtra: As for `tip_positions`.
+        NotPossible: As for `tip_positions`.
     """
-    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
+    tip_map = with_unstable(as_tip_map(arm, tol, frame=frame, device=device))
     return tip_map.tip_twists(tip_map.check_activations("activations", activations))[1]
 
 

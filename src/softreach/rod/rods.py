@@ -17,8 +17,10 @@ from softreach.kernels.rod.frames import move, turn
 from softreach.rod.free import ArmRod, FreeRod
 from softreach.rod.inputs import ActivationBox, Inputs
 from softreach.rod.tip_map import (
+    DEVICES,
     SMALLEST_TOL,
     Array,
+    Device,
     Frame,
     Frames,
     Held,
@@ -69,6 +71,14 @@ class ArmMap(TipMap):
     @property
     def frame(self) -> Frame:
         return self.rod.frame if self.pose.is_identity else "world"
+
+    @property
+    def block(self) -> int:
+        return self.rod.block
+
+    @property
+    def device(self) -> str:
+        return self.rod.device
 
     @property
     def point(self) -> Marker | None:
@@ -216,6 +226,7 @@ def as_tip_map(
     frame: Frame = "world",
     point: str | None = None,
     warn: bool = True,
+    device: Device = "cpu",
 ) -> ArmMap:
     """The tip map of an arm, kept for the next call; a tip map is returned as it is.
 
@@ -227,21 +238,40 @@ def as_tip_map(
         point: Name of the marker that counts as the tip; by default that of the design, or of a
             tip map.
         warn: Whether to warn of loads beyond what was verified.
+        device: What computes tips and their derivatives: "cpu", or "cuda" for a GPU. That of a tip
+            map counts.
 
     Raises:
-        InvalidInput: No arm, no such frame or marker, or `tol` out of range.
+        InvalidInput: No arm, no such frame, marker or device, or `tol` out of range.
+        MissingExtra: `softreach[cuda]` is not installed.
+        NotPossible: There is no GPU, no driver for it, or the arm has loads.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
     as_one_of("frame", frame, ("world", "base"))
+    check_device(device)
     if not isinstance(arm, Manipulator | TipMap):
         raise no_arm("arm", arm, "a Manipulator or a TipMap")
     if isinstance(arm, TipMap):
         known = arm if isinstance(arm, ArmMap) else ArmMap.of(arm)
         return replace(known, pose=UPRIGHT) if frame == "base" != known.frame else known
-    made = _of_arm(arm.at_point(point), check_tol(tol), frame)
+    made = _of_arm(arm.at_point(point), check_tol(tol), frame, device)
     if as_flag("warn", warn) and arm.loads is not None:
         _warn_of_large_loads(arm)
     return made
+
+
+def check_device(device: Device) -> None:
+    """See that a device can compute tips.
+
+    Raises:
+        InvalidInput: There is no such kind of device.
+        MissingExtra: `softreach[cuda]` is not installed.
+        NotPossible: There is no GPU, or no driver for it.
+    """
+    if as_one_of("device", device, DEVICES) == "cuda":
+        from softreach.rod.cuda import device_name
+
+        device_name()
 
 
 def refined(tip_map: TipMap, tol: float) -> TipMap:
@@ -259,7 +289,8 @@ def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
     if not isinstance(known.rod, ArmRod):
         return tip_map
     inputs = _with_tensions(known.inputs, tol)
-    return replace(known, rod=_known_rod(known.rod.arm, tol), inputs=inputs)
+    device: Device = "cpu" if known.device == "cpu" else "cuda"
+    return replace(known, rod=_known_rod(known.rod.arm, tol, device), inputs=inputs)
 
 
 def effective(tip_map: TipMap) -> TipMap:
@@ -329,8 +360,8 @@ def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
 
 
 @lru_cache(maxsize=64)
-def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> ArmMap:
-    return _made(arm, tol, frame, _known_rod(inner_arm(arm), tol))
+def _of_arm(arm: Manipulator, tol: float, frame: Frame, device: Device) -> ArmMap:
+    return _made(arm, tol, frame, _known_rod(inner_arm(arm), tol, device))
 
 
 def _made(arm: Manipulator, tol: float, frame: Frame, rod: ArmRod) -> ArmMap:
@@ -351,8 +382,12 @@ def _with_tensions(inputs: Inputs, tol: float) -> Inputs:
 
 
 @lru_cache(maxsize=64)
-def _known_rod(inner: Manipulator, tol: float) -> ArmRod:
-    return _rod(inner, tol)
+def _known_rod(inner: Manipulator, tol: float, device: Device) -> ArmRod:
+    if device == "cpu":
+        return _rod(inner, tol)
+    from softreach.rod.cuda import CudaRod
+
+    return CudaRod.of(inner, tol)
 
 
 def _rod(inner: Manipulator, tol: float, steps: int | None = None) -> ArmRod:

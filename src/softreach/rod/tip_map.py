@@ -27,6 +27,9 @@ from softreach.support.lazy import lazy
 Status = NDArray[np.int8]
 Frame = Literal["world", "base"]
 """Frame of places: the world, or that of the base, whose z is along the straight arm."""
+Device = Literal["cpu", "cuda"]
+"""What computes tips: the processor, or a GPU of NVIDIA."""
+DEVICES: tuple[Device, ...] = ("cpu", "cuda")
 
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
@@ -116,6 +119,16 @@ class TipMap(ABC):
 
     pose: Base = UPRIGHT
     """Pose of the clamped end in the frame of places."""
+
+    @property
+    def block(self) -> int:
+        """Samples of a task."""
+        return BLOCK
+
+    @property
+    def device(self) -> str:
+        """What computes the tips: "cpu", or the name of a GPU."""
+        return "cpu"
 
     @property
     def point(self) -> Marker | None:
@@ -295,7 +308,7 @@ class TipMap(ABC):
         for name in wanted:
             shape = {"slopes": (n, 3, m), "twists": (n, 6, m), "directions": (n, 3)}.get(name, (n,))
             room[name] = np.empty(shape, np.int8 if name == "status" else float)
-        size = BLOCK
+        size = self.block
         if len(room) > 1 and wanted != ("status",):
             size //= 16 if self.supports_unstable else 8  # an equilibrium takes a search
         self.prepare()

@@ -141,7 +141,7 @@ class InvalidDesign(SoftreachError, ValueError):
 
 
 _EXTRAS = {"matplotlib": "plot", "skimage": "surface", "distributed": "cluster", "viser": "studio"}
-_EXTRAS |= {"jinja2": "report", "optuna": "search", "cmaes": "search"}
+_EXTRAS |= {"numba_cuda": "cuda", "jinja2": "report", "optuna": "search", "cmaes": "search"}
 _EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")
 """Module -> extra of softreach that brings it."""
 
@@ -153,7 +153,9 @@ class MissingExtra(SoftreachError, ImportError):
         names = dict.fromkeys(name.replace("skimage", "scikit-image") for name in modules)
         extras = ",".join(dict.fromkeys(_EXTRAS[name] for name in modules))
         them = "them" if len(names) > 1 else "it"
-        remedy = f"pip install 'softreach[{extras}]', or in a clone with: make setup"
+        remedy = f"pip install 'softreach[{extras}]'"
+        if extras != "cuda":  # which is no part of [all]
+            remedy += ", or in a clone with: make setup"
         super().__init__(f"this needs {' and '.join(names)}; install {them} with: {remedy}")
 
 

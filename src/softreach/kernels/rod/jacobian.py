@@ -42,28 +42,41 @@ def _change(rest_length, weights, a):
 
 
 @inline
-def _walk_column(work, column, table, k, j, groups):
-    """Carry one column of the Jacobian across step k, in groups of lanes of which one is in use."""
-    t = table[k, :, j]
+def weights_at(column):
+    """Changes of η dZ, u and ζ dZ at the nodes of a step, base first, in a column of its table."""
+    t = column
     lengths = (t[12], t[13], t[14]) if len(t) > BEND_ROWS else (t[0], t[4], t[8])
-    at_base, at_middle, at_tip = (
+    return (
         (t[0], t[1], t[2], t[3], lengths[0]),
         (t[4], t[5], t[6], t[7], lengths[1]),
         (t[8], t[9], t[10], t[11], lengths[2]),
     )
+
+
+@inline
+def step_column(nodes, rest_lengths, weights, omega, xi):
+    """ξ <- ξ + dexp(dΩ + [Ω, ξ]): theory (29)."""
+    base, middle, tip = nodes
+    d_omega = exponent_derivative(
+        base,
+        middle,
+        tip,
+        _change(rest_lengths[0], weights[0], base),
+        _change(rest_lengths[1], weights[1], middle),
+        _change(rest_lengths[2], weights[2], tip),
+    )
+    return add(xi, dexp(omega, add(d_omega, bracket(omega, xi))))
+
+
+@inline
+def _walk_column(work, column, table, k, j, groups):
+    """Carry one column of the Jacobian across step k, in groups of lanes of which one is in use."""
+    weights = weights_at(table[k, :, j])
     for group in range(groups):
         for lane in range(TOGETHER):
             i = group * TOGETHER + lane
-            base, middle, tip = nodes_at(work, i)
-            omega = exponent(base, middle, tip)
-            d_omega = exponent_derivative(
-                base,
-                middle,
-                tip,
-                _change(work[i], at_base, base),
-                _change(work[4 * LANES + i], at_middle, middle),
-                _change(work[8 * LANES + i], at_tip, tip),
-            )
+            nodes = nodes_at(work, i)
+            lengths = work[i], work[4 * LANES + i], work[8 * LANES + i]
             xi = (
                 column[i],
                 column[LANES + i],
@@ -72,7 +85,8 @@ def _walk_column(work, column, table, k, j, groups):
                 column[4 * LANES + i],
                 column[5 * LANES + i],
             )
-            xi = add(xi, dexp(omega, add(d_omega, bracket(omega, xi))))
+            omega = exponent(nodes[0], nodes[1], nodes[2])
+            xi = step_column(nodes, lengths, weights, omega, xi)
             for row in range(6):
                 column[row * LANES + i] = xi[row]
 

@@ -87,21 +87,22 @@ def _next_group(values, g0, g1, g2, g3, weights):
 @inline
 def nodes_at(work, i):
     """A = (ηu, ζ e3) dZ of lane i at the three nodes, base first."""
-    base, middle, tip = work[i], work[4 * LANES + i], work[8 * LANES + i]
-    at_base, at_middle, at_tip = (
-        work[12 * LANES + i],
-        work[13 * LANES + i],
-        work[14 * LANES + i],
-    )
+    at_base, at_middle, at_tip = work[12 * LANES + i], work[13 * LANES + i], work[14 * LANES + i]
     return (
-        _twist(base, work[LANES + i], work[2 * LANES + i], work[3 * LANES + i], at_base),
-        _twist(middle, work[5 * LANES + i], work[6 * LANES + i], work[7 * LANES + i], at_middle),
-        _twist(tip, work[9 * LANES + i], work[10 * LANES + i], work[11 * LANES + i], at_tip),
+        _lane(work, i, at_base),
+        _lane(work, 4 * LANES + i, at_middle),
+        _lane(work, 8 * LANES + i, at_tip),
     )
 
 
 @inline
-def _twist(rest_length, u1, u2, u3, length):
+def _lane(work, i, length):
+    return node_twist(work[i], work[LANES + i], work[2 * LANES + i], work[3 * LANES + i], length)
+
+
+@inline
+def node_twist(rest_length, u1, u2, u3, length):
+    """A = (ηu, ζ e3) dZ of η dZ, u and ζ dZ."""
     return rest_length * u1, rest_length * u2, rest_length * u3, 0.0, 0.0, length
 
 
