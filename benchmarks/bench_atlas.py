@@ -20,9 +20,8 @@ import numpy as np
 from benchmarks.memory import peak_bytes
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
-from softreach.atlas.command import Command
-from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metrics import METRIC_GROUPS, Need, chosen_metrics
+from softreach.atlas.metrics import METRIC_GROUPS, Intermediates, Need, chosen_metrics
+from softreach.atlas.space import Command
 from softreach.atlas.store import AtlasStore
 from softreach.support.errors import SoftreachWarning
 

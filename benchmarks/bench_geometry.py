@@ -103,8 +103,7 @@ def _alpha_volume(shape: AlphaComplex) -> float:
 
 
 def _shape(points: np.ndarray) -> AlphaComplex:
-    from softreach.geometry.alpha_shape import AlphaComplex
-    from softreach.geometry.delaunay import delaunay
+    from softreach.geometry.alpha_shape import AlphaComplex, delaunay
 
     return AlphaComplex(triangulation=delaunay(points))
 
@@ -194,7 +193,7 @@ def print_roofline(n: int) -> None:
 def insertable(n: int) -> np.ndarray:
     """Points of a cloud as they enter a triangulation."""
     from softreach.geometry.surface import unit_scale
-    from softreach.kernels.points.spatial_sort import insertion_order
+    from softreach.kernels.points.bowyer_watson import insertion_order
 
     points = unit_scale(arm_cloud(n))[0]
     return points[insertion_order(points)]

@@ -19,7 +19,7 @@ from benchmarks.studio_tab import print_latencies
 from softreach import tip_positions
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.drag import Drag
+from softreach.inverse.path import Drag
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene.scene import Scene
 from softreach.studio.serve import start_server, stop_server

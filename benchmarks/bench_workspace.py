@@ -45,8 +45,7 @@ def cloud(arm: sr.Manipulator, n: int) -> None:
 
 def alpha_shape(arm: sr.Manipulator, n: int) -> float:
     """Volume of the alpha shape of n tips."""
-    from softreach.geometry.alpha_shape import AlphaComplex
-    from softreach.geometry.delaunay import delaunay
+    from softreach.geometry.alpha_shape import AlphaComplex, delaunay
 
     tips = sr.compute_cloud(arm, n=n).tip.values
     return float(AlphaComplex(triangulation=delaunay(tips)).volume(ALPHA))

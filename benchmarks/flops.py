@@ -16,8 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softreach.kernels.points import bowyer_watson
-from softreach.kernels.rod.magnus import exponent
-from softreach.kernels.rod.twist import act
+from softreach.kernels.rod.magnus import act, exponent
 
 
 class Counted:

@@ -132,7 +132,7 @@ class TestDesign:
         assert ("L) within the bounds" in err) == said
 
     def test_the_schema_is_printed_for_editors(self, printed):
-        from softreach.arm.design_file.schema import json_schema
+        from softreach.arm.design_reader import json_schema
 
         assert printed("design", "--schema") == json_schema()
 
@@ -266,7 +266,7 @@ def test_json_has_null_where_there_is_no_number(capsys):
 
 class TestList:
     def test_the_names_are_those_of_the_library(self, capsys, printed):
-        from softreach.arm.material import material_names
+        from softreach.arm.section import material_names
         from softreach.atlas.metrics import METRIC_GROUPS
 
         metrics = (metric.name for group in METRIC_GROUPS.values() for metric in group)

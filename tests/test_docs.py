@@ -129,6 +129,15 @@ def test_the_navigation_and_the_pages_are_the_same():
     assert sorted(named) == [page.name for page in sorted((ROOT / "docs").rglob("*.md"))]
 
 
+def test_files_that_the_design_names_are_there():
+    named = re.findall(r"`([a-z_]+/[\w/]*)(?:\.py)?`", (ROOT / "DESIGN.md").read_text("utf-8"))
+    folders = [ROOT, *(path for path in (ROOT / "src").rglob("*") if path.is_dir())]
+    assert len(named) > 100
+    for name in {name.rstrip("/") for name in named}:
+        places = (folder / f"{name}{end}" for folder in folders for end in ("", ".py"))
+        assert any(place.exists() for place in places), name
+
+
 def test_the_readme_is_short_and_its_links_hold_on_a_package_index():
     """They are absolute, begin with the address of pyproject.toml, and lead to what exists."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")

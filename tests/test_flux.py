@@ -14,8 +14,8 @@ from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import reachable_set, volume_gradient
-from softreach.workspace.flux import face_image, signed_volume
 from softreach.workspace.image import DIAGONAL, boundary_surface
+from softreach.workspace.measure import face_image, signed_volume
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
 from tests.sets import is_closed, solid, trunk_at

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.arm.actuators.sector import ring_integrals
+from softreach.arm.actuators.fiber import ring_integrals
 from softreach.cli.app import run
 from softreach.paper import reproduce, reproduce_paper
 from softreach.paper.notebook import QUICK, Notebook, Verdict

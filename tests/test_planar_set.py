@@ -10,7 +10,7 @@ from softreach.arm.actuators import LengthTendon
 from softreach.atlas.metrics import chosen_metrics
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import flat_areas, unreachability
-from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
+from softreach.geometry.hull import alpha_area, convex_edges, enclosed_area, plane_of
 from softreach.rod.rods import as_tip_map
 from softreach.workspace import ReachableSet, reachable_set
 from tests.made_arms import one_ring_arm

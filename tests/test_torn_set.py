@@ -209,7 +209,7 @@ class FlatCusp(Cusp):
 
 
 def test_a_region_of_a_plane_has_all_sheets_up_to_their_edges(monkeypatch):
-    monkeypatch.setattr("softreach.workspace.postures._MOST_ALONG", 24)
+    monkeypatch.setattr("softreach.workspace.grid._MOST_ALONG", 24)
     region = reachable_set(FlatCusp(), accuracy=0.2)
     assert region.outline is not None
     assert region.area == pytest.approx(cusp_area(), abs=region.area_error + 0.01)

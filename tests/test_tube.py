@@ -5,8 +5,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.skin import arm_surface, bundle_skins, bundle_surfaces
-from softreach.geometry.surface import Surface
-from softreach.geometry.tube import grid_faces, ribbon_surface, tube_surface
+from softreach.geometry.surface import Surface, grid_faces, ribbon_surface, tube_surface
 from softreach.rod.kinematics import rest_configuration
 from softreach.support.errors import InvalidInput
 from tests.sets import mesh_of

@@ -10,8 +10,8 @@ from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
-from softreach.workspace.flux import signed_volume
 from softreach.workspace.gradient import boundary_samples
+from softreach.workspace.measure import signed_volume
 from softreach.workspace.reach import rasterized_set
 from softreach.workspace.tip_derivatives import TipDerivatives
 from tests.bodies import rubber

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from softreach.arm.material import MaterialRecord, material_names, material_record
+from softreach.arm.section import MaterialRecord, material_names, material_record
 
 PAGE = Path(__file__).parent.parent / "docs" / "materials.md"
 BEGIN, END = "<!-- table: python -m tools.materials -->\n", "<!-- end of the table -->\n"

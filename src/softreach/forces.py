@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.actuators import LengthTendon
 from softreach.arm.manipulator import Manipulator
-from softreach.force_growth import Grown, Growth, Stop
+from softreach.force_growth import Grown, Growth, PushingTip, Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import as_activations
-from softreach.rod.loaded.pushing_tip import PushingTip
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap

@@ -9,7 +9,7 @@ import pytest
 import softreach as sr
 from softreach.arm.designs import minimal_trunk
 from softreach.cli.app import run
-from softreach.geometry.delaunay import local_dimension
+from softreach.geometry.alpha_shape import local_dimension
 from tests.abuse.refusals import raised_by
 from tests.laws import arm_of
 

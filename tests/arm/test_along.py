@@ -23,9 +23,9 @@ from softreach.arm import (
     Samples,
     Section,
 )
-from softreach.arm.along import AlongArm
 from softreach.arm.lines import limit_shortening, line_lengths, line_strains
 from softreach.arm.parameters import changed, parameters
+from softreach.arm.part import AlongArm
 from softreach.support.errors import InvalidDesign
 from tests.kinds import angles_along, fibers_and_a_tendon, profiles, stations, values_at
 from tests.laws import arms, in_box, tensions_of_lengths

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm.base import POINTS
-from softreach.arm.design_file.keys import keys_of
+from softreach.arm.design_file import keys_of
 from softreach.arm.parameters import Written
 from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidDesign

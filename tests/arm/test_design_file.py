@@ -28,8 +28,8 @@ from softreach.arm import (
     Section,
     Tendon,
 )
-from softreach.arm.design_file.schema import json_schema
-from softreach.arm.material import named_material
+from softreach.arm.design_reader import json_schema
+from softreach.arm.section import named_material
 from tests.cable import Cable
 from tests.kinds import any_arms
 from tests.laws import bases

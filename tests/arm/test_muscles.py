@@ -20,7 +20,7 @@ from softreach.arm import (
     SectorActuator,
     designs,
 )
-from softreach.arm.along import AlongArm
+from softreach.arm.part import AlongArm
 from softreach.arm.tables import tables
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.summary import describe

@@ -13,8 +13,8 @@ from tools.materials import page_with_table
 
 import softreach as sr
 from softreach.arm import designs
-from softreach.arm.bending import sharpest_bending
-from softreach.arm.material import material_names, material_record, named_material
+from softreach.arm.section import material_names, material_record, named_material
+from softreach.rod.bending import sharpest_bending
 from softreach.support.errors import InvalidInput
 from tests.laws import in_box
 
@@ -224,7 +224,7 @@ def test_an_unknown_name_is_refused_with_names_that_come_close(spelling):
 
 
 def test_a_name_like_no_other_is_refused_with_where_the_names_are():
-    with pytest.raises(InvalidInput, match=r"arm\.material\.material_names\(\)") as error:
+    with pytest.raises(InvalidInput, match=r"softreach\.arm\.material_names\(\)") as error:
         named_material("xyz")
     assert "did you mean" not in str(error.value)
     assert len(str(error.value)) < 160

@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 
 from softreach.arm import designs
 from softreach.arm.actuators import Chamber, FiberArchitecture, Tendon
-from softreach.arm.along import Samples
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.material import Material
 from softreach.arm.parameters import Written, changed, find_parameter, parameters, shifted
+from softreach.arm.part import Samples
 from softreach.arm.profile import PiecewiseTaper
-from softreach.arm.section import Measured, Ring, Section, name_faults
+from softreach.arm.section import Material, Measured, Ring, Section, name_faults
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.cable import Cable

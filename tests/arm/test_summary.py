@@ -25,12 +25,17 @@ from softreach.arm import (
     Tendon,
     designs,
 )
-from softreach.arm.actuators.sector import ring_integrals
-from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
+from softreach.arm.actuators.fiber import ring_integrals
 from softreach.arm.driving import extension_range
 from softreach.arm.tables import check_extension, tables
 from softreach.requirements import Limits, Requirements
-from softreach.rod.bending import bending_over_bounds
+from softreach.rod.bending import (
+    bending_at,
+    bending_over_bounds,
+    largest_bending,
+    sharpest_bending,
+    smallest_bending,
+)
 from softreach.rod.rods import as_tip_map
 from softreach.rod.summary import describe, design_warnings
 from softreach.support.errors import InvalidDesign

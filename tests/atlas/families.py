@@ -5,8 +5,8 @@ import xarray as xr
 
 import softreach as sr
 from softreach.atlas import DesignSpace
-from softreach.atlas.command import Command
 from softreach.atlas.metrics import chosen_metrics
+from softreach.atlas.space import Command
 
 SMALL = {"n": 2_000, "alpha_over_length": 0.5}
 SMALL["metrics"] = ("extent", "convex", "concave", "curvature")

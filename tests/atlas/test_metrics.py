@@ -165,13 +165,12 @@ def test_what_metrics_share_is_computed_once_for_each_design(tmp_path, monkeypat
 
         monkeypatch.setattr(owner, name, counted)
 
-    shared = ("delaunay", "stream_statistics")
+    shared = ("delaunay", "stream_statistics", "reachable_set")
     for name in shared:
-        counting(import_module("softreach.atlas.intermediates"), name)
-    counting(import_module("softreach.workspace"), "reachable_set")
+        counting(import_module("softreach.atlas.metrics"), name)
     counting(TipMap, "tips_and_status")
     built_with(tuple(METRIC_GROUPS), tmp_path, accuracy=0.1)
-    assert calls == dict.fromkeys([*shared, "reachable_set", "tips_and_status"], 4)
+    assert calls == dict.fromkeys([*shared, "tips_and_status"], 4)
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def test_so_is_a_cloud(tmp_path, trunk):
 def test_a_metric_that_a_later_version_has_does_not_stop_an_atlas(tmp_path, monkeypatch):
     settings = {**TINY, "metrics": ["extent"], "keep_clouds": False}
     with monkeypatch.context() as older:
-        older.setattr("softreach.atlas.command.version", lambda _: "0.0.9")
+        older.setattr("softreach.atlas.space.version", lambda _: "0.0.9")
         older.setitem(METRIC_GROUPS, "extent", METRIC_GROUPS["extent"][:-1])
         begun = build_atlas(small_space(), tmp_path / "a.zarr", **settings).load()
     with pytest.warns(SoftreachWarning, match=r"begun by softreach 0\.0\.9"):

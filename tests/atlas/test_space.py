@@ -94,6 +94,8 @@ def test_written_spaces_speak_in_degrees_and_ranges():
     same = parse_space(units, builtin)
     for number in range(space.size):
         assert same.values(number) == pytest.approx(space.values(number), rel=1e-15)
+    latin = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
+    assert parse_space(latin, builtin).shape == (5,)
 
 
 @pytest.mark.parametrize(
@@ -108,12 +110,6 @@ def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
     space = parse_space(f"design = 'redundant_trunk'\n{table}", builtin)
     wanted = {"left.offset": np.radians(60), "longitudinal 1.bundles": 2}
     assert space.values(0) == pytest.approx(wanted)
-
-
-def test_sampled_spaces_can_be_written_too():
-    text = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
-    space = parse_space(text, builtin)
-    assert (space.dims, space.shape) == (("design",), (5,))
 
 
 def test_a_space_prints_its_parameters_with_their_ends():

@@ -16,8 +16,8 @@ import pytest
 
 import softreach as sr
 from softreach.atlas import DesignSpace, StoreFailed, atlas_cloud, atlas_status, build_atlas
-from softreach.atlas.command import Command
-from softreach.atlas.intermediates import Intermediates
+from softreach.atlas.metrics import Intermediates
+from softreach.atlas.space import Command
 from softreach.atlas.store import AtlasStore
 from softreach.rod import TipMap
 from softreach.support.errors import InvalidInput, SoftreachError, SoftreachWarning

@@ -11,8 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from softreach.geometry import alpha_shape
-from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
-from softreach.geometry.delaunay import delaunay
+from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull, delaunay
 from softreach.geometry.hull import Hull, convex_hull
 from softreach.geometry.surface import enclosed_volume
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points

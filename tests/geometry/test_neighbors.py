@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softreach.geometry import neighbors
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay
+from softreach.geometry.alpha_shape import AlphaComplex, delaunay
 from softreach.geometry.neighbors import mean_value_distance
 from softreach.geometry.surface import Surface, enclosed_volume, parted, plane_cut, volume_beyond
 from softreach.kernels.points.neighbor_sums import stable_order

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import Delaunay, delaunay
+from softreach.geometry.alpha_shape import AlphaComplex, Delaunay, delaunay
 from softreach.geometry.sphere_maps import (
     icosphere,
     is_axisymmetric,
@@ -19,7 +18,6 @@ from softreach.geometry.sphere_maps import (
 )
 from softreach.geometry.surface import unit_scale
 from softreach.kernels.points.bowyer_watson import triangulate
-from softreach.kernels.points.expansions import scratch
 from softreach.kernels.points.predicates import (
     collinear,
     insphere,
@@ -28,6 +26,7 @@ from softreach.kernels.points.predicates import (
     orient,
     orient_exact,
     orient_filter,
+    scratch,
 )
 from softreach.kernels.points.triangulation import FACES, FEW
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points

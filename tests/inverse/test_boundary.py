@@ -6,8 +6,7 @@ from benchmarks.adversarial_inverse import activations, boundary_tips, bounded_d
 
 from softreach.arm import Loads, designs
 from softreach.inverse import PathStatus, Status, solve_inverse
-from softreach.inverse.drag import Drag
-from softreach.inverse.path import track_path
+from softreach.inverse.path import Drag, track_path
 from softreach.rod import as_tip_map, tip_positions
 
 TOL = 1e-6

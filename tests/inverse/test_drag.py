@@ -6,7 +6,7 @@ import pytest
 import softreach as sr
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.inverse.drag import Drag
+from softreach.inverse.path import Drag
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipStatus
 

@@ -5,8 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
-from softreach.kernels.image.activation_mesh import ActivationMesh, interpolation_errors
+from softreach.kernels.image.activation_mesh import (
+    ActivationMesh,
+    corner_bits,
+    interpolation_errors,
+    kuhn_simplices,
+)
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softreach.inverse.cells import ImageLeaves, image_tree
+from softreach.inverse.prepared import ImageLeaves, image_tree
 from softreach.kernels.branches import candidates, newton
-from softreach.kernels.branches.candidates import MOST_STARTS, find_starts
-from softreach.kernels.branches.space_tree import SpaceTree, leaf_at
+from softreach.kernels.branches.candidates import MOST_STARTS, SpaceTree, find_starts, leaf_at
 from softreach.kernels.image.activation_mesh import ActivationMesh
 from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic, sampled
 

@@ -13,9 +13,9 @@ from softreach.kernels.parts import KernelDispatcher
 
 ROD = {"tips._tips"}
 SLOPES = ROD | {"slopes._slopes"}
-HULL = {"spatial_sort._sort_keys", "bowyer_watson._insert"}
+HULL = {"bowyer_watson._sort_keys", "bowyer_watson._insert"}
 HULL |= {f"alpha.{name}" for name in ("measure_cells", "boundary_faces", "join_regions")}
-REACH = {"contour.stretches", "contour.critical_triangles"}
+REACH = {"raster.stretches", "raster.critical_triangles"}
 REACH |= {f"raster.{name}" for name in ("most_crossings", "crossings", "add_counts")}
 MESH = {"activation_mesh.interpolation_errors", "activation_mesh.face_planes"}
 OF_NEWTON = ("newton_step", "conditions", "merge_equal", "second_preimages")
@@ -32,7 +32,7 @@ KERNELS = {
 TWICE = {
     "vector.combination",  # of twists and of vectors
     "vector.cross",  # `inline` and `strict`
-    "spatial_sort._reflect",  # with low bits of two types
+    "bowyer_watson._reflect",  # with low bits of two types
 }
 """Functions that are compiled for two sets of types."""
 

@@ -12,17 +12,17 @@ from softreach import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.driving import extension_range
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.cells import activation_cells
-from softreach.inverse.seeds import Seeds
-from softreach.kernels.box.simplices import (
+from softreach.inverse.prepared import Seeds, activation_cells
+from softreach.kernels.image import raster
+from softreach.kernels.image.activation_mesh import (
+    ActivationMesh,
     chains,
     corner_bits,
     corner_steps,
+    face_planes,
     kuhn_simplices,
     strides,
 )
-from softreach.kernels.image import contour, raster
-from softreach.kernels.image.activation_mesh import ActivationMesh, face_planes
 from softreach.rod import as_tip_map, tip_positions
 from softreach.support.arrays import rows
 from tests.inverse.test_many_bundles import six_bundles
@@ -38,16 +38,16 @@ def grid(cells: tuple[int, ...]) -> np.ndarray:
 
 
 def critical(vertices: np.ndarray, cells: tuple[int, ...], stretches: np.ndarray) -> np.ndarray:
-    star = contour.stars(cells)
+    star = raster.stars(cells)
     out = np.empty((len(vertices) * len(star.triangles), 5), np.int64)
     whole = np.zeros(len(vertices), bool)
     part = np.array(cells), whole, 0, len(vertices)
-    return out[: contour.critical_triangles(vertices, stretches, *part, star, out)]
+    return out[: raster.critical_triangles(vertices, stretches, *part, star, out)]
 
 
 def counts(vertices: np.ndarray, cells: tuple[int, ...], size: int) -> tuple[np.ndarray, ...]:
     """Cover counts and degrees at the centers UNIT · (i, j, k), i, j, k < size."""
-    stretches = contour.stretches(vertices, np.array(cells))
+    stretches = raster.stretches(vertices, np.array(cells))
     triangles = critical(vertices, cells, stretches)
     out = raster.empty_crossings(raster.most_crossings(vertices, triangles, UNIT, 0, 1))
     used = raster.crossings(vertices, triangles, UNIT, 2, size, out)
@@ -156,7 +156,7 @@ def test_points_and_centers_of_any_map_are_counted_alike(seed):
     cells = (2, 2, 1)
     vertices = rng.integers(64, 700, (18, 3)).astype(float)
     cover, degree = counts(vertices, cells, 12)
-    triangles = critical(vertices, cells, contour.stretches(vertices, np.array(cells)))
+    triangles = critical(vertices, cells, raster.stretches(vertices, np.array(cells)))
     at = rng.integers(0, 12, (9, 3))
     members, starts = raster.bin_triangles(vertices, triangles, UNIT, (12, 12))
     found = np.empty(9, np.int64)
@@ -172,7 +172,7 @@ def test_stretches_are_the_determinant_of_a_quadratic_map():
     x, y, z = grid(cells).T
     vertices = np.column_stack([8 * x + 3 * x * x, 5 * y - x, 7 * z - 2 * z * z + y])
     expected = (8 + 6 * x) * 5 * (7 - 4 * z)
-    assert contour.stretches(vertices, np.array(cells)) == pytest.approx(8 * expected)
+    assert raster.stretches(vertices, np.array(cells)) == pytest.approx(8 * expected)
 
 
 # Starts among seeds with tips near a target, against the same choice in NumPy

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from softreach.geometry.delaunay import Delaunay
+from softreach.geometry.alpha_shape import Delaunay
 from softreach.geometry.surface import unit_scale
 
 EXCHANGED = np.array([1, 0, 2, 3])

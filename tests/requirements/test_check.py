@@ -178,7 +178,7 @@ def test_the_share_of_a_region_is_that_of_its_volume():
 
 
 def test_limits_without_targets_are_those_of_all_bounds():
-    from softreach.arm.bending import sharpest_bending
+    from softreach.rod.bending import sharpest_bending
 
     (finding,) = checked(limits=Limits(bending=0.1)).findings
     assert finding.excess == pytest.approx(sharpest_bending(ARM).value / 0.1 - 1.0)

@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import softreach as sr
-from softreach.kernels.rod import reference
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import as_tip_map
 from softreach.support.errors import InvalidInput
 from tests.kinds import fibers_and_a_tendon
 from tests.laws import arms, in_box
+from tests.oracles import free_rod as reference
 
 
 def nodes_of(arm, tol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from softreach.arm import Base, Chamber, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.cloud.curvature import stream_statistics
+from softreach.kernels.loaded.shooting import solve_frames
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.postures import Postures
 from softreach.rod.loaded.rod import LoadedRod
@@ -71,6 +73,24 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
         np.testing.assert_allclose(shapes.position[k], expected.place, atol=2e-9)
         np.testing.assert_allclose(shapes.directors[k], expected.frame, atol=1e-8)
         np.testing.assert_allclose(moment, expected.moment, atol=5e-8)
+
+
+@pytest.mark.parametrize("kind", ["force that follows", "along the arm"])
+def test_a_newton_step_squares_the_error_of_the_nodes_between_segments(kind):
+    rod = loaded(KINDS[kind])
+    tables, gamma = replace(rod.tables, longest=0.3 * rod.tables.phase.entire), GAMMA[:1]
+    known = Solver(tables, rod.steps, 1e-9).search(gamma, None).frame
+    ways = np.random.default_rng(0).normal(size=(tables.segments, 3))
+    assert tables.segments == 4
+    misses, out = [], np.empty((1, 5 + tables.frame_size))
+    for angle in (2e-2, 1e-2):
+        frames = known.reshape(-1, 2, 3)
+        turned = frames + angle * np.cross(ways[:, None], frames)
+        steps, limits = tuple(tables.uniform(rod.steps)), (np.inf, 0.0, 0.0)  # which end no search
+        arm = gamma, tables.axes, tables.at_tip, turned.reshape(1, -1), steps
+        solve_frames(*arm, limits, (1, 0), np.ones(1), out)
+        misses.append(np.linalg.norm(out[:, 3:-2] - known))
+    assert 3.6 < misses[0] / misses[1] < 4.4
 
 
 PULLS = {

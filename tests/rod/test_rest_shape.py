@@ -13,11 +13,11 @@ from scipy.integrate import solve_ivp
 import softreach as sr
 from softreach.arm import FiberArchitecture, ObliqueMuscle, Pieces, RestShape, Samples, Tendon
 from softreach.arm.base import POINTS
-from softreach.arm.bending import bending_at
 from softreach.arm.loads import PointLoad
 from softreach.forces import blocked_force
 from softreach.rest import rest
 from softreach.rod import as_tip_map
+from softreach.rod.bending import bending_at
 from softreach.rod.rods import free_bundles
 from softreach.stiffness import cloud_compliance, tip_compliance
 from softreach.support.errors import InvalidInput

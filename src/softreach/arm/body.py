@@ -16,10 +16,9 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.actuators.actuator import MOST_BUNDLES, MOST_TURN, Actuator, Outline, Resultants
-from softreach.arm.along import Samples, values_along
 from softreach.arm.loads import Loads
 from softreach.arm.number import number
-from softreach.arm.part import Part, faults_under, gathered, kind_faults
+from softreach.arm.part import Part, Samples, faults_under, gathered, kind_faults, values_along
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section, Stiffness, name_faults
 from softreach.arm.stations import Located, RigidPiece, Stations, placed

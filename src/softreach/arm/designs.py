@@ -15,10 +15,9 @@ from softreach.arm.actuators import (
     Tendon,
 )
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.material import Material, named_material
 from softreach.arm.number import fields_of
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.section import Ring, Section
+from softreach.arm.section import Material, Ring, Section, named_material
 from softreach.support.arguments import as_instance, as_integer, as_number
 
 __all__ = [

@@ -10,16 +10,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm import design_file
+from softreach.arm import design_file, design_reader
 from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator, Tendon
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.body import Body, actuator_faults, behind, mass
 from softreach.arm.drives import Drive, drive_faults
-from softreach.arm.material import Material
 from softreach.arm.part import gathered, kind_faults
 from softreach.arm.profile import LinearTaper
-from softreach.arm.section import Ring, Section, name_faults
+from softreach.arm.section import Material, Ring, Section, name_faults
 from softreach.arm.stations import Marker
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path, as_text, plain
 from softreach.support.arrays import Array, read_only
@@ -238,7 +237,7 @@ class Manipulator(Body):
         Raises:
             InvalidDesign: The text's faults, all of them, in the file's own names and units.
         """
-        return design_file.read(as_text("text", text), as_text("source", source), cls)
+        return design_reader.read(as_text("text", text), as_text("source", source), cls)
 
     def to_toml(self) -> str:
         """The design as the text of a file, from which `from_toml` makes an equal one.
@@ -266,7 +265,7 @@ class Manipulator(Body):
             SoftreachWarning: A length or a radius that may be in another unit.
         """
         source = as_path("path", path)
-        arm = cls.from_toml(design_file.text_of(source), source=source)
+        arm = cls.from_toml(design_reader.text_of(source), source=source)
         for text in scale_warnings(arm):
             warn(f"{source}: {text}")
         return arm

@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from softreach.arm.actuators import FiberArchitecture
-from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.material import Material
 from softreach.arm.number import Number, alternatives, fields_of, unit_suffix
-from softreach.arm.part import gathered
+from softreach.arm.part import AlongArm, gathered
 from softreach.arm.profile import LinearTaper
-from softreach.arm.section import Ring
+from softreach.arm.section import Material, Ring
 from softreach.support.arguments import as_instance, as_text, plain
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean
 from softreach.support.quantity import read_quantity, unit_names

@@ -14,9 +14,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.along import Samples
 from softreach.arm.number import number, series_faults, stations
-from softreach.arm.part import Part
+from softreach.arm.part import Part, Samples
 from softreach.support.arguments import plain
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import Fault, InvalidDesign, Range

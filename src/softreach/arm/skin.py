@@ -13,8 +13,7 @@ from softreach.arm.actuators import Tendon
 from softreach.arm.base import Base
 from softreach.arm.body import Body
 from softreach.arm.stations import Marker
-from softreach.geometry.surface import Surface
-from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
+from softreach.geometry.surface import Surface, grid_faces, joined, ribbon_surface, tube_surface
 from softreach.picture import Skin, html_card
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput

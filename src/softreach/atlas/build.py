@@ -16,11 +16,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from zarr.storage import MemoryStore, StoreLike  # noqa: TID253  (imported where stores are)
 
-from softreach.atlas.command import Command
-from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metrics import METRIC_GROUPS, Metric, Need, chosen_metrics
+from softreach.atlas.metrics import METRIC_GROUPS, Intermediates, Metric, Need, chosen_metrics
 from softreach.atlas.reading import a_store, contents, open_atlas, over_length
-from softreach.atlas.space import DesignSpace
+from softreach.atlas.space import Command, DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
 from softreach.rod.rods import check_device
 from softreach.rod.tip_map import Device, check_tol, no_equilibrium_message
@@ -154,11 +152,9 @@ def begin_design(store: AtlasStore, index: int) -> Callable[[], Outcome]:
     All threads compute the tips of one design while the hulls of others are computed, one on each
     thread. A failure of the design is stored and returned, one of the store is raised.
     """
-    command = store.command
     try:
-        needed = Intermediates(command.space.design(index), store.cube, command)
-        threaded = [metric for metric in command.metrics if Need.REACHABLE_SET in metric.needs]
-        values = _values(threaded, needed, command)  # none but NaN where nothing is stable
+        needed = Intermediates(store.command.space.design(index), store.cube, store.command)
+        values = _values(needed, store.command, of_sets=True)
         needed.computed.pop(Need.REACHABLE_SET, None)  # frees memory
     except StoreFailed:
         raise
@@ -169,28 +165,27 @@ def begin_design(store: AtlasStore, index: int) -> Callable[[], Outcome]:
 
 @errors.no_warnings()
 def _finish(store: AtlasStore, index: int, needed: Intermediates, values: Values) -> Outcome:
-    command, stable = store.command, needed.stable
     try:
-        rest = [metric for metric in command.metrics if metric.name not in values]
-        values |= _values(rest, needed, command)
-        tips = needed.tips if command.keep_clouds else None
+        values |= _values(needed, store.command, of_sets=False)
+        tips = needed.tips if store.command.keep_clouds else None
     except Exception as error:
         return _fail(store, index, error)
-    if stable.any():
-        store.write(index, values, tips)
-    else:
-        store.write(index, values, tips, UNSTABLE, no_equilibrium_message(len(stable)))
+    stable, why = needed.stable, ""
+    if not stable.any():
+        why = no_equilibrium_message(len(stable))
+    store.write(index, values, tips, UNSTABLE if why else DONE, why)
     return index, ""
 
 
-def _values(metrics: Sequence[Metric], needed: Intermediates, command: Command) -> Values:
+def _values(needed: Intermediates, command: Command, *, of_sets: bool) -> Values:
     """Metrics by name; where no sample is stable there is none but the share that is lost."""
     sizes, is_stable = command.profile_sizes, needed.stable.any()
     return {
         metric.name: metric.value(needed, sizes)
         if is_stable or metric.needs == (Need.LOST_SHARE,)
         else np.full([sizes[dim] for dim in metric.over], np.nan)
-        for metric in metrics
+        for metric in command.metrics
+        if (Need.REACHABLE_SET in metric.needs) == of_sets
     }
 
 
@@ -312,10 +307,9 @@ def _shard_of(name: str, value: Any) -> tuple[int, int]:
 
 def _warn_of_metrics(built: xr.Dataset) -> None:
     if len(unstable := np.flatnonzero(built["status"].values == UNSTABLE)):
-        first = built[["number", "message"]].stack(all=built["status"].dims, create_index=False)
-        first = first.isel(all=unstable[0])
+        number, message = (built[x].values.flat[unstable[0]] for x in ("number", "message"))
         without = f"{errors.counted(len(unstable), 'design')} without metrics"
-        errors.warn(f"{without}, first number {first['number'].item()}: {first['message'].item()}")
+        errors.warn(f"{without}, first number {number}: {message}")
     radius = built.volume.attrs["alpha_over_length"] if "spacing" in built else 0.0
     if radius and (sparse := int((radius < 3.0 * over_length(built, "spacing")).sum())):
         whose = "its volume is" if sparse == 1 else "their volumes are"

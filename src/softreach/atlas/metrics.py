@@ -1,25 +1,37 @@
-"""Metrics of softreach: one table of name, unit, meaning, function and needs, in groups."""
+"""Metrics of softreach: one table of name, unit, meaning, function and needs, in groups.
+
+What they need of a design is computed once each, at its first use.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
-from functools import partial
+from functools import cached_property, partial
 from itertools import chain
 from operator import attrgetter
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from softreach.cloud.curvature import QUANTITIES
+from softreach.arm.manipulator import Manipulator
+from softreach.cloud.curvature import QUANTITIES, stream_statistics
 from softreach.cloud.volume import flat_areas
-from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.geometry.alpha_shape import AlphaComplex, delaunay
+from softreach.geometry.hull import convex_hull
+from softreach.rod.rods import as_tip_map, with_unstable
+from softreach.rod.tip_map import Device, TipMap, TipStatus
+from softreach.sampling import sample_cube
 from softreach.support import plugins
-from softreach.support.arguments import as_given, as_instance, as_text
-from softreach.support.arrays import Array
+from softreach.support.arguments import as_function, as_given, as_instance, as_text
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, SoftreachError, warn
+from softreach.workspace import reachable_set
 
 PROFILE = ("station", "quantile")
+_BLOCK = 65_536  # samples at a time, where not all of them are needed at once
+_TOL = 1e-6  # of tips, in L
+_SPACINGS = 1.6  # of samples that fill the box evenly, over L: radius of the alpha shape
 
 
 class Need(Enum):
@@ -67,15 +79,14 @@ class Metric:
     def __post_init__(self) -> None:
         if not as_text("name of the metric", self.name).isidentifier():
             raise InvalidInput("name of the metric", self.name, "letters, digits and underscores")
-        for field in ("unit", "meaning", "nan_if"):
-            as_text(f"{field} of metric {self.name}", getattr(self, field))
+        for what in ("unit", "meaning", "nan_if"):
+            as_text(f"{what} of metric {self.name}", getattr(self, what))
+        as_function(f"compute of metric {self.name}", self.compute)
         as_instance(f"needs of metric {self.name}", self.needs, (tuple, list), "a tuple")
-        object.__setattr__(self, "needs", tuple(self.needs))
         if not all(isinstance(need, Need) for need in self.needs):
             allowed = f"some of Need.{', Need.'.join(Need.__members__)}"
             raise InvalidInput(f"needs of metric {self.name}", self.needs, allowed)
-        if not callable(self.compute):
-            raise InvalidInput(f"compute of metric {self.name}", self.compute, "a function")
+        object.__setattr__(self, "needs", tuple(self.needs))
         if self.over not in ((), PROFILE):
             raise InvalidInput(f"over of metric {self.name}", self.over, f"() or {PROFILE}")
 
@@ -107,15 +118,9 @@ class Metric:
 
         Two metrics with equal values here are the same to a store.
         """
-        return {
-            "name": self.name,
-            "unit": self.unit,
-            "meaning": self.meaning,
-            "needs": [need.name for need in self.needs],
-            "over": list(self.over),
-            "nan_if": self.nan_if,
-            "compute": place_of(self.compute),
-        }
+        plain = {name: getattr(self, name) for name in ("name", "unit", "meaning")}
+        plain |= {"needs": [need.name for need in self.needs], "over": list(self.over)}
+        return plain | {"nan_if": self.nan_if, "compute": place_of(self.compute)}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
@@ -156,9 +161,8 @@ def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
         same = chosen.setdefault(metric.name, metric) == metric
         if not same or _KNOWN.get(metric.name, metric) != metric:
             raise InvalidInput("name of a metric", metric.name, "the name of one metric only")
-    order = list(_KNOWN)
-    own = sorted(name for name in chosen if name not in _KNOWN)
-    return tuple(chosen[name] for name in [*order, *own] if name in chosen)
+    order = dict.fromkeys([*_KNOWN, *sorted(chosen)])
+    return tuple(chosen[name] for name in order if name in chosen)
 
 
 def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
@@ -324,3 +328,100 @@ METRIC_GROUPS = {
 
 _KNOWN = {metric.name: metric for group in METRIC_GROUPS.values() for metric in group}
 _ALLOWED = f"some of {', '.join(METRIC_GROUPS)}, or metrics of your own"
+
+
+class Settings(NamedTuple):
+    """What the command of an atlas says of the metrics of many designs, for a single one."""
+
+    tol: float  # Error of tips over L
+    accuracy: float  # Relative error of volumes of reachable sets
+    alpha_over_length: float  # Radius of alpha shapes over L
+    stations: tuple[float, ...] = (1.0,)  # Over L, where curvatures are taken
+    quantiles: tuple[float, ...] = (0.5,)  # Of these
+    metrics: tuple[Metric, ...] = ()  # That will be computed
+    device: Device = "cpu"  # Of tips
+
+
+@dataclass(eq=False)
+class Intermediates:
+    """Need -> its value for one design, computed at first use."""
+
+    arm: Manipulator
+    cube: Array  # Unit activations that all designs share, shape (n, bundles)
+    command: Any  # Settings, or a `Command` that has them
+    known_set: Callable[[], Any] | None = None  # Source of the reachable set, if it is known
+    computed: dict[Need, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of_one(cls, arm: Manipulator, n: int, accuracy: float, sets: Callable[[], Any]) -> Self:
+        """Of one design, with a radius of alpha shapes that its samples, a power of 2, allow."""
+        cube = sample_cube("sobol", n, max(arm.inputs, 1))
+        alpha = _SPACINGS / float(np.cbrt(n))
+        return cls(arm, cube, Settings(_TOL, accuracy, alpha), sets)
+
+    @cached_property
+    def rod(self) -> TipMap:
+        """The tip map of the design, to the tolerance of the command."""
+        return as_tip_map(self.arm, self.command.tol, device=self.command.device)
+
+    @cached_property
+    def tips(self) -> Array:
+        """Tips of all samples [m], shape (n, 3); NaN where there is no equilibrium."""
+        return self._samples[0]
+
+    @cached_property
+    def stable(self) -> Mask:
+        """Mask of the samples that have a stable equilibrium, shape (n,)."""
+        if not self.rod.supports_unstable:  # the tips may not be needed
+            return np.ones(len(self.cube), bool)
+        return self._samples[1] == TipStatus.STABLE
+
+    @cached_property
+    def _samples(self) -> tuple[Array, Any]:
+        return with_unstable(self.rod).tips_and_status(activations_of(self.rod, self.cube))
+
+    def __getitem__(self, need: Need) -> Any:
+        if need not in self.computed:
+            self.computed[need] = _COMPUTE[need](self)
+        return self.computed[need]
+
+
+def activations_of(rod: TipMap, cube: Array) -> Array:
+    """The shared unit activations in the bounds of a tip map, shape (n, bundles)."""
+    return rod.box.from_cube(cube[:, : rod.box.bundles])
+
+
+def _stable(of: Intermediates, values: Array) -> Array:
+    """Those of the samples that have a stable equilibrium; not copied if all have."""
+    return values if of.stable.all() else values[of.stable]
+
+
+def _convex_volume(of: Intermediates) -> float:
+    """From the triangulation, if one is needed anyway."""
+    if any(Need.ALPHA_COMPLEX in metric.needs for metric in of.command.metrics):
+        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
+    return convex_hull(of[Need.TIPS]).volume
+
+
+def _strain_statistics(of: Intermediates) -> Any:
+    rod, cube = of.rod, _stable(of, of.cube)
+    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
+    stations = np.array(of.command.stations) * rod.length
+    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
+
+
+_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
+    Need.ARM: lambda of: of.arm,
+    Need.LENGTH: lambda of: of.arm.length,
+    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
+    Need.TIPS: lambda of: _stable(of, of.tips),
+    Need.BASE_TIPS: lambda of: of.arm.base.to_base(of[Need.TIPS]),
+    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
+    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
+    Need.ALPHA_COMPLEX: lambda of: AlphaComplex(triangulation=delaunay(of[Need.TIPS])),
+    Need.CONVEX_VOLUME: _convex_volume,
+    Need.REACHABLE_SET: lambda of: (
+        of.known_set() if of.known_set else reachable_set(of.rod, accuracy=of.command.accuracy)
+    ),
+    Need.STRAIN_STATISTICS: _strain_statistics,
+}

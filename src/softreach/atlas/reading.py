@@ -16,9 +16,8 @@ from zarr.storage import StoreLike, StorePath  # noqa: TID253
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import from_written, written_name
-from softreach.atlas.command import Command
-from softreach.atlas.intermediates import activations_of
-from softreach.atlas.metrics import Need
+from softreach.atlas.metrics import Need, activations_of
+from softreach.atlas.space import Command
 from softreach.atlas.store import ABOUT, DAMAGED, EXPLAINED, KNOWN, OF, PER_DESIGN, AtlasStore
 from softreach.rod.rods import as_tip_map, with_unstable
 from softreach.schema import cloud_dataset, stored_names, with_status
@@ -181,8 +180,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """
     opened = opened_atlas(atlas, metrics=False)
     command = command_of(opened)
-    kept = [name for name in ("status", "number", "tip") if name in opened]
-    row = _nearest(opened[kept], at)
+    row = _nearest(opened[[name for name in ("status", "number", "tip") if name in opened]], at)
     if (status := int(row["status"])) not in KNOWN:
         raise InvalidInput("design", at, "done", f"its status is {status}")
     arm = command.space.design(int(row["number"]))
@@ -242,8 +240,7 @@ class Contents(NamedTuple):
     """Contents of an atlas but its tips, each chunk checked."""
 
     status: NDArray[np.uint8]  # DAMAGED for designs of which a chunk is, shape (designs,)
-    messages: dict[int, str]
-    """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
+    messages: dict[int, str]  # As `AtlasStatus` has them
     tables: dict[str, Any]  # Arrays `metrics` and `curvature`; fill values where they are damaged
 
     def warn_of_damage(self, then: str) -> None:
@@ -280,12 +277,8 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
         return chunk.array != "status" and bool(of_designs[store.number(chunk)])
 
     store.opened.required = required
-    names = ("metrics", "curvature") if command.profiles else ("metrics",)
-    tables = {
-        name: read(name) if known.any() else np.full(store.array(name).shape, np.nan)
-        for name in names
-        if metrics
-    }
+    names = ["metrics", *["curvature"] * bool(command.profiles)] if metrics else []
+    tables = {x: read(x) if known.any() else np.full(store.array(x).shape, np.nan) for x in names}
     for index in tips_of if command.keep_clouds else ():
         if known[index]:
             read("tip", place_of(index))
@@ -344,8 +337,8 @@ def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
 def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
     names = ("todo", "done", "failed", "gaps", "unstable", "damaged")  # in the order of the status
     counts: Any = zip(names, np.bincount(status, minlength=len(names)).tolist(), strict=True)
-    told = {"tips_verified": tips_verified, "messages": messages}
-    return AtlasStatus(designs=status.size, **dict(counts), **told)
+    known = {"tips_verified": tips_verified, "messages": messages}
+    return AtlasStatus(designs=status.size, **dict(counts), **known)
 
 
 def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
@@ -388,11 +381,9 @@ def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
 
 
 def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
-    """Status, messages, and the metrics that were read."""
     command, shape, dims = store.command, store.command.space.shape, store.command.space.dims
     texts = np.full(command.space.size, "", dtype=object)
-    for index, message in content.messages.items():
-        texts[index] = message
+    texts[[*content.messages]] = [*content.messages.values()]
     variables: dict[str, Any] = {
         "status": (dims, content.status.reshape(shape), ABOUT["status"]),
         "message": (dims, texts.reshape(shape), ABOUT["message"]),

@@ -1,16 +1,21 @@
-"""A family of designs: one design, some of its parameters, and the values they take."""
+"""A family of designs, by some parameters and the values they take; the command of an atlas.
 
+The same command resumes an atlas, another one is refused.
+"""
+
+import json
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from typing import Any, Literal, NamedTuple, Self
+from importlib.metadata import version
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.design_file import document_of
+from softreach.arm.design_reader import document_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import (
     Parameter,
@@ -23,8 +28,11 @@ from softreach.arm.parameters import (
     unknown_parameter,
 )
 from softreach.arm.tables import check_extension
-from softreach.sampling import sample_cube
-from softreach.support.arguments import as_integer, as_one_of
+from softreach.atlas.metrics import Metric, known_metric
+from softreach.cloud.curvature import QUANTILES
+from softreach.rod.tip_map import Device
+from softreach.sampling import check_sampler, sample_cube
+from softreach.support.arguments import as_instance, as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite
 from softreach.support.errors import InvalidDesign, InvalidInput, counted
 from softreach.support.progress import bar
@@ -32,6 +40,15 @@ from softreach.support.quantity import read_number, read_whole_number
 
 Layout = Literal["grid", "list"]
 
+ATLAS_VERSION = 5  # Version of the layout of a store
+STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
+
+_RESERVED = frozenset(
+    ("status", "message", "number", "tip", "axis", "unit_activation", "sample", "bundle", "length")
+    + ("design", "metric", "metrics", "curvature", "quantity", "station", "quantile", "rank")
+)
+"""Names that no metric may have, as an atlas or a question about it uses them itself."""
+_LONGEST = 1e3  # ratio of the lengths of designs whose tips share one fixed-point step
 _MOST = 1_000_000  # designs, each of which is looked at and has files of its own
 _MOST_VALUES = 100_000  # of one parameter
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
@@ -47,14 +64,6 @@ def column(name: str, values: ArrayLike) -> tuple[float, ...]:
         raise InvalidInput(f"{name}.shape", floats.shape, "of one dimension")
     array = np.asarray(values)
     return tuple(np.atleast_1d(array if array.dtype.kind in "iu" else floats).tolist())
-
-
-class _Survey(NamedTuple):
-    """What is known of a space once each of its designs has been made."""
-
-    gaps: dict[int, str]  # Combinations that no arm can have: number -> why not
-    bundles: int  # The largest number of bundles of any design; 0 if there is no design
-    length_range: tuple[float, float]  # Length of the shortest and of the longest design [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +83,6 @@ class DesignSpace:
     """Name and values [SI units] of every parameter."""
     layout: Layout = "grid"
     """Every combination (grid), or the values taken together, one of each (list)."""
-    known: _Survey | None = field(default=None, repr=False, compare=False)
-    """What a store says of the designs but its gaps, so that reading it makes none."""
 
     def __post_init__(self) -> None:
         base = a_manipulator("base", self.base)
@@ -139,7 +146,7 @@ class DesignSpace:
         from scipy.stats import qmc
 
         a_manipulator("base", base)
-        as_one_of("method", method, ("sobol", "latin"))
+        as_one_of("method", method, _SAMPLERS)
         count, seed = as_integer("count", count, 1, _MOST), as_integer("seed", seed)
         if not ranges:
             return cls(base=base, parameters=())
@@ -210,21 +217,22 @@ class DesignSpace:
     @property
     def gaps(self) -> Mapping[int, str]:
         """Combinations that no arm can have: number -> why not."""
-        return self._survey.gaps
-
-    @property
-    def bundles(self) -> int:
-        """The largest number of bundles of any design; 0 if there is no design."""
-        return (self.known or self._survey).bundles
-
-    @property
-    def length_range(self) -> tuple[float, float]:
-        """Length of the shortest and of the longest design [m]."""
-        return (self.known or self._survey).length_range
+        return self._survey[0]
 
     @cached_property
-    def _survey(self) -> _Survey:
-        """Each design is made once, which takes about 2 ms."""
+    def bundles(self) -> int:
+        """The largest number of bundles of any design; 0 if there is no design."""
+        return max((count for count, _ in self._survey[1]), default=0)
+
+    @cached_property
+    def length_range(self) -> tuple[float, float]:
+        """Length of the shortest and of the longest design [m]."""
+        lengths = [length for _, length in self._survey[1]] or [math.nan]
+        return min(lengths), max(lengths)
+
+    @cached_property
+    def _survey(self) -> tuple[dict[int, str], list[tuple[int, float]]]:
+        """Gaps, and inputs and length of all others; each is made once, which takes about 2 ms."""
         gaps: dict[int, str] = {}
         sizes: list[tuple[int, float]] = []
         with bar("looking at all designs", self.size) as shown:
@@ -236,8 +244,7 @@ class DesignSpace:
                 else:
                     sizes.append((arm.inputs, arm.length))
                 shown(1)
-        bundles, lengths = zip(*sizes, strict=True) if sizes else ((0,), (math.nan,))
-        return _Survey(gaps, max(bundles), (min(lengths), max(lengths)))
+        return gaps, sizes
 
     def to_dict(self) -> dict[str, Any]:
         """The space in plain values, from which `from_dict` makes an equal one."""
@@ -248,11 +255,10 @@ class DesignSpace:
     @classmethod
     def from_dict(cls, space: Mapping[str, Any]) -> Self:
         """The space that `to_dict` described; its base design is read when it is asked for."""
-        bundles, shortest, longest = space["extent"]
+        bundles, *lengths = space["extent"]  # so that reading a store makes no design
         made = object.__new__(cls)
-        known = _Survey({}, bundles, (shortest, longest)) if bundles else None
-        vars(made).update(layout=space["layout"], known=known, written=space["design"])
-        vars(made)["parameters"] = _plain(space["parameters"])
+        vars(made).update(layout=space["layout"], written=space["design"], bundles=bundles)
+        vars(made).update(parameters=_plain(space["parameters"]), length_range=tuple(lengths))
         return made
 
     def __getattr__(self, name: str) -> Any:
@@ -274,6 +280,125 @@ def _ends(name: str, ends: ArrayLike) -> np.ndarray:
     if floats.shape != (2,) or not floats[0] < floats[1]:
         raise InvalidInput(name, ends, allowed)
     return floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """Everything that decides the numbers of an atlas, and nothing else."""
+
+    space: DesignSpace
+    n: int
+    seed: int
+    sampler: str
+    tol: float
+    alpha_over_length: float  # Radius of the alpha shapes over the length of each design
+    accuracy: float  # Relative error asked of the exact volumes
+    metrics: tuple[Metric, ...]  # As `chosen_metrics` has them
+    keep_clouds: bool
+    device: Device = "cpu"
+    """What computes tips; the last digits depend on it."""
+    stations: tuple[float, ...] = STATIONS
+    """Places at which curvature is measured, over the length of each design."""
+    quantiles: tuple[float, ...] = QUANTILES
+    softreach_version: str = field(default_factory=lambda: version("softreach"))
+    atlas_version: int = ATLAS_VERSION
+
+    def __post_init__(self) -> None:
+        space = self.space
+        for metric in self.metrics:
+            if metric.name in _RESERVED or metric.name in space.names:
+                allowed = "a name that the atlas does not use itself"
+                raise InvalidInput("name of a metric", metric.name, allowed)
+        if not space.bundles:
+            why = next(iter(space.gaps.values()))
+            designs = counted(space.size, "design")
+            raise InvalidInput("space", designs, "valid for at least one design", why)
+        shortest, longest = space.length_range
+        if self.keep_clouds and longest > _LONGEST * shortest:
+            allowed = f"within a factor of {_LONGEST:g} of each other if clouds are kept"
+            hint = "stored tips share one step; pass keep_clouds=False, or build two atlases"
+            raise InvalidInput("length", f"{shortest:g} to {longest:g} m", allowed, hint)
+        check_sampler(self.sampler, self.n, space.bundles, self.seed)
+
+    @property
+    def numbers(self) -> tuple[Metric, ...]:
+        """The metrics that are single numbers."""
+        return tuple(metric for metric in self.metrics if not metric.over)
+
+    @property
+    def profiles(self) -> tuple[Metric, ...]:
+        """The metrics over stations and quantiles."""
+        return tuple(metric for metric in self.metrics if metric.over)
+
+    @property
+    def profile_sizes(self) -> dict[str, int]:
+        """Number of stations and quantiles of a profile."""
+        return {"station": len(self.stations), "quantile": len(self.quantiles)}
+
+    def to_json(self) -> str:
+        """The command as text, from which `from_json` makes an equal one."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        metrics = [metric.to_dict() for metric in self.metrics]
+        return json.dumps({**values, "space": self.space.to_dict(), "metrics": metrics})
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The command that `to_json` wrote; metrics that are not softreach's lack a function."""
+        values = json.loads(text)  # the root of a store is sealed
+        if (version := values.get("atlas_version")) != ATLAS_VERSION:
+            hint = "build the atlas again in a new folder"
+            raise InvalidInput("version of the atlas", version, str(ATLAS_VERSION), hint)
+        values |= {name: tuple(values[name]) for name in ("stations", "quantiles")}
+        space, metrics = DesignSpace.from_dict(values["space"]), list[Metric]()
+        for metric in values["metrics"]:
+            own = known_metric(metric["name"])
+            same = own is not None and own.to_dict() == metric
+            metrics.append(own if own and same else Metric.from_dict(metric))
+        return cls(**{**values, "space": space, "metrics": tuple(metrics)})
+
+    def continuing(self, begun: Self) -> Self:
+        """This command for a store that another version began: without metrics added since."""
+        names = {metric.name for metric in begun.metrics}
+        kept = (m for m in self.metrics if m.name in names or not known_metric(m.name))
+        return replace(self, metrics=tuple(kept), softreach_version=begun.softreach_version)
+
+    def differences(self, other: Self) -> list[str]:
+        """Differences between this command and another, one line each."""
+        own, its = ({m.name: m.to_dict() for m in each.metrics} for each in (self, other))
+        lines = [*_differences(_flat(self), _flat(other))]
+        for one, two, words in ((its, own, "there and not here"), (own, its, "here and not there")):
+            if only := [name for name in one if name not in two]:
+                lines.append(f"metrics: {', '.join(only)} {words}")
+        for name in own.keys() & its.keys():
+            lines += (f"metric {name}, {line}" for line in _differences(own[name], its[name]))
+        return lines
+
+
+def _flat(command: Command) -> dict[str, Any]:
+    """All settings but the metrics by name, those of the space too."""
+    values = {f.name: getattr(command, f.name) for f in fields(command) if f.name != "metrics"}
+    space = values.pop("space")
+    design = {"layout": space.layout, "design": space.base.to_toml()}
+    return values | design | dict(space.parameters)
+
+
+def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[str]:
+    for name in dict.fromkeys([*mine, *theirs]):
+        own, other = mine.get(name), theirs.get(name)
+        if own != other:
+            yield f"{name}: {_shown(other, own)} there, {_shown(own, other)} here"
+
+
+def _shown(value: Any, other: Any) -> str:
+    """A setting in a few words, chosen so that it differs visibly from the other one."""
+    if value is None:
+        return "none"
+    if isinstance(value, tuple) and len(value) > 4:
+        return f"{len(value)} values from {value[0]:.6g} to {value[-1]:.6g}"
+    if isinstance(value, str) and "\n" in value:
+        own = [line for line in value.splitlines() if line and line not in str(other).splitlines()]
+        return "; ".join(own) or "less"
+    return repr(value)
 
 
 def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignSpace:
@@ -298,14 +423,11 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     except InvalidDesign as error:
         raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
     for key in document:
-        if key not in _KEYS:
-            raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
+        as_one_of("key", key, _KEYS)
     base = design_from(str(document.get("design", "minimal_trunk")))
     table, layout = document.get("parameters", {}), document.get("layout", "grid")
-    if not isinstance(table, dict):
-        raise InvalidInput("parameters", table, "a table of parameters and their values")
-    if layout not in _LAYOUTS:
-        raise InvalidInput("layout", layout, f"one of {', '.join(_LAYOUTS)}")
+    as_instance("parameters", table, dict, "a table of parameters and their values")
+    as_one_of("layout", layout, _LAYOUTS)
     values: dict[str, list[float]] = {}
     for key, value in flat_keys(table):
         name, numbers = parse_parameter(base, key, value)

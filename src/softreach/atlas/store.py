@@ -20,8 +20,8 @@ from zarr.codecs import BloscCodec, Crc32cCodec  # noqa: TID253
 from zarr.errors import ContainsArrayError  # noqa: TID253
 from zarr.storage import LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
 
-from softreach.atlas.command import Command
 from softreach.atlas.metrics import Metric
+from softreach.atlas.space import Command
 from softreach.sampling import sample_cube
 from softreach.schema import AXES
 from softreach.support.arrays import Array
@@ -39,11 +39,9 @@ EXPLAINED = (FAILED, GAP, UNSTABLE)  # The status of designs that have a message
 _RESOLUTION = 1e-5  # step of stored tips over the shortest length: off by no more than half of it
 _MISSING = int(np.iinfo(np.int32).min)  # in place of a tip that is NaN, or not stored
 _CHUNK = 1 << 20  # numbers of a chunk that all designs share
-_OF_BOX = "place in the activation box of each design: 0 is its lower bound, 1 its upper"
-_CUBE = {"units": "1", "long_name": _OF_BOX}
+_BOX = "place in the activation box of each design: 0 is its lower bound, 1 its upper"
 _STATION = {"units": "1", "long_name": "station Z before activation, over the design's length"}
-_FLAGS = "to_do done failed gap unstable damaged"
-_NUMBERS = {"flag_values": [0, 1, 2, 3, 4, 5], "flag_meanings": _FLAGS}
+_NUMBERS = {"flag_values": [*range(6)], "flag_meanings": "to_do done failed gap unstable damaged"}
 ABOUT: dict[str, dict[str, Any]] = {
     "status": {"long_name": "status of the design", **_NUMBERS},
     "message": {"long_name": "why a design has no numbers"},
@@ -73,7 +71,8 @@ def array_plans(command: Command) -> Iterator[Plan]:
         yield plan(name, values.dtype, {dim: len(values)}, about, fill, values)
     yield labels("metric", [metric.name for metric in numbers])
     yield labels("axis", AXES)
-    yield plan(CUBE, float, {"sample": command.n, "bundle": space.bundles}, _CUBE)
+    about = {"units": "1", "long_name": _BOX}
+    yield plan(CUBE, float, {"sample": command.n, "bundle": space.bundles}, about)
     yield plan("status", np.uint8, designs, ABOUT["status"], 0)
     yield plan("message", str, designs, ABOUT["message"], "")
     if profiles:
@@ -144,13 +143,13 @@ class AtlasStore:
         Where it is durable, a power cut loses nothing that was written.
         """
         location = stores.absolute(location)
-        opened = None
+        opened, open_it = None, partial(stores.opened_store, location, "atlas", durable=durable)
         with stores.writing(location):
             with suppress(stores.DamagedStore):
-                opened = stores.opened_store(location, "atlas", "r+", durable=durable)
+                opened = open_it("r+")
             if opened is None:
                 _write_root(location, command, durable)
-                opened = stores.opened_store(location, "atlas", "r+", durable=durable)
+                opened = open_it("r+")
         allowed = "a new folder, or an atlas; this one holds other files"
         opened, stored = _with_command(opened, location, allowed)
         if (begun := stored.softreach_version) != (now := command.softreach_version):
@@ -170,8 +169,7 @@ class AtlasStore:
         location = stores.absolute(location)
         opened = stores.opened_store(location, "atlas", mode, durable=durable)
         lacks = f"it does not exist, or has no {stores.ROOT}"
-        why = lacks if opened is None else "this is no atlas"
-        allowed = f"an atlas written by build_atlas; {why}"
+        allowed = f"an atlas written by build_atlas; {'this is no atlas' if opened else lacks}"
         opened, command = _with_command(opened, location, allowed)
         opened.check_arrays()
         return cls(location, command, opened)

@@ -1,13 +1,11 @@
 """Calibration: the arm on the bench from measured poses, and which poses to measure."""
 
-from __future__ import annotations
-
 from softreach.calibration.calibration import calibrate, leave_one_run_out
 from softreach.calibration.errors import PlacementErrors, Repeatability, Verdict
+from softreach.calibration.fit import Uncertainty
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.plan import PosePlan, plan_poses
 from softreach.calibration.result import Calibration, Rival
-from softreach.calibration.uncertainty import Uncertainty
 from softreach.support.report import Report
 
 __all__ = [

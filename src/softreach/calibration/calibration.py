@@ -1,14 +1,12 @@
 """Calibration: from measured poses to the arm on the bench, and laws without a rod beside it."""
 
-from __future__ import annotations
-
 import datetime as dt
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -16,12 +14,11 @@ from softreach.arm.driving import Driving, body_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import tables
 from softreach.calibration.errors import PlacementErrors, misses, with_products
-from softreach.calibration.fit import exchanged_columns, fitted
+from softreach.calibration.fit import FEWEST_RUNS, exchanged_columns, fitted, uncertainty
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel, marker_stations
 from softreach.calibration.result import Calibration, Rival
-from softreach.calibration.uncertainty import FEWEST_RUNS, uncertainty
 from softreach.rod.summary import design_warnings
 from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Mask
@@ -165,7 +162,7 @@ def leave_one_run_out(
         out = table.runs == number
         if out.any() and not out.all():
             others = calibrate(arm, table.of(~out), free=free, **{"rivals": False, **options})
-            errors[name] = misses(others.residuals_on(table.of(out)))
+            errors[name] = others.errors_on(table.of(out))
     return errors
 
 
@@ -182,15 +179,11 @@ def _warn_of_numbers(result: Calibration) -> None:
     own = [n.name for n in fit.free.numbers if n.prior is not None]
     for name, ratio in result.ratios.items():
         if _left(ratio) and name not in own:
-            warn(
-                f"{name} became {ratio:.3g} times what the design says: check the order of "
-                "the inputs, then hold this number or give it a prior"
-            )
+            more = "check the order of the inputs, then hold this number or give it a prior"
+            warn(f"{name} became {ratio:.3g} times what the design says: {more}")
     if len(vague := names[~(result.uncertainty.told | fit.at_bound)]):
-        warn(
-            f"the data does not determine {', '.join(vague)}: standard deviation infinite; hold "
-            "it, give it a prior, or measure more"
-        )
+        more = "standard deviation infinite; hold it, give it a prior, or measure more"
+        warn(f"the data does not determine {', '.join(vague)}: {more}")
     before = {re.sub(r"[\d.]+", "", text) for text in design_warnings(result.start)}
     for text in design_warnings(result.arm):
         if re.sub(r"[\d.]+", "", text) not in before:
@@ -238,8 +231,7 @@ def constant_curvature(
     """
     from scipy.optimize import least_squares
 
-    arcs = _Arcs.of(arm, train)
-    seen = np.isfinite(train.places)
+    arcs, seen = _Arcs.of(arm, train), np.isfinite(train.places)
 
     def residuals(values: Array) -> Array:
         progress(0)  # which may end the fit
@@ -259,7 +251,7 @@ class _Arcs(NamedTuple):
     offsets: Array
 
     @classmethod
-    def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:
+    def of(cls, arm: Manipulator, data: Measurements) -> Self:
         ends = [part.span(arm.length)[1] for part in arm.actuators]
         ends = np.unique(np.round([*ends, arm.length], 9))
         middles = 0.5 * (np.append(0.0, ends[:-1]) + ends)
@@ -292,9 +284,8 @@ class _Arcs(NamedTuple):
         rest = values[6 : 6 + 2 * count].reshape(count, 2)
         slopes = np.zeros((count, inputs.shape[1], 2))
         slopes[self.acts] = values[6 + 2 * count :].reshape(-1, 2)
-        x = inputs / self.scale
-        place = np.broadcast_to(values[:3], (len(x), 3))
-        frame = np.broadcast_to(Rotation.from_rotvec(values[3:6]).as_matrix(), (len(x), 3, 3))
+        x, frame = inputs / self.scale, Rotation.from_rotvec(values[3:6]).as_matrix()
+        place, frame = np.tile(values[:3], (len(x), 1)), np.tile(frame, (len(x), 1, 1))
         result, begin = np.empty((len(x), len(self.markers), 3)), 0.0
         own = np.searchsorted(self.ends[:-1], self.markers, "right")  # arc of each marker
         for k, end in enumerate(self.ends):

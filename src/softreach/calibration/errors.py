@@ -1,8 +1,5 @@
 """Errors of predicted places, what the data repeats, and what the residuals speak of."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +32,7 @@ class PlacementErrors(NamedTuple):
     """Number of places."""
 
     def text(self, length: float) -> str:
-        """Of the command line: "median 3.1, mean 4.0, rms 5.2, 95 % below 9.9 mm (1.4 % of L)"."""
+        """In words: "rms 5.2 mm (1.4 % of L), median 3.1, mean 4.0, 95 % below 9.9"."""
         median, mean, rms, most = (f"{1e3 * value:.3g}" for value in self[:4])
         share = 100.0 * self.rms / length
         return f"rms {rms} mm ({share:.2g} % of L), median {median}, mean {mean}, 95 % below {most}"
@@ -86,8 +83,7 @@ def repeatability(data: Measurements, residuals: Array) -> Repeatability:
     return Repeatability(np.nan, 0)
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """Limitation of a fit."""
 
     limit: str
@@ -168,9 +164,8 @@ def _explained(data: Measurements, residuals: Array) -> tuple[float, float | Non
     same all over the samples, and beyond that of last commands drawn by chance. The second is None
     where too few samples follow each other in a run.
     """
-    order = data.order
+    order, moving = data.order, np.ptp(data.inputs, axis=0) > 0
     flat = residuals.reshape(len(residuals), -1)[order]
-    moving = np.ptp(data.inputs, axis=0) > 0
     x, runs = data.inputs[order][:, moving], data.runs[order]
     known = np.isfinite(flat).all(axis=1) & np.append(False, runs[1:] == runs[:-1])
     if known.sum() < 10 * (1 + 3 * x.shape[1]):

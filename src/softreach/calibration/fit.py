@@ -1,6 +1,4 @@
-"""Least squares of measured places: robust, bounded, with priors; what the data cannot tell."""
-
-from __future__ import annotations
+"""Least squares of measured places: robust, bounded, with priors; how sure the numbers are."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 
 from softreach.calibration.errors import misses
 from softreach.calibration.free_numbers import POSE, SCALE, FreeNumbers
+from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import MarkerModel, Prediction
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
@@ -27,6 +26,9 @@ _PROMISING, _BETTER = 0.8, 0.5  # Error over that of the columns as they are: be
 _ALIKE, _FAR_BETTER = 1.2, 0.35
 """Factor between errors that nothing tells apart, and that with which a fit is not begun."""
 _FAR = 1.0  # m, what a sample without equilibrium misses
+FEWEST_RUNS = 8  # Runs from which these share errors and are held out, not samples
+_SEEN = 0.1  # least share of a variance that the residuals would show if they were plain noise
+_VAGUE = 30.0  # Standard deviation, in changes that matter, of what the data does not tell
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +48,7 @@ class Fit:
 def started(model: MarkerModel, places: Array) -> FreeNumbers:
     """Numbers to start from: the pose that puts predicted places on measured ones [Kabsch1976]."""
     free = model.free
-    turning = [name for name in POSE[3:] if name in free.names]
-    moving = [name for name in POSE[:3] if name in free.names]
-    if not moving:
+    if not {*POSE[:3]} & {*free.names}:
         return free
     each = model.predict(free.start).places
     predicted, measured = each.reshape(-1, 3), places.reshape(-1, 3)
@@ -57,10 +57,9 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
         return free
     predicted, measured = predicted[known], measured[known]
     start = np.array(free.arm.base.position)
-    if len(turning) < 3 or len(moving) < 3:
+    if {*POSE} - {*free.names}:
         shift = np.median(measured - predicted, axis=0)
-        moved = zip(POSE[:3], start + shift, strict=True)
-        return free.started_at({name: place for name, place in moved if name in moving})
+        return free.started_at(dict(zip(POSE[:3], start + shift, strict=True)))
     _refuse_exchanged(model, each, places)
     rotation, scale, place = _kabsch(free, predicted - start, measured)
     from scipy.spatial.transform import Rotation
@@ -87,7 +86,7 @@ def _miss(free: FreeNumbers, predicted: Array, measured: Array) -> float:
     if known.sum() < 3:
         return np.inf
     predicted, measured = predicted[known], measured[known]
-    if set(POSE) <= set(free.names):
+    if not {*POSE} - {*free.names}:
         rotation, scale, shift = _kabsch(free, predicted, measured)
         off = scale * predicted @ rotation.T + shift - measured
     else:
@@ -131,14 +130,12 @@ def _exchanges(model: MarkerModel) -> Iterator[_Order]:
         parts = np.split(inputs, np.cumsum(counts)[:-1])
         turned = np.concatenate([[*part[:1], *part[:0:-1]] for part in parts])
         yield _Order("the senses in which bundles are counted", turned, columns)
-    for j, k in combinations(range(3), 2):
-        text = f"the axes {'xyz'[j]} and {'xyz'[k]}"
-        yield _Order(text, inputs, _exchanged(columns, each[:, j], each[:, k]))
-    for j, k in combinations(range(len(names)), 2):
-        order = _exchanged(columns, each[j], each[k])
-        yield _Order(f"the markers {names[j]} and {names[k]}", inputs, order)
-    for j, k in combinations(range(len(columns)), 2) if len(names) > 1 else ():
-        yield _Order(f"the columns {words[j]} and {words[k]}", inputs, _exchanged(columns, j, k))
+    groups = [("axes", "xyz", each.T), ("markers", names, each)]
+    groups += [("columns", words, columns[:, None])] if len(names) > 1 else []
+    for kind, known, places in groups:
+        for j, k in combinations(range(len(known)), 2):
+            order = _exchanged(columns, places[j], places[k])
+            yield _Order(f"the {kind} {known[j]} and {known[k]}", inputs, order)
 
 
 def _exchanged(order: NDArray[np.intp], here: Any, there: Any) -> NDArray[np.intp]:
@@ -188,12 +185,9 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
         return
     null = axes[values <= SAME * values[0]]
     trading = [free.names[k] for k in _fewest(null * sizes)]
-    allowed = (
-        "numbers that the data can tell apart: markers show only the ratio or the sum "
-        f"of these; leave out one, such as {trading[-1]}, or give "
-        "it a prior"
-    )
-    raise InvalidInput("free", ", ".join(trading), allowed)
+    allowed = "numbers that the data can tell apart: markers show only their ratio or their sum"
+    hint = f"leave out one, such as {trading[-1]}, or give it a prior"
+    raise InvalidInput("free", ", ".join(trading), allowed, hint)
 
 
 def _fewest(directions: Array) -> list[int]:
@@ -285,19 +279,10 @@ class _Problem:
     def solved(self, values: Array, fine: float) -> Any:
         from scipy.optimize import least_squares
 
-        return least_squares(
-            self.residuals,
-            values,
-            jac=self.slopes,  # pyright: ignore[reportArgumentType]
-            bounds=self.bounds,
-            x_scale=self.model.free.scale,
-            loss=_loss(int(self.seen.sum()), self.width),  # pyright: ignore[reportArgumentType]
-            f_scale=1.0,
-            ftol=fine,
-            xtol=fine,
-            gtol=1e-14,
-            max_nfev=_MOST,
-        )
+        loss = _loss(int(self.seen.sum()), self.width)
+        scales: Any = {"jac": self.slopes, "bounds": self.bounds, "x_scale": self.model.free.scale}
+        ends: Any = {"loss": loss, "ftol": fine, "xtol": fine, "gtol": 1e-14, "max_nfev": _MOST}
+        return least_squares(self.residuals, values, **scales, **ends)
 
 
 def _loss(count: int, width: float | None) -> str | Callable[[Array], Array]:
@@ -349,3 +334,130 @@ def exchanged_columns(
         if error < least:
             least, best = error, (_said(orders), error)
     return best
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Covariance of the fitted numbers."""
+
+    covariance: Array
+    """Of what the data tells, shape (number, number)."""
+    told: Mask
+    """False for a number that the data does not tell at the end of the fit, of which no residuals
+    are left to say how well, or which is at a bound; shape (number,)."""
+    freedom: Array
+    """Degrees of freedom of the interval of each number, shape (number,)."""
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations, infinite for what the data does not tell, shape (number,)."""
+        return np.where(self.told, np.sqrt(np.diag(self.covariance)), np.inf)
+
+    @property
+    def correlation(self) -> Array:
+        """Shape (number, number)."""
+        sigma = np.sqrt(np.diag(self.covariance))
+        sigma = np.where(sigma > 0, sigma, 1.0)
+        return self.covariance / np.outer(sigma, sigma)
+
+    def half_widths(self, level: float = 0.95) -> Array:
+        """Of intervals that hold each number with this probability, by Student's t, (number,)."""
+        from scipy.special import stdtrit
+
+        return self.sigma * stdtrit(self.freedom, 0.5 + 0.5 * level)
+
+
+def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertainty:
+    """The sandwich of clusters, each freed of its own leverage [BellMcCaffrey2002].
+
+    Numbers at a bound are held there, and the variance of the others is as if they were known. The
+    noise is the standard deviation of a coordinate [m], against which priors are weighed.
+    """
+    slopes, free, count = fit.prediction.slopes, ~fit.at_bound, len(fit.values)
+    scale = np.maximum(fit.free.scale, 0.1 * np.abs(fit.values))
+    weight = np.sqrt(fit.weights)[..., None]
+    seen = (fit.weights > 0) & np.isfinite(slopes).all(axis=(2, 3))
+    rows = np.where(seen[..., None, None], weight[..., None] * slopes * scale, 0.0)
+    miss = np.where(seen[..., None], weight * fit.residuals, 0.0)
+    by_run = len(data.run_names) >= max(FEWEST_RUNS, 2 * count)
+    keys = data.runs if by_run else np.arange(len(data))  # what shares errors
+    rows = rows.reshape(len(data), -1, count)[:, :, free]
+    miss = miss.reshape(len(data), -1)
+    squares = np.einsum("nrp,nrq->pq", rows, rows)
+    bread = squares - _bent(fit, seen, scale)[np.ix_(free, free)]
+    width = noise or robust_width(miss.reshape(-1, 3)[seen.ravel()])
+    widths = [np.inf if number.prior is None else number.prior[1] for number in fit.free.numbers]
+    known = ((width * scale / np.array(widths)) ** 2)[free]
+    plain = squares + np.diag(known)
+    sizes, axes = np.linalg.eigh(plain)
+    dropped = axes[:, sizes <= SAME**2 * sizes.max(initial=0.0)]
+    inverse = np.linalg.pinv(bread + np.diag(known), SAME**2, hermitian=True)
+    expected = np.linalg.pinv(plain, SAME**2, hermitian=True)
+    meat, freedom, shown = _sandwich(rows, miss, keys, expected)
+    prior = np.diag(expected @ np.diag(known) @ expected)
+    whole = np.zeros((count, count))
+    whole[np.ix_(free, free)] = inverse @ (meat + np.diag(known * width**2)) @ inverse
+    degrees = np.full(count, np.inf)
+    degrees[free] = freedom
+    told = np.ones(count, bool)
+    told[free] = (np.abs(dropped) < 1e-3).all(axis=1) & (shown + prior > _SEEN * np.diag(expected))
+    told &= ~fit.at_bound & (np.diag(whole) <= _VAGUE**2)
+    whole[~told] = whole[:, ~told] = 0.0
+    return Uncertainty(whole * np.outer(scale, scale), told, degrees)
+
+
+def _bent(fit: Fit, seen: Mask, scale: Array) -> Array:
+    """Difference between the second derivatives of a robust loss and of weighted squares.
+
+    Of 2W²(√(1 + d²/W²) - 1) in the distance d of a place it is w - w (1 - w²) along the residual,
+    with w = 1/√(1 + d²/W²).
+    """
+    slopes, weight = fit.prediction.slopes, fit.weights
+    square = np.where(seen, (fit.residuals**2).sum(axis=2), 0.0)
+    lost = weight * (1.0 - weight**2)
+    share = np.divide(lost, square, out=np.zeros_like(square), where=square > 0)
+    along = np.einsum("nma,nmap->nmp", np.where(seen[..., None], fit.residuals, 0.0), slopes)
+    along = np.where(seen[..., None], along * scale, 0.0)
+    return np.einsum("nm,nmp,nmq->pq", share, along, along)
+
+
+def _sandwich(
+    rows: Array, miss: Array, keys: NDArray[np.intp], inverse: Array
+) -> tuple[Array, Array, Array]:
+    """Squares of the scores of clusters, degrees of freedom, variances to expect of plain noise.
+
+    The residuals of a cluster are freed of its own leverage, (1 - H)^-1/2; the degrees of freedom
+    are those of the chi square with the same mean and variance (Satterthwaite). `inverse` is that
+    of the sum of squares of all rows, derivatives of residuals, shape (n, residual, number).
+    """
+    count = rows.shape[2]
+    values, axes = np.linalg.eigh(inverse)
+    half, meat = axes * np.sqrt(np.maximum(values, 0.0)), np.zeros((count, count))
+    squares, total, mixed = np.zeros((3, count))
+    spread = np.zeros((count, count, count))
+    order = np.argsort(keys, kind="stable")
+    ends = np.flatnonzero(np.diff(keys[order], append=-1)) + 1
+    for cluster in np.split(order, ends[:-1]):
+        own, left = rows[cluster].reshape(-1, count), miss[cluster].ravel()
+        if not own.any():
+            continue
+        score = own.T @ _without_leverage(own @ half, left[:, None])[:, 0]
+        meat += np.outer(score, score)
+        part = _without_leverage(own @ half, own @ inverse)
+        size, moved = (part**2).sum(axis=0), own.T @ part
+        total += size
+        squares += size**2
+        mixed += size * np.einsum("pc,pq,qc->c", moved, inverse, moved)
+        spread += np.einsum("pc,qc->cpq", moved, moved)
+    product = np.einsum("pq,cqr->cpr", inverse, spread)
+    lost = np.einsum("cpp->c", product)
+    variance = squares - 2.0 * mixed + np.einsum("cpq,cqp->c", product, product)
+    freedom = np.maximum((total - lost) ** 2 / np.maximum(variance, 1e-300), 1.0)
+    return meat, freedom, total - lost
+
+
+def _without_leverage(half: Array, left: Array) -> Array:
+    """(1 - H)^-1/2 of columns of residuals of a cluster, with H = half halfᵀ."""
+    axes, values, _ = np.linalg.svd(half, full_matrices=False)
+    factor = 1.0 / np.sqrt(np.maximum(1.0 - values**2, 1e-6)) - 1.0
+    return left + axes @ (factor[:, None] * (axes.T @ left))

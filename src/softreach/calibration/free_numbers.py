@@ -1,14 +1,12 @@
 """Free numbers of a calibration: parameters of the design, the pose of its base, what is tied."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -38,7 +36,7 @@ Neighbors = list[tuple[float, Manipulator | Base | float]]
 """Arms around one, their bases or scales of data alone, with the factors of a derivative."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class FreeNumber:
     """A number that a fit may change."""
 
@@ -78,10 +76,9 @@ class FreeNumbers:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest values; those that are excluded by a hair."""
-        return (
-            np.array([_inside(n.range.low, n.range.open_low, n.scale) for n in self.numbers]),
-            np.array([_inside(n.range.high, n.range.open_high, -n.scale) for n in self.numbers]),
-        )
+        low = [n.range.low + 1e-6 * n.scale * n.range.open_low for n in self.numbers]
+        high = [n.range.high - 1e-6 * n.scale * n.range.open_high for n in self.numbers]
+        return np.array(low), np.array(high)
 
     def made(self, values: Array) -> Manipulator:
         """The arm with these values; raises InvalidDesign if there is none."""
@@ -125,7 +122,7 @@ class FreeNumbers:
             result.append((factor / step, made))
         return result
 
-    def started_at(self, values: Mapping[str, float]) -> FreeNumbers:
+    def started_at(self, values: Mapping[str, float]) -> Self:
         """The same with other values to start from."""
         numbers = (replace(n, start=float(values.get(n.name, n.start))) for n in self.numbers)
         return replace(self, numbers=tuple(numbers))
@@ -140,10 +137,8 @@ def free_numbers(
         # All arms on the way have a rest shape, were it of the size of rounding.
         arm = arm.replace(rest=RestShape(curvature_x=_UNSEEN / arm.length))
     priors = {} if prior is None else as_mapping("prior", prior, lambda _, value: value)
-    numbers = tuple(
-        replace(number, prior=_prior(number, priors.pop(number.name, None)))
-        for number in _each(arm, given)
-    )
+    each = ((number, priors.pop(number.name, None)) for number in _each(arm, given))
+    numbers = tuple(replace(number, prior=_prior(number, known)) for number, known in each)
     names = [number.name for number in numbers]
     if priors:
         raise InvalidInput("prior", next(iter(priors)), f"a free number: {', '.join(names)}")
@@ -162,10 +157,9 @@ def _each(arm: Manipulator, free: tuple[str, ...]) -> Iterator[FreeNumber]:
                 axis = POSE.index(each)
                 start = arm.base.position[axis] if axis < 3 else 0.0
                 unit, scale = ("m", 1e-2 * arm.length) if axis < 3 else ("rad", 0.02)
-                allowed = Range(unit=unit)
-                yield FreeNumber(name=each, unit=unit, start=start, range=allowed, scale=scale)
+                yield FreeNumber(each, unit, start, Range(unit=unit), scale)
         elif name == SCALE:
-            yield FreeNumber(name=SCALE, unit="1", start=1.0, range=Range(1e-3, 1e3), scale=0.02)
+            yield FreeNumber(SCALE, "1", 1.0, Range(1e-3, 1e3), 0.02)
         elif "*" in name:
             known = parameters(arm)
             hits = [key for key in known if fnmatchcase(key, name.replace("[", "[[]"))]
@@ -227,8 +221,7 @@ def _of_parameters(arm: Manipulator, name: str) -> FreeNumber:
     start = float(np.mean(values)) if values else typical
     if paths[0].rpartition(".")[2] in _PLACES:
         allowed = allowed._replace(high=arm.length)
-    scale = max(0.1 * abs(start), 1e-2 * typical)
-    return FreeNumber(name=name, unit=first.unit, start=start, range=allowed, scale=scale)
+    return FreeNumber(name, first.unit, start, allowed, max(0.1 * abs(start), 1e-2 * typical))
 
 
 def _moved(base: Base, pose: Mapping[str, float]) -> Base:
@@ -252,7 +245,3 @@ def _prior(number: FreeNumber, given: Any) -> tuple[float, float] | None:
     if len(values) > 2 or not (0 < width < math.inf and math.isfinite(mean)):
         raise InvalidInput(f"prior of {number.name}", given, "a width above 0, or (mean, width)")
     return float(mean), float(width)
-
-
-def _inside(bound: float, is_open: bool, scale: float) -> float:
-    return bound + 1e-6 * scale if is_open and math.isfinite(bound) else bound

@@ -164,32 +164,27 @@ def read_measurements(
         places, chosen = places[:, seen], {k: x for k, x in chosen.items() if k not in lost}
     _refuse_far(arm, places, [triples[start] for start in chosen.values()])
     _refuse_inputs(arm, values, sources)
-    run_names, runs, taken = _runs_and_order(table, run, order)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
     return Measurements(
         inputs=values,
         places=places,
         input_names=tuple(sources),
         marker_names=tuple(chosen),
-        runs=runs,
-        run_names=run_names,
-        order=taken,
         rows=np.arange(len(values)),
         source=source,
         digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
+        **_runs_and_order(table, run, order),
     )
 
 
-def _runs_and_order(
-    table: pd.DataFrame, run: str | None, order: str | None
-) -> tuple[tuple[str, ...], NDArray[np.intp], NDArray[np.intp]]:
+def _runs_and_order(table: pd.DataFrame, run: str | None, order: str | None) -> dict[str, Any]:
     """Names of runs, the run of each sample, and samples run by run in the order of each."""
     every = np.full(len(table), "all") if run is None else table[run].to_numpy(object)
     names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
     taken = np.arange(len(table))
     if order is not None and table[order].dtype.kind in "iuf":  # names of samples say nothing
         taken = np.lexsort((_numbers(table, order, gaps=True), begins[runs])).astype(np.intp)
-    return tuple(names.tolist()), runs, taken
+    return {"run_names": tuple(names.tolist()), "runs": runs, "order": taken}
 
 
 def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
@@ -276,12 +271,12 @@ def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
         raise InvalidInput("data", name, f"a table in CSV or Parquet: {reason}") from None
 
 
-def _unzipped(file: IO[bytes]) -> IO[bytes]:
-    archive = zipfile.ZipFile(file)
-    return archive.open(archive.namelist()[0])
-
-
-_UNPACKED = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open, ".zip": _unzipped}
+_UNPACKED: Mapping[str, Any] = {
+    ".gz": gzip.open,
+    ".bz2": bz2.open,
+    ".xz": lzma.open,
+    ".zip": lambda file: (packed := zipfile.ZipFile(file)).open(packed.namelist()[0]),
+}
 
 
 def _refuse_short(text: str) -> None:
@@ -310,34 +305,31 @@ def _refuse_far(arm: Manipulator, places: Array, columns: Sequence[Sequence[str]
         row, marker, axis = (int(k) for k in np.unravel_index(away.argmax(), away.shape))
         given = f"{1e3 * places[row, marker, axis]:.4g} mm"
         given += f", and {far - 1} more cells" if far > 1 else ""
-        allowed = f"within {1e3 * reach:.4g} mm of the median, for an arm of "
-        allowed += f"{1e3 * arm.length:.4g} mm: look at the unit of the column, and leave a cell "
-        allowed += "empty where the marker was not seen"
-        raise InvalidInput(f"{columns[marker][axis]} in row {row}", given, allowed)
+        near = f"within {1e3 * reach:.4g} mm of the median, for an arm of {1e3 * arm.length:.4g} mm"
+        hint = "look at the unit of the column, and leave a cell empty where no marker was seen"
+        raise InvalidInput(f"{columns[marker][axis]} in row {row}", given, f"{near}: {hint}")
 
 
 def _refuse_inputs(arm: Manipulator, values: Array, columns: Sequence[str]) -> None:
     actuators = [*[None] * len(arm.drives), *(arm.bundle_actuators[k] for k in arm.undriven)]
-    most = np.abs(arm.input_bounds).max(axis=1)
-
-    def refuse(row: int, k: int, allowed: str) -> None:
-        given = f"{values[row, k]:.4g} {arm.input_units[k]}"
-        raise InvalidInput(f"{columns[k]} in row {row}", given, allowed)
-
     for unit in dict.fromkeys(arm.input_units):
         own = [k for k, each in enumerate(arm.input_units) if each == unit and columns[k]]
-        bound = max((most[k] for k in own), default=0.0)
+        bound = np.abs(arm.input_bounds[own]).max(initial=0.0)
         size = np.abs(values[:, own])
-        if not own or not size.any() or not 0 < bound < np.inf:
+        if not size.any() or not 0 < bound < np.inf:
             continue
+        rows = values[:, own].argmin(axis=0).tolist()
+        least = [getattr(actuators[k], "least", -np.inf) - _SLACK * size.max() for k in own]
+        wrong = [x for *x, low in zip(rows, own, least, strict=True) if values[*x] < low]
+        allowed = f"at least 0 {unit}: a tendon pulls and cannot push"
         if size.max() > _HARD * bound:
             row, k = divmod(int(size.argmax()), len(own))
-            near = f"near the bounds of the design, {bound:.4g} {unit}: look at the column's unit"
-            refuse(row, own[k], near)
-        for k in own:
-            row = int(values[:, k].argmin())
-            if values[row, k] < getattr(actuators[k], "least", -np.inf) - _SLACK * size.max():
-                refuse(row, k, f"at least 0 {unit}: a tendon pulls and cannot push")
+            wrong = [[row, own[k]]]
+            near = f"near the bounds of the design, {bound:.4g} {unit}"
+            allowed = f"{near}: look at the column's unit"
+        for row, k in wrong:
+            given = f"{values[row, k]:.4g} {unit}"
+            raise InvalidInput(f"{columns[k]} in row {row}", given, allowed)
 
 
 def _missing(what: str, name: str, columns: Sequence[str]) -> InvalidInput:
@@ -377,13 +369,11 @@ def _chosen_markers(
     names = marker_names(arm)
     if chosen := _matched("marker", names, given, {start: start for start in triples}):
         return chosen
-    if len(names) != len(triples):
-        listed = ", ".join(start or "x, y, z" for start in triples)
-        own = f"{counted(len(names), 'marker')} ({', '.join(names)})"
-        raise NotPossible(
-            f"the arm has {own}, the data has {len(triples)} ({listed}): name them by `markers`"
-        )
-    return dict(zip(names, triples, strict=True))
+    if len(names) == len(triples):
+        return dict(zip(names, triples, strict=True))
+    listed = ", ".join(start or "x, y, z" for start in triples)
+    own = f"the arm has {counted(len(names), 'marker')} ({', '.join(names)})"
+    raise NotPossible(f"{own}, the data has {len(triples)} ({listed}): name them by `markers`")
 
 
 def _matched(
@@ -413,11 +403,9 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
         fitting = {unit} if unit in ("m", "N", "Pa") else {unit, ""}  # a plain number has none
         free = [c for c in columns if c not in chosen.values() and _unit(c)[1] in fitting]
         if len(free) != len(wanting):
-            have, several = ", ".join(free) or "none", counted(len(wanting), "column")
-            wanted = f"{several} in {_unit_text(unit)} for {', '.join(wanting)}"
-            raise NotPossible(
-                f"the data must have {wanted}, and has {have}: name the columns by `inputs`"
-            )
+            wanted = f"{counted(len(wanting), 'column')} in {_unit_text(unit)}"
+            wanted += f" for {', '.join(wanting)}, and has {', '.join(free) or 'none'}"
+            raise NotPossible(f"the data must have {wanted}: name the columns by `inputs`")
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]
 

@@ -4,11 +4,9 @@ Tables are differentiated by differences of fourth order, which are good to ten 
 equilibrium; all that follows from them, how the arm moves, is the linear response of the rod.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +85,7 @@ class MarkerModel:
     names: tuple[str, ...]  # Of the markers that were measured
 
     @classmethod
-    def of(cls, free: FreeNumbers, data: Measurements) -> MarkerModel:
+    def of(cls, free: FreeNumbers, data: Measurements) -> Self:
         """The model of measured poses."""
         return cls(free, data.inputs, data.marker_names)
 
@@ -114,44 +112,35 @@ class MarkerModel:
     def _by_differences(
         self, arm: Manipulator, scale: float, neighbors: list[Neighbors]
     ) -> Prediction:
-        """Places and their derivatives by those of the neighbors."""
-        slopes = list[Array]()
-        for each in neighbors:
-            slope = np.zeros((len(self.inputs), len(self.names), 3))
+        slopes = np.zeros((len(self.inputs), len(self.names), 3, len(neighbors)))
+        for k, each in enumerate(neighbors):
             for factor, other in each:
                 if isinstance(other, float | int):
                     near = arm, float(other)
                 else:
                     near = arm.replace(base=other) if isinstance(other, Base) else other, scale
-                slope += factor * self.of_arm(*near).places
-            slopes.append(slope)
-        return self.of_arm(arm, scale)._replace(slopes=np.stack(slopes, axis=-1))
+                slopes[..., k] += factor * self.of_arm(*near).places
+        return self.of_arm(arm, scale)._replace(slopes=slopes)
 
     def _explicit(self, arm: Manipulator, scale: float, grid: StepGrid, inputs: Array) -> _Explicit:
         stations, offsets = marker_stations(arm, self.names)
-        body, driving = body_of(arm), Driving(arm)
-        law = driving.law
-        table = node_tables(body, stations, grid)
-        columns = law.columns
+        law, table = Driving(arm).law, node_tables(body_of(arm), stations, grid)
+        bend, rise = (x[..., law.columns] for x in (table.curvature, table.extension[:, :, None]))
         stiffness = np.zeros((*table.length.shape, 4))
-        if len(columns):
+        if len(law.columns):
             own = arm.section.stiffness_at(arm.profile, table.stations)
             stiffness = np.append(arm.section.resistance(own), own.axial[..., None], axis=-1)
-        measures = np.concatenate(
-            [table.curvature[..., columns], table.extension[:, :, None, columns]], axis=2
-        )
-        rest = table.curvature @ law.rest[0]
         return _Explicit(
             table,
             arm.base.rotation,
             np.array(arm.base.position),
             scale,
             offsets,
-            driving.bundles(inputs),
+            Driving(arm).bundles(inputs),
             law.taut_from,
             law.compliance,
-            measures * stiffness[..., None],
-            rest,
+            measures=np.concatenate([bend, rise], axis=2) * stiffness[..., None],
+            rest=table.curvature @ law.rest[0],
         )
 
     def _block(
@@ -268,8 +257,10 @@ def _slopes(
     response = linear_response(at.table, state, tables, at.measures)
     if by_length and at.measures.shape[-1]:
         driven = _with_tensions(arm, at, state, changes, driven, response.works)
-    moves = response.moves[..., bundles:] + _products(response.moves[..., :bundles], driven)
-    turns = response.turns[..., bundles:] + _products(response.turns[..., :bundles], driven)
+    moves, turns = (
+        each[..., bundles:] + np.einsum("nmaj,njk->nmak", each[..., :bundles], driven)
+        for each in (response.moves, response.turns)
+    )
     offset, place = _beyond(at, state)
     slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
     for k, change in enumerate(changes):
@@ -279,10 +270,6 @@ def _slopes(
         turned = change.scale * at.rotation + at.scale * change.rotation
         slopes[..., k] += change.position + place @ turned.T
     return slopes
-
-
-def _products(by_activation: Array, driven: Array) -> Array:
-    return np.einsum("nmaj,njk->nmak", by_activation, driven)
 
 
 def _with_tensions(

@@ -20,7 +20,7 @@ from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support.arguments import as_integer, as_names, as_number
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput, NotPossible, Range, did_you_mean
+from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.files.text import write_table
 
 if TYPE_CHECKING:
@@ -69,8 +69,7 @@ class PosePlan:
             noise: Standard deviation of a coordinate of a marker [m]: of the measurement, and of
                 all that the model does not have.
         """
-        noise = as_number("noise", noise, Range(0.0, 1.0, "m", True))
-        scale = self.free.scale
+        noise, scale = as_number("noise", noise, Range(0.0, 1.0, "m", True)), self.free.scale
         inverse = np.linalg.inv(self.information * np.outer(scale, scale))
         widths = noise * scale * np.sqrt(np.diag(inverse))
         return dict(zip(self.names, widths.tolist(), strict=True))
@@ -159,7 +158,12 @@ def plan_poses(
     numbers = free_numbers(arm, free)
     candidates = as_integer("candidates", candidates, 2, 200_000)
     n, seed = as_integer("n", n, 1, candidates), as_integer("seed", seed)
-    names, (low, high) = _markers(arm, markers), arm.input_bounds.T
+    known, (low, high) = marker_names(arm), arm.input_bounds.T
+    names = known if markers is None else as_names("markers", markers)
+    if not names or {*names} - {*known} or len({*names}) < len(names):
+        raise InvalidInput(
+            "markers", ", ".join(names) or "none", f"of {', '.join(known)}, each once"
+        )
     moving = low < high
     cube = _candidates(int(moving.sum()), candidates, seed)
     inputs = np.tile(low, (len(cube), 1))
@@ -186,18 +190,6 @@ def plan_poses(
     return PosePlan(numbers, names, inputs[chosen], own.T @ own)
 
 
-def _markers(arm: Manipulator, given: Sequence[str] | None) -> tuple[str, ...]:
-    known = marker_names(arm)
-    if given is None:
-        return known
-    names = as_names("markers", given)
-    wrong = [name for name in names if name not in known or names.count(name) > 1]
-    if wrong or not names:
-        allowed, value = f"of {', '.join(known)}, each once", wrong[0] if wrong else "none"
-        raise InvalidInput("markers", value, allowed, did_you_mean(value, known))
-    return names
-
-
 def _candidates(dim: int, count: int, seed: int) -> Array:
     """Places all over the unit cube, then corners of it, shape (n, dim)."""
     inside = sample_cube("sobol", 1 << (count - 1).bit_length(), dim, seed)[:count]
@@ -218,8 +210,7 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
     near = np.zeros(len(slopes), int)  # chosen poses that each candidate is too near to
     chosen: list[int] = []
     for _ in range(n):
-        best = _best(slopes, total, near)
-        chosen.append(best)
+        chosen.append(best := _best(slopes, total, near))
         near += _within(at, best, room)
         total = total + each[best]
     for _ in range(_ROUNDS):
@@ -227,9 +218,9 @@ def _chosen(slopes: Array, at: Array, n: int) -> NDArray[np.intp]:
         for place, old in enumerate(chosen):
             near -= _within(at, old, room)
             rest = total - each[old]
-            best = _best(slopes, rest, near)
+            chosen[place] = best = _best(slopes, rest, near)
             near += _within(at, best, room)
-            chosen[place], total = best, rest + each[best]
+            total = rest + each[best]
         if np.linalg.slogdet(total)[1] - before < _GAIN:
             break
     return np.array(chosen, np.intp)

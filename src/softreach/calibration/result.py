@@ -22,11 +22,10 @@ from softreach.calibration.errors import (
     misses,
     repeatability,
 )
-from softreach.calibration.fit import Fit, robust_width, started
+from softreach.calibration.fit import Fit, Uncertainty, robust_width, started
 from softreach.calibration.free_numbers import POSE, SCALE, free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
-from softreach.calibration.uncertainty import Uncertainty
 from softreach.support.arguments import as_flag, as_integer
 from softreach.support.arrays import Array, Index, Mask, as_rows
 from softreach.support.errors import counted
@@ -163,17 +162,14 @@ class Calibration(Reported):
         for number, value in zip(self.fit.free.numbers, self.fit.values.tolist(), strict=True):
             mean, width = number.prior or (value, 1.0)
             if (off := abs(value - mean) / width) > _FAR_FROM_PRIOR:
-                doubts.append(
-                    f"{number.name} is {off:.1f} widths from its prior: free another number that "
-                    "may explain the data, or widen the prior"
-                )
+                more = "free another number that may explain the data, or widen the prior"
+                doubts.append(f"{number.name} is {off:.1f} widths from its prior: {more}")
         known = [rival for rival in self.rivals if rival.held_out.number]
         best = min(known, key=lambda rival: rival.held_out.rms, default=None)
         if best is not None and best.held_out.rms < _BETTER * own.rms:
-            doubts.append(
-                f"{best.name} predicts better than the arm ({1e3 * best.held_out.rms:.3g} mm, not "
-                f"{1e3 * own.rms:.3g}): check order, sign and unit of inputs, or free more numbers"
-            )
+            errors = f"{1e3 * best.held_out.rms:.3g} mm, not {1e3 * own.rms:.3g}"
+            more = "check order, sign and unit of inputs, or free more numbers"
+            doubts.append(f"{best.name} predicts better than the arm ({errors}): {more}")
         return tuple(doubts)
 
     @property
@@ -230,16 +226,14 @@ class Calibration(Reported):
         Raises:
             InvalidInput: No finite inputs of that shape.
         """
-        allowed = f"shape (n, {self.arm.inputs})"
-        x = as_rows("inputs", inputs, self.arm.inputs, allowed)
+        x = as_rows("inputs", inputs, self.arm.inputs, f"shape (n, {self.arm.inputs})")
         model = MarkerModel(self.fit.free, x, self.data.marker_names)
-        prediction = model.predict(self.fit.values, slopes=True)
-        covariance = self.uncertainty.covariance
-        square = np.einsum("nmap,pq,nmaq->nma", prediction.slopes, covariance, prediction.slopes)
+        places, slopes, _ = model.predict(self.fit.values, slopes=True)
+        square = np.einsum("nmap,pq,nmaq->nma", slopes, self.uncertainty.covariance, slopes)
         square = np.maximum(square, 0.0)
         if not as_flag("numbers_only", numbers_only):
             square = square + self.spread**2
-        return prediction.places, np.sqrt(square)
+        return places, np.sqrt(square)
 
     @cached_property
     def spread(self) -> Array:
@@ -285,12 +279,11 @@ class Calibration(Reported):
         """Numbers with their errors over `number`, residuals over `sample`, `marker`, `axis`."""
         import xarray as xr
 
-        free = self.fit.free
-        place = ("sample", "marker", "axis")
+        numbers, place = self.fit.free.numbers, ("sample", "marker", "axis")
         values = {
             "value": ("number", self.fit.values),
             "sigma": ("number", self.uncertainty.sigma),
-            "start": ("number", np.array([number.start for number in free.numbers])),
+            "start": ("number", np.array([number.start for number in numbers])),
             "at_bound": ("number", self.fit.at_bound),
             "correlation": (("number", "other"), self.uncertainty.correlation),
             "measured": (place, self.data.places, {"units": "m"}),
@@ -303,7 +296,7 @@ class Calibration(Reported):
         names = {
             "number": list(self.names),
             "other": list(self.names),
-            "unit": ("number", [number.unit for number in free.numbers]),
+            "unit": ("number", [number.unit for number in numbers]),
             "marker": list(self.data.marker_names),
             "axis": ["x", "y", "z"],
             "input": list(self.arm.input_names),
@@ -332,14 +325,12 @@ class Calibration(Reported):
             InvalidInput: Something is there, and `overwrite` is not given.
             NotWritten: It cannot be written.
         """
-        free, sigma = self.fit.free.numbers, self.sigma
-        pairs = zip(free, self.fit.values.tolist(), strict=True)
-        lines = [
-            "# Calibrated from measured poses.",
-            *(f"# {key}: {value}" for key, value in self.provenance.items()),
-            *(f"# {n.name} = {x:.6g} ± {sigma[n.name]:.2g} {n.unit}" for n, x in pairs),
-        ]
-        write_text(path, "\n".join(lines) + f"\n\n{self.arm.file_text}", overwrite=overwrite)
+        lines = [f"{key}: {value}" for key, value in self.provenance.items()]
+        for number, value in zip(self.fit.free.numbers, self.fit.values.tolist(), strict=True):
+            sigma = f"{self.sigma[number.name]:.2g}"
+            lines.append(f"{number.name} = {value:.6g} ± {sigma} {number.unit}")
+        head = "\n# ".join(["# Calibrated from measured poses.", *lines])
+        write_text(path, f"{head}\n\n{self.arm.file_text}", overwrite=overwrite)
 
     @property
     def errors(self) -> list[tuple[str, str, PlacementErrors]]:
@@ -450,10 +441,8 @@ def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
         listed = ", ".join(f"{name} {rms:.3g}" for name, rms in each)
         yield f"{unit.label('rms')} of each marker: {listed}"
     if result.held.any() and not result.held_runs and len(result.data.run_names) > 1:
-        yield (
-            "rows of one motion are neighbors: errors at held-out rows say little about other "
-            "motions; hold out whole runs"
-        )
+        more = "errors at held-out rows say little about other motions; hold out whole runs"
+        yield f"rows of one motion are neighbors: {more}"
     for first, second, share in result.correlated[:3]:
         yield f"hardly told apart: {first} and {second} (correlation {share:+.3f})"
     if len(far := result.outliers):
@@ -481,12 +470,11 @@ def _doubtful_inputs(result: Calibration) -> Iterator[str]:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = 1.0 - (missed * moves).sum(axis=2) / square
         sure = _WIDTHS * np.sqrt(noise * np.diag(inverse)[1:, None] / square)
+    against = share + sure < _AGAINST, "the wrong way: check its sign and the input order"
+    hardly = np.abs(share) + sure < _HARDLY, "hardly: check its column and its unit"
     for k, name in enumerate(result.arm.input_names[j] for j in moving):
-        for wrong, words in (
-            (share[k] + sure[k] < _AGAINST, "the wrong way: check its sign and the input order"),
-            (np.abs(share[k]) + sure[k] < _HARDLY, "hardly: check its column and its unit"),
-        ):
-            if (hits := np.flatnonzero(wrong & matters[k])).size:
+        for wrong, words in (against, hardly):
+            if (hits := np.flatnonzero(wrong[k] & matters[k])).size:
                 seen = ", ".join(data.marker_names[m] for m in hits)
                 times = share[k, hits[0]]
                 yield f"{name} moves {seen} {words} ({times:.2f} times as far as the model)"

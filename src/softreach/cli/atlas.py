@@ -197,7 +197,7 @@ def figures(
 def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
 ) -> sr.DesignSpace:
-    from softreach.arm.design_file import LONGEST
+    from softreach.arm.design_reader import LONGEST
     from softreach.atlas.space import parse_space
 
     if (path is None) == (vary is None):

@@ -183,7 +183,7 @@ def _examples() -> Table:
 
 
 def _materials() -> Table:
-    from softreach.arm.material import material_record
+    from softreach.arm.section import material_record
 
     yield "material", "young_modulus_pa", "poisson_ratio", "density_kg_m3", "modulus"
     for name in sr.arm.material_names():
@@ -192,7 +192,7 @@ def _materials() -> Table:
 
 
 def _actuators() -> Table:
-    from softreach.arm.design_file.keys import every_kind
+    from softreach.arm.design_file import every_kind
 
     yield "kind", "activation", "unit", "module", "description"
     for name, kind in every_kind(sr.arm.Actuator).items():

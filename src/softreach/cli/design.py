@@ -39,7 +39,7 @@ def design(
     if schema:
         given = {"out": out, "overwrite": output.overwrite, "unit": output.unit}
         options.refuse("with --schema", **given, **changes.given)
-        from softreach.arm.design_file.schema import json_schema
+        from softreach.arm.design_reader import json_schema
 
         console.json(json_schema(), indent=2)
         return

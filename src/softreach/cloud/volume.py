@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.geometry import hull as hulls
-from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull
-from softreach.geometry.delaunay import delaunay
-from softreach.geometry.flat import alpha_area, convex_edges, enclosed_area, plane_of
-from softreach.geometry.hull import Hull
+from softreach.geometry.alpha_shape import AlphaComplex, alpha_hull, delaunay
+from softreach.geometry.hull import Hull, alpha_area, convex_edges, enclosed_area, plane_of
 from softreach.schema import AXES, is_stable
 from softreach.support import parallel
 from softreach.support.arguments import POSITIVE, as_flag, as_given, plain

@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import arm_surface, bundle_surfaces, inside
 from softreach.export.formats import write_by_suffix, write_ply, write_vtu
-from softreach.geometry.surface import SurfaceMesh, parted
-from softreach.geometry.tube import joined
+from softreach.geometry.surface import SurfaceMesh, joined, parted
 from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points

@@ -1,7 +1,7 @@
 """All activations that put the tip at a target, with three free bundles.
 
 1. The activation box is cut into cells of six tetrahedra each; tips and Jacobians are computed at
-   their corners, once for an arm (`cells`).
+   their corners, once for an arm (`prepared`).
 2. A tetrahedron is mapped by the quadratic through tips and Jacobians of its corners, whose image
    lies within planes; the true image lies within a remainder of it, estimated from the tips and
    Jacobians along the edges: `kernels.image.activation_mesh`. So every root lies in a tetrahedron

@@ -19,7 +19,7 @@ from softreach.inverse.request import Request
 from softreach.inverse.roots import Reached, descend, first_of_each, reach
 from softreach.kernels.box import sequential_projection as kernels
 from softreach.kernels.box.box_projection import project
-from softreach.kernels.branches.spread import choose_apart
+from softreach.kernels.box.sequential_projection import choose_apart
 from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows

@@ -1,12 +1,12 @@
 """Vectors in space as tuples of three numbers, which stay in registers once inlined.
 
-A matrix is a tuple of three such rows, a rotation a unit quaternion (w, x, y, z). `strict_vector`
-has some of the functions for `strict` kernels: these call no other.
+A matrix is a tuple of three such rows, a rotation a unit quaternion (w, x, y, z). Some functions
+are there for `strict` kernels too, which call no others: these round each operation as written.
 """
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inline
+from softreach.kernels.compiler import inline, strict
 
 
 @inline
@@ -94,3 +94,8 @@ def turned(q, p):
 def back(q):
     """The quaternion that turns back."""
     return -q[0], q[1], q[2], q[3]
+
+
+strict_row, strict_difference = strict(row), strict(difference)
+strict_minus, strict_times = strict(minus), strict(times)
+strict_cross, strict_dot = strict(cross), strict(dot)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.material import named_material
 from softreach.arm.number import fields_of
 from softreach.arm.parameters import Parameter, changed, parameters_by_every_name, unknown_parameter
+from softreach.arm.section import named_material
 from softreach.arm.tables import check_extension
 from softreach.support.arguments import as_given, as_mapping, plain
 from softreach.support.arrays import Array
@@ -134,7 +134,7 @@ class FreeParameters:
     def start(self) -> dict[str, float | str] | None:
         """Values of the first base, within the ranges; None where it does not tell them."""
         known, values = parameters_by_every_name(self.base), {}
-        for name, each in ((each.name, each) for each in self.free):
+        for name, each in zip(self.names, self.free, strict=True):
             if name in _WORDS:
                 values[name] = each.choices[0]
                 continue
@@ -158,6 +158,9 @@ def free_parameters(
     given = as_mapping("free", free, lambda _, value: value)
     picks = {} if choices is None else as_mapping("choices", choices, lambda _, value: value)
     known = known_parameters(bases.values(), picks.get(BUNDLES, ()))
+    for name in (*given, *(name for name in picks if name not in _WORDS)):
+        if name not in known:
+            raise unknown_parameter(name, known)
     texts = {name: text for name, text in given.items() if isinstance(text, str)}
     parts = [_ranged(known, name, ends) for name, ends in given.items() if name not in texts]
     if len(bases) > 1:
@@ -182,14 +185,8 @@ def known_parameters(arms: Iterable[Manipulator], counts: Any) -> dict[str, Para
     return known
 
 
-def _parameter(known: Mapping[str, Parameter], name: str) -> Parameter:
-    if name not in known:
-        raise unknown_parameter(name, known)
-    return known[name]
-
-
 def _ranged(known: Mapping[str, Parameter], name: str, ends: Any) -> FreeParameter:
-    parameter = _parameter(known, name)
+    parameter = known[name]
     try:
         low, high = (float(plain(end)) for end in ends)
     except (TypeError, ValueError):
@@ -213,22 +210,21 @@ def _choice(
     if not picks or len({*picks}) < len(picks):
         allowed = "a list of different values to choose from"
         raise InvalidInput(f"choices {name}", as_given(values), allowed)
-    unit = "1"
-    if name in _CHOICES:
-        for arm in bases.values():
-            for value in picks:
-                _CHOICES[name](arm, value)
-    elif name == DESIGN:
+    if name == DESIGN:
         raise InvalidInput("choices", DESIGN, "given as base: a dictionary of designs by name")
-    else:
-        unit = _parameter(known, name).unit
-        if wrong := [v for v in picks if isinstance(v, bool) or not isinstance(v, int | float)]:
-            raise InvalidInput(f"choices {name}", as_given(wrong[0]), "numbers")
-    return FreeParameter(name=name, unit=unit, choices=picks)
+    for value in picks:
+        if name in _CHOICES:
+            for arm in bases.values():
+                _CHOICES[name](arm, value)
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            raise InvalidInput(f"choices {name}", as_given(value), "numbers")
+    return FreeParameter(
+        name=name, unit="1" if name in _CHOICES else known[name].unit, choices=picks
+    )
 
 
 def _tie(known: Mapping[str, Parameter], free: list[str], name: str, text: str) -> Tie:
-    unit, match = _parameter(known, name).unit, _TIE.fullmatch(text)
+    unit, match = known[name].unit, _TIE.fullmatch(text)
     if match is None or match["name"] not in free:
         allowed = f"{_TIES}; free are {', '.join(free) or 'none'}"
         raise InvalidInput(f"free {name}", as_given(text), allowed)

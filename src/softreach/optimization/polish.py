@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -171,19 +172,16 @@ class _Program:
 
     def _cost(self, unknowns: Array) -> float:
         """Cost over that of the start; that of a design that cannot exist is large."""
-        try:
+        cost = math.nan
+        with suppress(InvalidDesign, InvalidInput):
             cost = self.point(unknowns).cost / self._scale
-        except (InvalidDesign, InvalidInput):
-            return _WORSE
         return cost if math.isfinite(cost) else _WORSE
 
     def _cost_slope(self, unknowns: Array) -> Array:
         self.accepted = unknowns.copy()
-        try:
+        with suppress(InvalidDesign, InvalidInput):
             return np.nan_to_num(self.point(unknowns).cost_slope / self._scale)
-        except (InvalidDesign, InvalidInput):
-            return np.zeros(len(unknowns))
+        return np.zeros(len(unknowns))
 
     def _asked(self, parts: str, of: Callable[[Sequence[Part]], Array], unknowns: Array) -> Array:
-        """Values or derivatives of the "equations" or "inequalities"."""
         return of(getattr(self.point(unknowns), parts))

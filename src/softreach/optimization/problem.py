@@ -13,8 +13,7 @@ import numpy as np
 
 from softreach.arm.body import mass
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metrics import Metric, MetricFailed, known_metric
+from softreach.atlas.metrics import Intermediates, Metric, MetricFailed, known_metric
 from softreach.cloud import compute_cloud
 from softreach.cloud.dexterity import dexterity
 from softreach.cloud.redundancy import activation_distance
@@ -129,9 +128,9 @@ def goals(maximize: Names, minimize: Names, requirements: Requirements) -> tuple
             several = as_names(word, several)
         result += [Goal(known_objective(word, each), sense) for each in several]
     names = [goal.name for goal in result]
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise InvalidInput("objective", twice[0], "given once")
     for goal in result:
+        if names.count(goal.name) > 1:
+            raise InvalidInput("objective", goal.name, "given once")
         if (asks := goal.objective.asks) and not getattr(requirements, asks):
             raise InvalidInput("objective", goal.name, f"left out: the requirements have no {asks}")
     return tuple(result)

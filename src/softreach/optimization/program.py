@@ -60,18 +60,13 @@ class DesignPoint:
         return tuple(map(self._derivatives_of, self.rods))
 
     def _derivatives_of(self, rod: TipMap) -> TipDerivatives:
-        known = find_parameters(rod.arm, self._paths[0])
-        return TipDerivatives(rod, [known[name] for name in self._paths[0]])
-
-    @lazy
-    def chain(self) -> Array:
-        """Change of parameters of the arm by unknowns: ranges and ties, shape (paths, reals)."""
-        return self._paths[1]
+        known = find_parameters(rod.arm, self.moved)
+        return TipDerivatives(rod, [known[name] for name in self.moved])
 
     @lazy
     def sets(self) -> VolumeGradient:
         """Derivatives of the reachable set."""
-        return gradient_of(self.case.reached, self._paths[0], self.accuracy)
+        return gradient_of(self.case.reached, (*self.moved,), self.accuracy)
 
     def value(self, name: str) -> float:
         """A number of the reachable set, of what it covers, or of the design alone."""
@@ -86,7 +81,7 @@ class DesignPoint:
         if name == "coverage":
             return np.mean([self.share_slope(*pair) for pair in self._covered], axis=0)
         if name in SETS:
-            return getattr(self.sets, SETS[name]) @ self._paths[1]
+            return getattr(self.sets, SETS[name]) @ self.chain
         of = OF_ARM[name]
         return np.array([(of(up) - of(down)) / step for step, up, down in self.neighbors])
 
@@ -107,7 +102,7 @@ class DesignPoint:
         """Its derivatives: what the part of the boundary in the region sweeps, theory (98)."""
         solid = self.case.set_of(self.arms[number])
         if solid.dimension < 3:
-            return np.zeros(self.chain.shape[1])
+            return np.zeros(len(self.problem.parameters.real))
         nodes = boundary_samples(solid.image)
         inside = (region.distance(nodes.places) <= 0.0).astype(float)
         own, rod = self.rods[number], effective(self.rods[number])
@@ -126,9 +121,14 @@ class DesignPoint:
             pairs.append(((ends[0] - ends[1]) / (p.high - p.low), *arms))
         return pairs
 
+    @property
+    def chain(self) -> Array:
+        """Change of parameters of the arm by unknowns, shape (parameter, real)."""
+        return np.array([*self.moved.values()]).reshape(-1, len(self.problem.parameters.real))
+
     @lazy
-    def _paths(self) -> tuple[tuple[str, ...], Array]:
-        """Parameters of the arm that move, and the chain."""
+    def moved(self) -> dict[str, Array]:
+        """Parameters of the arm that move, and how with unknowns: by ranges and ties."""
         parameters = self.problem.parameters
         known = parameters_by_every_name(self.case.arm)
         names = [each.name for each in parameters.real]
@@ -137,7 +137,7 @@ class DesignPoint:
         for tie in parameters.ties:
             if tie.of in widths and tie.name in known:
                 rows[tie.name] = tie.factor * widths[tie.of]
-        return tuple(rows), np.array(list(rows.values())).reshape(-1, len(names))
+        return rows
 
 
 EFFORTS = ("mean_effort", "worst_effort")
@@ -313,16 +313,13 @@ class Point:
                 share = self.design.share(number, region)
                 slope = partial(self.design.share_slope, number, region)
                 yield self._limit(target.name, -1.0, share, target.share, slope)
-        limits = [
-            (name, sense, limit)
-            for name, ends in needs.measures.items()
-            for sense, limit in zip((-1.0, 1.0), ends, strict=True)
-            if name in SETS and limit is not None
-        ]
-        given = needs.limits.given
-        for name, sense, limit in limits + [(x, 1.0, given[x]) for x in OF_ARM if x in given]:
-            slope = partial(self.design.slope, name)
-            yield self._limit(name, sense, self.design.value(name), limit, slope)
+        ends = [(name, needs.measures[name]) for name in needs.measures if name in SETS]
+        ends += [(name, (None, needs.limits.given.get(name))) for name in OF_ARM]
+        for name, pair in ends:
+            for sense, limit in zip((-1.0, 1.0), pair, strict=True):
+                if limit is not None:
+                    slope = partial(self.design.slope, name)
+                    yield self._limit(name, sense, self.design.value(name), limit, slope)
         for k, (goal, floor) in enumerate(zip(goals, self.floors, strict=False)):
             if k != self.goal:
                 scale = abs(floor) or 1.0

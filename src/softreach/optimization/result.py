@@ -128,10 +128,8 @@ class Search(Reported):
         ends = {}
         for p in (p for p in self.problem.parameters.free if not p.choices):
             value, near = float(self.best.values[p.name]), _AT_END * (p.high - p.low)
-            if value <= p.low + near:
-                ends[p.name] = "lower"
-            elif value >= p.high - near:
-                ends[p.name] = "upper"
+            if not p.low + near < value < p.high - near:
+                ends[p.name] = "lower" if value <= p.low + near else "upper"
         return ends
 
     @property
@@ -163,12 +161,11 @@ class Search(Reported):
         import xarray as xr
 
         every, free = self.every, self.problem.parameters.free
-        goals, arm = self.goals, self.shown
+        goals, arm, numbers = self.goals, self.shown, self._numbers(self.every)
         shown = {"length": arm.length, "display_unit": arm.display_unit or ""}
         places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
         coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
         values = [[p.number(each.values[p.name]) for p in free] for each in every]
-        numbers = self._numbers(every)
         looked_at = np.cumsum([each.designs for each in self.candidates], dtype=int)
         return xr.Dataset(
             {
@@ -244,12 +241,10 @@ class Search(Reported):
     def _design_text(self, each: Candidate) -> str:
         arm, unit = self.problem.parameters.arm(each.values), self.shown.length_unit
         pairs = zip(self.goals, each.objectives, strict=bool(each.objectives))
-        lines = [
-            f"{_FOUND}{'' if each.is_feasible else '; it does not meet all requirements'}.",
-            *(f"# {goal.name}: {_value_text(goal, value, unit)}" for goal, value in pairs),
-            *(f"# {key}: {text}" for key, text in self.provenance.items()),
-        ]
-        return "\n".join(lines) + f"\n\n{arm.file_text}"
+        numbers = {goal.name: _value_text(goal, value, unit) for goal, value in pairs}
+        head = f"{_FOUND}{'' if each.is_feasible else '; it does not meet all requirements'}."
+        lines = (f"# {key}: {text}" for key, text in [*numbers.items(), *self.provenance.items()])
+        return "\n".join([head, *lines]) + f"\n\n{arm.file_text}"
 
     def table(self, *, every: bool = False, unit: str = "m") -> pd.DataFrame:
         """Parameters and objectives with their errors, a row for each design of the front.

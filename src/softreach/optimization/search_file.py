@@ -79,8 +79,6 @@ def read_search(
 
 
 class _Reader(FaultReader):
-    """Reads the table, and what was given beside it."""
-
     def __init__(self, document: Mapping[str, Any], given: Mapping[str, Any]) -> None:
         super().__init__()
         self.free: dict[str, Any] = {}
@@ -118,15 +116,13 @@ class _Reader(FaultReader):
         names = Written(known_parameters(bases.values(), self.choices.get("bundles", ())))
         for path, key, value in self._entries("choices", names):
             if key not in NAMED_CHOICES:
-                name = self._name(names, path, key)
-                self._add(path, value, self.choices, name, self._numbers(names, path, key, value))
+                self._add_numbers(path, value, self.choices, names, key, ",")
         ties = []
         for path, key, value in self._entries("free", names):
-            name = self._name(names, path, key)
-            if isinstance(value, str) and ":" not in value:
-                ties.append((path, value, self.free, name, value))
+            if key in names.by_key and isinstance(value, str) and ":" not in value:
+                ties.append((path, value, self.free, names.by_key[key].name, value))
             else:
-                self._add(path, value, self.free, name, self._numbers(names, path, key, value, ":"))
+                self._add_numbers(path, value, self.free, names, key, ":")
         if not (self.free or self.choices or len(bases) > 1 or self.faults):
             allowed = "needs one parameter or more with a range, or choices: taper_deg = [0, 3]"
             self._refuse("search.free", None, allowed)
@@ -173,21 +169,16 @@ class _Reader(FaultReader):
         for key, value in given.items():
             yield f"{table} {key}", key, value
 
-    def _name(self, names: Written, path: str, key: str) -> str:
-        """Plain name of a parameter; empty with a fault if there is none."""
-        if key in names.by_key:
-            return names.by_key[key].name
-        hint = did_you_mean(key, names.by_key, 0.5)
-        allowed = unknown_parameter(key, names.written).allowed
-        text = f"is no parameter; {hint}" if hint else f"is no parameter: must be {allowed}"
-        self._refuse(path, None, text)
-        return ""
-
-    def _numbers(self, names: Written, path: str, key: str, given: Any, mark: str = ",") -> Any:
-        """Numbers in SI units; `WRONG` where some are none or beyond what they may be."""
-        values = given.split(mark) if isinstance(given, str) else given
+    def _add_numbers(
+        self, path: str, given: Any, table: dict[str, Any], names: Written, key: str, mark: str
+    ) -> Any:
+        """Take the numbers of a parameter as written, in a list or divided by a mark."""
         if key not in names.by_key:
-            return WRONG
+            hint = did_you_mean(key, names.by_key, 0.5)
+            allowed = unknown_parameter(key, names.written).allowed
+            text = f"is no parameter; {hint}" if hint else f"is no parameter: must be {allowed}"
+            return self._refuse(path, None, text)
+        values = given.split(mark) if isinstance(given, str) else given
         if not isinstance(values, list | tuple):
             return self._refuse(path, values, "must be a list of numbers")
         parameter, numbers = names.by_key[key], []
@@ -201,15 +192,15 @@ class _Reader(FaultReader):
         if wrong := [value for value in numbers if not allowed.admits(value)]:
             shown = allowed.in_degrees() if parameter.unit == "rad" else allowed
             return self._refuse(path, values[numbers.index(wrong[0])], f"must be {shown.text}")
-        return tuple(numbers)
+        return self._add(path, given, table, parameter.name, tuple(numbers))
 
     def _add(self, path: str, given: Any, table: dict[str, Any], name: str, value: Any) -> None:
         """Take the value of a parameter, the first of its name, if a search may have it."""
         if name in table:
             self._refuse(path, None, "is given twice")
-        elif name and value is not WRONG:
-            of_free = {**self.free, name: value} if table is self.free else {}
-            choices = {**self.choices, name: value} if table is self.choices else self.choices
-            make = partial(free_parameters, self._bases, of_free, choices)
-            if self._tried(path, given, make) is not WRONG:
-                table[name] = value
+            return
+        of_free = {**self.free, name: value} if table is self.free else {}
+        choices = {**self.choices, name: value} if table is self.choices else self.choices
+        make = partial(free_parameters, self._bases, of_free, choices)
+        if self._tried(path, given, make) is not WRONG:
+            table[name] = value

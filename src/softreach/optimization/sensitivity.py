@@ -250,16 +250,15 @@ def _equations(point: Point) -> Array:
 
 def _ends(problem: Problem, point: Point) -> Iterator[tuple[Array, Multiplier]]:
     """Slopes of bounds of unknowns, and what these are worth per unit: nothing for a pose."""
-    unknowns = np.concatenate([point.reals, point.poses.ravel()])
+    unknowns, reals = np.concatenate([point.reals, point.poses.ravel()]), problem.parameters.real
     for j, (place, row) in enumerate(zip(unknowns, np.eye(len(unknowns)), strict=True)):
         for end, sign, word in ((0.0, -1.0, "low"), (1.0, 1.0, "high")):
             if abs(place - end) <= _AT_END:
-                name, gain, unit = "", 0.0, ""
-                if j < len(point.reals):
-                    real = problem.parameters.real[j]
-                    name, unit = f"{word} end of {real.name}", real.unit
-                    gain = 1.0 / (real.high - real.low)
-                yield sign * row, Multiplier(name, gain, unit)
+                worth = Multiplier("", 0.0, "")
+                if j < len(reals):
+                    gain = 1.0 / (reals[j].high - reals[j].low)
+                    worth = Multiplier(f"{word} end of {reals[j].name}", gain, reals[j].unit)
+                yield sign * row, worth
 
 
 def _variances(

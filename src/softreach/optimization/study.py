@@ -5,6 +5,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import Any, Literal, get_args
@@ -112,12 +113,11 @@ class Study:
         """Let a sampler that begins at one place begin where the best of the known designs are."""
         if self.kind != "cma" or len(self.candidates) < _WARM:
             return
-        complete = (self._optuna.trial.TrialState.COMPLETE,)
         options = {"n_startup_trials": 0, "warn_independent_sampling": False}
-        make = self._optuna.samplers.CmaEsSampler
         with _quiet():
-            trials = self._study.get_trials(states=complete)
-            self._study.sampler = make(source_trials=trials, seed=self.seed + 1, **options)
+            trials = self._study.get_trials(states=(self._optuna.trial.TrialState.COMPLETE,))
+            make = partial(self._optuna.samplers.CmaEsSampler, source_trials=trials)
+            self._study.sampler = make(seed=self.seed + 1, **options)
 
     def _created(self, storage: Any) -> Any:
         samplers, quiet = self._optuna.samplers, {"warn_independent_sampling": False}
@@ -188,9 +188,8 @@ def first_designs(problem: Problem, count: int, seed: int) -> Iterator[Values]:
     """Designs evenly spread over all ranges and choices, after the one that the user has."""
     from scipy.stats import qmc
 
-    if (start := problem.parameters.start()) is not None:
-        yield start
-    free = problem.parameters.free
+    free, start = problem.parameters.free, problem.parameters.start()
+    yield from [] if start is None else [start]
     sampler = qmc.Sobol(len(free), rng=np.random.default_rng(seed))
     for place in sampler.random_base2(math.ceil(math.log2(max(count, 1))))[:count]:
         yield {each.name: each.at(float(x)) for each, x in zip(free, place, strict=True)}

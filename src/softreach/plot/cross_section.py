@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.material import Material
-from softreach.arm.section import Section
+from softreach.arm.section import Material, Section
 from softreach.plot.style import LENGTH, PLACE, Unit, some_bundles, styled_axes, unit_for
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput

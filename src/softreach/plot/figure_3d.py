@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.cloud.clouds import design_of
-from softreach.geometry.surface import compact_surface, simplified
-from softreach.geometry.tube import tube_surface
+from softreach.geometry.surface import compact_surface, simplified, tube_surface
 from softreach.picture.page import ColorScale, Figure3D, PagePart, Swatches, css_color, web_page
 from softreach.picture.projection import View, view_angles
 from softreach.picture.thumbnail import Dots, Skin

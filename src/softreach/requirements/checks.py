@@ -306,15 +306,13 @@ def _covered(rules: PoseRules, target: Target, places: Array, sets: Sets, step: 
         return np.zeros(len(places), bool)
     if reached.dimension == 3 and not target.within:
         return reached.contains(places)
-    rod = reached.tip_map
-    least = rod.tol * rod.length if reached.dimension < 3 else 0.0
+    least = reached.tip_map.tol * reached.tip_map.length if reached.dimension < 3 else 0.0
     return reached.distance(places) <= max(target.within, least)
 
 
 def _largest(values: Array) -> tuple[int, int]:
     """Payload and place of the largest value, by their numbers."""
-    load, place = np.unravel_index(int(values.argmax()), values.shape)
-    return int(load), int(place)
+    return divmod(int(values.argmax()), values.shape[1])
 
 
 def _under(payload: float | None) -> str:
@@ -331,9 +329,8 @@ def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding
         load, place = _largest(gaps)
         met, of = int(reached.all(axis=0).sum()), counted(len(target.points), "place")
         if reached.all():
-            effort = float(made.effort[:, own].max())
             near = f" to {unit.text(target.within)}" if target.within else ""
-            text = f"{of} reached{near}, effort up to {effort:.3g}"
+            text = f"{of} reached{near}, effort up to {made.effort[:, own].max():.3g}"
             yield Finding(target.name, "reach", "met", 0.0, text)
             continue
         gap = float(gaps[load, place])
@@ -394,16 +391,14 @@ def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Ite
 def _kept(
     keep: Keep, value: float, error: float, excess: float, where: str, unit: LengthUnit
 ) -> Finding:
-    of = "the tip" if keep.of == "tip" else "the arm"
     close = f" ± {unit.rounded(error, digits='.2g')}" if keep.of == "arm" else ""
     verdict = "missed" if excess > 0.0 else verdict_of(max(-value, 0.0), error)
+    text = f"the {keep.of} keeps {unit.rounded(0.0 - value)}{close} to spare {where}"
     if excess > 0.0:
         beyond = "outside" if keep.inside else "inside or too near"
-        text = f"{of} is {unit.rounded(value)}{close} {beyond} {where}"
+        text = f"the {keep.of} is {unit.rounded(value)}{close} {beyond} {where}"
     elif not np.isfinite(value):
         text = "no pose to judge"
-    else:
-        text = f"{of} keeps {unit.rounded(0.0 - value)}{close} to spare {where}"
     return Finding(keep.name, keep.kind, verdict, excess, text)
 
 

@@ -10,8 +10,7 @@ from softreach.arm.body import load_number, mass
 from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import ends_over, quadrature, tables
-from softreach.atlas.intermediates import Intermediates
-from softreach.atlas.metrics import Need, known_metric
+from softreach.atlas.metrics import Intermediates, Need, known_metric
 from softreach.requirements.parts import LIMIT_UNITS
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.rods import as_tip_map
@@ -123,19 +122,17 @@ def _too_far(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
 
 def limit_finding(name: str, value: float, most: float, arm: Manipulator, where: str) -> Finding:
     """A limit against its value."""
-    symbol = LIMIT_UNITS[name]
+
+    def text(x: float) -> str:
+        if name in ("actuators", "shortening"):
+            return f"{x:g}" if name == "actuators" else f"{100 * x:.3g} %"
+        symbol = LIMIT_UNITS[name]
+        return arm.length_unit.text(x) if symbol == "m" else f"{x:.4g} {symbol}".strip()
+
     excess = max(value - most, 0.0) / (most or 1.0)
     excess = excess if excess > _ROUNDING else 0.0
-    if name == "actuators":
-        texts = [f"{value:g}", f"{most:g}"]
-    elif name == "shortening":
-        texts = [f"{100 * value:.3g} %", f"{100 * most:.3g} %"]
-    elif symbol == "m":
-        texts = [arm.length_unit.text(x) for x in (value, most)]
-    else:
-        texts = [f"{x:.4g} {symbol}".strip() for x in (value, most)]
-    text = f"{texts[0]} of at most {texts[1]}{where}"
-    return Finding(_WORDS.get(name, name), "limit", verdict_of(-excess), excess, text)
+    said = f"{text(value)} of at most {text(most)}{where}"
+    return Finding(_WORDS.get(name, name), "limit", verdict_of(-excess), excess, said)
 
 
 def design_limits(arm: Manipulator, needs: Requirements) -> Iterator[Finding]:
@@ -217,10 +214,10 @@ def _binding(arm: Manipulator, rod: TipMap, gamma: Array, slope: Array, miss: Ar
     box, pull = rod.box, miss @ slope
     texts = []
     for k in box.free:
-        name, unit = arm.input_names[k], _unit(arm, int(k))
         for end, bound, sign in (("lower", box.low[k], -1.0), ("upper", box.high[k], 1.0)):
             if abs(gamma[k] - bound) <= _AT_BOUND * box.widths[k] and sign * pull[k] > 0.0:
-                texts.append(f"the {end} bound of {name} ({bound:.4g}{unit})")
+                at = f"{bound:.4g}{_unit(arm, int(k))}"
+                texts.append(f"the {end} bound of {arm.input_names[k]} ({at})")
     return texts
 
 

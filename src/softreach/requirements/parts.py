@@ -16,7 +16,6 @@ from softreach.support.files.text import MEGABYTE
 MOST_PLACES = 1_000_000  # Places that all targets may have together
 LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
 
-_NOT_NEGATIVE = Range(0.0)
 _LENGTH = Range(0.0, unit="m")
 _SHARE = Range(0.0, 1.0, open_low=True)
 _REGION = "a region: Box, Sphere, HalfSpace or Mesh"
@@ -145,9 +144,9 @@ class Limits:
         for name, value in self.given.items():
             if name == "actuators":
                 arguments.as_integer(name, value, 0, 1_000_000)
-                continue
-            allowed = Range(0.0, 1.0) if name == "shortening" else _NOT_NEGATIVE
-            object.__setattr__(self, name, arguments.as_number(name, value, allowed))
+            else:
+                allowed = Range(0.0, 1.0 if name == "shortening" else np.inf)
+                object.__setattr__(self, name, arguments.as_number(name, value, allowed))
 
     @property
     def given(self) -> dict[str, float]:

@@ -7,7 +7,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from softreach.arm.bending import bending_stations
 from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
@@ -16,7 +15,7 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.parts import LIMIT_UNITS, Keep
 from softreach.requirements.regions import HalfSpace
-from softreach.rod.bending import bending_over_bounds, some_corners, worst_inputs
+from softreach.rod.bending import bending_over_bounds, bending_stations, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import InvalidLoads, TipMap
@@ -58,8 +57,7 @@ class PoseRules:
     keeps: tuple[Keep, ...]
     limits: dict[str, float]
     tolerance: float  # Error that is allowed in how far a region is missed [m]
-    known_rod: TipMap | None = None
-    """Tip map of the arm, if it is to be another than to the usual tolerance."""
+    known_rod: TipMap | None = None  # Tip map of the arm, if it is another than the usual one
 
     @property
     def rooms(self) -> tuple[Array, Array]:
@@ -99,8 +97,7 @@ class PoseRules:
 
     def _kept(self, gamma: Array, levels: Sequence[int] = _LEVELS) -> tuple[Array, Array]:
         """Distances by which regions are missed [m], and what may come on top, (n, keep) each."""
-        value = np.empty((len(gamma), len(self.keeps)))
-        error = np.zeros_like(value)
+        value, error = np.zeros((2, len(gamma), len(self.keeps)))
         left: dict[int, Index] = {}
         for column, keep in enumerate(self.keeps):
             if keep.of == "tip":
@@ -166,9 +163,7 @@ class Body(NamedTuple):
 
     center: Array  # Shape (n, station, 3) [m]
     tangent: Array  # Shape (n, station, 3)
-    radius: Array
-    """Of what is widest before activation, body, tendons and the disks that hold these, shape
-    (n, station) [m]."""
+    radius: Array  # Of the widest before activation: body, tendons, their disks; (n, station) [m]
     between: Array
     """Farthest that a point of the body is from those of the two sections that it lies between,
     both ways together [m], shape (n, station - 1)."""

@@ -28,7 +28,6 @@ _STEPS = np.array([0.8191725133961645, 0.6710436067037893, 0.5497004779019703])
 """1/g, 1/g² and 1/g³ with g⁴ = g + 1: steps of a sequence that fills the cube evenly."""
 _BLOCK = 65_536  # points at once
 _MOST_PLACES = 1_000_000
-_MOST_FACES = 5_000_000  # of a file
 _MOST_BYTES = 256_000_000
 _FILES = (".stl", ".ply", ".obj", ".off", ".glb")
 _EMPTIEST = 1e-4  # share of its bounding box that a region fills at least, to draw places from it
@@ -74,20 +73,18 @@ class Region(ABC):
             InvalidInput: The region has no end.
             NotPossible: It fills next to nothing of the box around it.
         """
-        n = as_integer("n", n, 1, _MOST_PLACES)
-        low, high = self.bounds
+        n, (low, high) = as_integer("n", n, 1, _MOST_PLACES), self.bounds
         if not np.isfinite(self.volume):
             raise InvalidInput("region", self, "bounded: a half-space has no end")
-        kept: list[Array] = []
-        count, drawn = 0, 0
-        while count < n:
+        kept, drawn = np.empty((0, 3)), 0
+        while len(kept) < n:
             numbers = np.arange(drawn + 1, drawn + max(n, 256) + 1)[:, None]
             points = low + (0.5 + numbers * _STEPS) % 1.0 * (high - low)
-            kept.append(points[self.distance(points) <= 0.0])
-            count, drawn = count + len(kept[-1]), drawn + len(points)
-            if count < _EMPTIEST * drawn and drawn > 1.0 / _EMPTIEST:
+            kept = np.concatenate([kept, points[self.distance(points) <= 0.0]])
+            drawn += len(points)
+            if len(kept) < _EMPTIEST * drawn and drawn > 1.0 / _EMPTIEST:
                 raise NotPossible(f"{self} is too thin to draw places from it")
-        return np.concatenate(kept)[:n]
+        return kept[:n]
 
     def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         """Least and largest distance of the points of circular sections, negative inside.
@@ -297,13 +294,8 @@ class Mesh(Region):
         if stated not in (None, size.name):
             raise InvalidInput("unit", size.name, f"{stated}, as {name} says")
         check_installed("trimesh")
-        trimesh = import_module("trimesh")
         try:
-            scene: Any = trimesh.load(name, force="scene")
-            parts = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
-            if (count := sum(len(getattr(part, "faces", ())) for part in parts)) > _MOST_FACES:
-                raise ValueError(f"{count:,} triangles are more than {_MOST_FACES:,}")
-            mesh: Any = scene.to_mesh()
+            mesh: Any = import_module("trimesh").load(name, force="scene").to_mesh()
             mesh.merge_vertices()
             import_module("trimesh.repair").fix_winding(mesh)
             vertices, faces = np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)

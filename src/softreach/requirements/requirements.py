@@ -226,12 +226,12 @@ def _limits_of(name: str, ends: Any) -> tuple[float | None, float | None]:
     if metric is None or metric.over:
         known = [m.name for group in METRIC_GROUPS.values() for m in group if not m.over]
         raise InvalidInput("measures", as_given(name), f"one of {', '.join(known)}")
+    said = f"measures[{name!r}]"
     if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) != 2:
-        raise InvalidInput(f"measures[{name!r}]", as_given(ends), "a pair (least, largest)")
-    low, high = (None if x is None else as_number(f"measures[{name!r}]", x) for x in ends)
+        raise InvalidInput(said, as_given(ends), "a pair (least, largest)")
+    low, high = (None if x is None else as_number(said, x) for x in ends)
     if low is not None and high is not None and low > high:
-        allowed = "a pair with least <= largest"
-        raise InvalidInput(f"measures[{name!r}]", f"({low:g}, {high:g})", allowed)
+        raise InvalidInput(said, f"({low:g}, {high:g})", "a pair with least <= largest")
     return low, high
 
 
@@ -297,11 +297,10 @@ class _Reader(toml.FaultReader):
         return self._made(Target, raw, path, values)
 
     def _beside(self, name: str, instead: str) -> Path:
-        """Path of a file that lies beside the text, if that has a place."""
-        if self.folder is None:
-            allowed = f"part of the text: other files are not sent along; write {instead}"
-            raise InvalidInput("file", repr(name), allowed)
-        return self.folder / name
+        if self.folder is not None:
+            return self.folder / name
+        allowed = f"part of the text: other files are not sent along; write {instead}"
+        raise InvalidInput("file", repr(name), allowed)
 
     def _keep(self, raw: dict[str, Any], path: str, inside: bool) -> Any:
         values = self._part(raw, path, {"clearance": "m"}, ("name", "of", "when"))
@@ -357,7 +356,7 @@ class _Reader(toml.FaultReader):
                 self._refuse(path, table, "must be a table with at_least, at_most or both")
             else:
                 unit = metric.unit if metric.unit in _EXAMPLES else ""
-                ends: dict[str, str] = {"at_least": unit, "at_most": unit}
+                ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
                 values = self._numbers(table, path, ends, plain=True)
                 measures[name] = tuple(map(values.get, ends))
         return measures
@@ -436,10 +435,10 @@ class _Reader(toml.FaultReader):
             return "the length L of the arm is not known here: give m, cm or mm"
         if symbol or not unit:
             return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
-        units = ", ".join(unit_names(unit)) + ", L" * (unit == "m" and self.length is not None)
-        hint = "" if unit != "m" or self.length is not None else "; L is not known here"
-        key = f"{name}_{unit.lower()}{hint}"
-        return f'must have its unit ({units}), such as "{_EXAMPLES[unit]}", or stand under {key}'
+        more, hint = ("", "; L is not known here") if self.length is None else (", L", "")
+        more, hint = (more, hint) if unit == "m" else ("", "")
+        how = f'({", ".join(unit_names(unit))}{more}), such as "{_EXAMPLES[unit]}"'
+        return f"must have its unit {how}, or stand under {name}_{unit.lower()}{hint}"
 
 
 def _keys(name: str, unit: str) -> dict[str, str]:

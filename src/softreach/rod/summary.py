@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
-from softreach.arm.along import AlongArm
-from softreach.arm.bending import Extreme
 from softreach.arm.body import (
     VERIFIED_LOAD_NUMBER,
     is_overloaded,
@@ -22,9 +20,10 @@ from softreach.arm.body import (
 from softreach.arm.driving import extension_range
 from softreach.arm.lines import law_warning, line_strains
 from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
+from softreach.arm.part import AlongArm
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension
-from softreach.rod.bending import BendingRange, bending_over_bounds
+from softreach.rod.bending import BendingRange, Extreme, bending_over_bounds
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidInput
 from softreach.support.quantity import columns

@@ -13,7 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.calibration.calibration import Calibration
 from softreach.calibration.measurements import Measurements
 from softreach.inverse import Solution
-from softreach.inverse.drag import Drag, Dragged
+from softreach.inverse.path import Drag, Dragged
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.requirements import Check
 from softreach.rod.tip_map import TipStatus

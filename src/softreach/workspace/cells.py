@@ -27,9 +27,9 @@ from softreach.support.lazy import lazy
 from softreach.support.memory import free_memory
 from softreach.support.progress import Progress
 from softreach.workspace.crossings import Crossings, line_volume, swept_crossings
+from softreach.workspace.grid import AllPostures
 from softreach.workspace.image import Image, Lattice, covered_cubes
 from softreach.workspace.measure import ConvexHull, Estimate, climbed_hull
-from softreach.workspace.postures import AllPostures
 from softreach.workspace.search import (
     CLOUD,
     DISTANCE,

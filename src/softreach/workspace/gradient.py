@@ -21,9 +21,18 @@ from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.quantity import quantity
 from softreach.workspace.cells import ReachedCells, Wrap
-from softreach.workspace.flux import Flux, face_image, flux_tol, grid_faces, signed_volume
 from softreach.workspace.image import Image, Lattice
-from softreach.workspace.measure import FLUX_PART, Estimate, HullCorners, outer_vertices
+from softreach.workspace.measure import (
+    FLUX_PART,
+    Estimate,
+    Flux,
+    HullCorners,
+    face_image,
+    flux_tol,
+    grid_faces,
+    outer_vertices,
+    signed_volume,
+)
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.tip_derivatives import Shifts, TipDerivatives, shifts_along

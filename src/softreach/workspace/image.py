@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
 
 from softreach.geometry.surface import Surface, compact_surface, enclosed_volume, level_set
-from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
-from softreach.kernels.image import contour, raster
+from softreach.kernels.image import raster
+from softreach.kernels.image.activation_mesh import corner_bits, kuhn_simplices
 from softreach.picture.zbuffer import vertex_normals
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows
@@ -98,7 +98,7 @@ class Image:
     vertices: Array
     """Mapped vertices in these units from the lattice's origin, shape (n, 3)."""
     triangles: Index
-    """Critical triangles, as `kernels.image.contour.critical_triangles` lists them."""
+    """Critical triangles, as `kernels.image.raster.critical_triangles` lists them."""
     half: LiftedGrid | None = None
     """The grid of half as many cells, if it is known."""
 
@@ -291,7 +291,7 @@ def image_of(
     longest = max(float(np.sum(steps)), 1.0)
     longest = max(longest, float(np.ptp(scaled[grid.lifted], axis=1).sum(axis=1).max(initial=0.0)))
     # Determinants of the kernels are then exact, as rounding adds no more than 1 unit.
-    unit = 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
+    unit = 2.0 ** np.floor(raster.EXACT_BITS - 1 - np.log2(longest))
     vertices = np.rint(scaled * unit)
     vertices[np.isnan(vertices)] = 0.0
     triangles = _critical_triangles(vertices[:nodes], grid.jacobian_dets, grid.is_lifted, progress)
@@ -325,7 +325,7 @@ def _lifted_triangles(vertices: Array, cells: Index) -> Index:
 def _critical_triangles(
     vertices: Array, jacobian_dets: Array, is_lifted: Mask, progress: Progress
 ) -> Index:
-    star, axes = contour.stars(is_lifted.shape), np.array(is_lifted.shape)
+    star, axes = raster.stars(is_lifted.shape), np.array(is_lifted.shape)
     gaps = np.pad(is_lifted, [(0, 1)] * 3).ravel()  # of the cells whose least vertex this is
     largest = np.abs(jacobian_dets).max() or 1.0
     jacobian_dets = np.rint(jacobian_dets / largest * 2.0**_DET_BITS)
@@ -336,7 +336,7 @@ def _critical_triangles(
         first, last = blocks[number].start, blocks[number].stop
         out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
         grid = vertices, jacobian_dets, axes, gaps
-        used = contour.critical_triangles(*grid, first, last, star, out)
+        used = raster.critical_triangles(*grid, first, last, star, out)
         parts[number] = out[:used].copy()
         progress(last - first)
 

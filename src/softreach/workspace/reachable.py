@@ -18,9 +18,8 @@ from softreach.support.errors import MissingExtra, NotPossible, counted
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.cells import Covering, ReachedCells, cells_of
-from softreach.workspace.flux import face_image
 from softreach.workspace.image import DIAGONAL, Image, boundary_surface, wrapped_surface
-from softreach.workspace.measure import Estimate, extrapolated
+from softreach.workspace.measure import Estimate, extrapolated, face_image
 from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from softreach.rod.tip_map import BLOCK, TipMap, TipOutputs, no_equilibrium
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, rows
 from softreach.support.progress import Progress, silent
+from softreach.workspace.grid import AllPostures
 from softreach.workspace.image import Lattice, covered_cubes
-from softreach.workspace.postures import AllPostures
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 ENOUGH = 1e-3  # distance at which a place counts as reached, in cells

@@ -20,9 +20,9 @@ from softreach.picture.zbuffer import vertex_normals
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Faces, Mask
-from softreach.workspace.flux import face_triangles, grid_faces
 from softreach.workspace.grid import box_slopes, cube_grid
 from softreach.workspace.image import Image
+from softreach.workspace.measure import face_triangles, grid_faces
 
 _FACE_CELLS = 40
 _FOLD_CELLS = 24

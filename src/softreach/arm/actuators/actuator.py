@@ -12,8 +12,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from softreach.arm.along import AlongArm
 from softreach.arm.number import MOST, Number, as_numbers, fields_of, number
+from softreach.arm.part import AlongArm
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span

@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from softreach.arm.actuators.actuator import MOST_TURN, Outline, PolarActuator, Resultants
-from softreach.arm.along import Samples
 from softreach.arm.number import as_numbers, number
+from softreach.arm.part import Samples
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.support.arrays import Array

@@ -13,11 +13,10 @@ from typing import Any, Self
 import numpy as np
 
 from softreach.arm.actuators import FiberArchitecture
-from softreach.arm.along import AlongArm, Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.material import Material
+from softreach.arm.part import AlongArm, Pieces
 from softreach.arm.profile import LinearTaper
-from softreach.arm.section import Ring, Section
+from softreach.arm.section import Material, Ring, Section
 from softreach.support.arguments import POSITIVE, as_given, as_number, as_path
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, Range

@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, pasted
-from softreach.kernels.lanes import LANES, copy, get, get_four, load_all, put, put_four, turn_at
 from softreach.kernels.loaded.rod_step import at_stages, column_step, frame_tip
 from softreach.kernels.loaded.section import (
     FORCE,
@@ -35,11 +34,19 @@ from softreach.kernels.loaded.section import (
 from softreach.kernels.loaded.section import SIZE as SECTION
 from softreach.kernels.loaded.shooting import node_world
 from softreach.kernels.loaded.unloaded_frames import (
+    LANES,
     NODE_ROWS,
     STEP_ROWS,
     TURN,
     TURN_ROWS,
+    copy,
+    get,
+    get_four,
+    load_all,
+    put,
+    put_four,
     rest_frames,
+    turn_at,
 )
 from softreach.kernels.loaded.unloaded_frames import WORK as REST_WORK
 from softreach.kernels.vector import back, combination, cross, plus, times, turned

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.lanes import LANES, get, put, turn_at
 from softreach.kernels.loaded.rod_step import (
     at_stages,
     direction_tip,
@@ -22,7 +21,7 @@ from softreach.kernels.loaded.rod_step import (
     frame_tip,
     frame_walk,
 )
-from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
+from softreach.kernels.loaded.unloaded_frames import LANES, NODE_ROWS, get, put, turn_at
 from softreach.kernels.vector import combination, cross, dot, minus, plus, times
 
 # Rows of the workspace, LANES numbers each.

@@ -4,6 +4,8 @@ They are d and P of theory (63). A load turns an arm by less than its activation
 an integrator of the load alone, in the frames of the unloaded arm, needs a fifth of the steps
 (`design/loaded_rod.md`). What it needs of those frames is d3 at the five Lobatto nodes of a step
 and the activated lengths.
+
+Rods lie side by side, component after component, in rows of LANES numbers.
 """
 
 from __future__ import annotations
@@ -11,10 +13,74 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import inline, pasted
-from softreach.kernels.lanes import LANES
 from softreach.kernels.loaded.rod_step import NODES
 from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.rod.tips import load
 from softreach.kernels.vector import dot, times
+
+LANES = 32
+"""Rods side by side: whole blocks only, so that a rod's result never depends on its neighbors.
+
+A block of rods under loads is searched until the last of them is found, and what one step of it
+needs should stay in the nearest cache: fewer than the tips of free rods take.
+"""
+
+
+@inline
+def get(w, at, i):
+    """Three rows of one lane."""
+    return w[at + i], w[at + LANES + i], w[at + 2 * LANES + i]
+
+
+@inline
+def put(w, at, i, v):
+    """Write three rows of one lane."""
+    w[at + i] = v[0]
+    w[at + LANES + i] = v[1]
+    w[at + 2 * LANES + i] = v[2]
+
+
+@inline
+def get_four(w, at, i):
+    """Four vectors of one lane."""
+    return (
+        get(w, at, i),
+        get(w, at + 3 * LANES, i),
+        get(w, at + 6 * LANES, i),
+        get(w, at + 9 * LANES, i),
+    )
+
+
+@inline
+def put_four(w, at, i, s):
+    """Write four vectors of one lane."""
+    put(w, at, i, s[0])
+    put(w, at + 3 * LANES, i, s[1])
+    put(w, at + 6 * LANES, i, s[2])
+    put(w, at + 9 * LANES, i, s[3])
+
+
+@inline
+def turn_at(w, at, i):
+    """A quaternion in four rows of one lane."""
+    return w[at + i], w[at + LANES + i], w[at + 2 * LANES + i], w[at + 3 * LANES + i]
+
+
+@inline
+def copy(into, at, values, start, count):
+    """A loop: an assignment of slices would compile messages for shapes that do not fit."""
+    for i in range(count):
+        into[at + i] = values[start + i]
+
+
+@inline
+def load_all(lanes, gamma, first, count):
+    """Lay activations side by side; lanes to spare repeat the last one."""
+    load(lanes, gamma, first, count)
+    for j in range(lanes.shape[0]):
+        for i in range(count, LANES):
+            lanes[j, i] = lanes[j, count - 1]
+
 
 # A step is a row of a table: η dZ, d1, d2, d3, ζ̂ dZ of each of its nodes, tip first, LANES numbers
 # each.

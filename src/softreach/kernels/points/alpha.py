@@ -18,10 +18,20 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import strict
-from softreach.kernels.points.expansions import BOTTOM, value
-from softreach.kernels.points.predicates import EPS, ORIENT_BOUND, dot3, edge, end, minor
+from softreach.kernels.points.predicates import (
+    BOTTOM,
+    EPS,
+    ORIENT_BOUND,
+    dot3,
+    edge,
+    end,
+    minor,
+    value,
+)
 from softreach.kernels.points.triangulation import FACES, corners
-from softreach.kernels.strict_vector import cross, difference, dot
+from softreach.kernels.vector import strict_cross as cross
+from softreach.kernels.vector import strict_difference as difference
+from softreach.kernels.vector import strict_dot as dot
 
 DIGITS = 2.0**26  # a value this many times its rounding error is good to eight digits
 LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two products

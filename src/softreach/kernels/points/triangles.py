@@ -7,7 +7,10 @@ import math
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, strict
-from softreach.kernels.strict_vector import dot, minus, row, times
+from softreach.kernels.vector import strict_dot as dot
+from softreach.kernels.vector import strict_minus as minus
+from softreach.kernels.vector import strict_row as row
+from softreach.kernels.vector import strict_times as times
 
 
 @strict

@@ -16,9 +16,8 @@ from numba import float64
 from softreach.kernels.compiler import cuda_kernel, inline
 from softreach.kernels.counting import PARTS, cell_of, rank_of, sector_of, uniform
 from softreach.kernels.rod.jacobian import step_column, weights_at
-from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.rod.magnus import act, exponent
 from softreach.kernels.rod.tips import BEND_ROWS, node_twist
-from softreach.kernels.rod.twist import act
 from softreach.kernels.vector import combination, cross, minus, plus
 
 cuda: Any = numba.cuda  # without types

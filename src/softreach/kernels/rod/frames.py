@@ -8,9 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, strict
-from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.rod.magnus import act, exp_coefficients, exponent
 from softreach.kernels.rod.tips import BEND_ROWS
-from softreach.kernels.rod.twist import act, exp_coefficients
 from softreach.kernels.vector import combination, cross
 
 _BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)

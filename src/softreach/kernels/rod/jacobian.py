@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.rod.magnus import exponent, exponent_derivative
+from softreach.kernels.rod.magnus import add, bracket, dexp, exponent, exponent_derivative
 from softreach.kernels.rod.tips import (
     BEND_ROWS,
     LANES,
@@ -22,7 +22,6 @@ from softreach.kernels.rod.tips import (
     room,
     walk,
 )
-from softreach.kernels.rod.twist import add, bracket, dexp
 
 
 @inline

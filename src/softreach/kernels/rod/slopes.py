@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.rod.magnus import exponent_and_parts, pulled_back
+from softreach.kernels.rod.magnus import act, exp_derivatives, exponent_and_parts, pulled_back
 from softreach.kernels.rod.tips import (
     BEND_ROWS,
     LANES,
@@ -24,7 +24,6 @@ from softreach.kernels.rod.tips import (
     nodes_at,
     room,
 )
-from softreach.kernels.rod.twist import act, exp_derivatives
 
 # Scratch of a group of lanes: for each coordinate what multiplies changes of the tables' rows, the
 # rows of R, what multiplies dΩ in each coordinate, and the parts of the exponent.

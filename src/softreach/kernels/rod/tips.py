@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.rod.magnus import exponent
-from softreach.kernels.rod.twist import act
+from softreach.kernels.rod.magnus import act, exponent
 
 LANES = 128
 """Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import quad
 
-from softreach.arm.actuators.sector import ring_integrals
+from softreach.arm.actuators.fiber import ring_integrals
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
 from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, Verdict, judged

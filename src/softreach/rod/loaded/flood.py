@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softreach.kernels.loaded.grid_values import UNEVEN, interpolate
+from softreach.kernels.loaded.shooting import UNEVEN, interpolate
 from softreach.rod.inputs import ActivationBox
 from softreach.rod.loaded.solver import ALL_LOADS, Equilibria, Solver, turn_between, units
 from softreach.support.arrays import Array, Index, Mask

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from softreach.kernels.lanes import LANES
+from softreach.kernels.loaded.unloaded_frames import LANES
 from softreach.rod.loaded.flood import Flood, are_same, edges_along, follow, neighbors, smooth_edges
 from softreach.rod.loaded.postures import Postures, polished
 from softreach.rod.loaded.solver import Equilibria, Solver

@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings
-from softreach.kernels.lanes import LANES
+from softreach.kernels.loaded.unloaded_frames import LANES
 from softreach.rod.free import FreeRod
 from softreach.rod.inputs import ActivationBox
 from softreach.rod.loaded.flood import CUT, PARTS, Flood, Followed, follow

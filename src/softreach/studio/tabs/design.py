@@ -13,7 +13,7 @@ from softreach.arm.base import POINTS
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.material import material_names
+from softreach.arm.section import material_names
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
 from softreach.studio.figures import NO_BAR, slope_bars

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.export.clouds import path_csv
-from softreach.inverse.drag import Drag
-from softreach.inverse.path import PathStatus, end_text, track_path
+from softreach.inverse.path import Drag, PathStatus, end_text, track_path
 from softreach.inverse.request import positions_in
 from softreach.schema import input_symbols
 from softreach.studio.captions import place_text, tip_text
