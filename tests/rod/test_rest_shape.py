@@ -16,8 +16,8 @@ from softreach.arm.base import POINTS
 from softreach.arm.bending import bending_at
 from softreach.arm.loads import PointLoad
 from softreach.forces import blocked_force
-from softreach.rest import rest
 from softreach.rod import as_tip_map
+from softreach.rod.rest import rest
 from softreach.rod.rods import free_bundles
 from softreach.stiffness import cloud_compliance, tip_compliance
 from softreach.support.errors import InvalidInput

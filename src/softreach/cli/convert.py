@@ -9,9 +9,10 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import Rows, console
+from softreach.cli.console import console
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible
+from softreach.support.rows import Rows
 
 Format = Annotated[
     str | None,

@@ -10,14 +10,14 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import ERROR, Rows, as_read, console, rows_of
-from softreach.cli.design import load_rows
+from softreach.cli.console import as_read, console, rows_of
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, read_mass
 from softreach.support import progress
 from softreach.support.arguments import as_number
 from softreach.support.errors import NotPossible, Range, counted
 from softreach.support.files.formats import PAGES, PICTURES
 from softreach.support.memory import check_memory
+from softreach.support.rows import ERROR, Rows
 
 HULL_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
 
@@ -47,6 +47,7 @@ def reach(
     """
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.inverse.request import position_in
+    from softreach.rod.summary import load_rows
 
     arm = design_from(design, changes, output.unit)
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
@@ -213,6 +214,7 @@ def cloud(
         out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
     from softreach.cloud.clouds import CLOUD_STORE
+    from softreach.rod.summary import load_rows
 
     arm = design_from(design, changes, output.unit)
     out = out or Path(f"{Path(design).stem}.zarr")
