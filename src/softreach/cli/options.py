@@ -136,16 +136,12 @@ class Sampling:
     sampler: str | None = None
 
     @property
-    def count(self) -> int:
-        """Number of samples."""
-        return 400_000 if self.n is None else self.n
-
-    @property
     def arguments(self) -> dict[str, Any]:
         """Arguments of `compute_cloud` and `build_atlas`."""
         if self.sampler == "grid":
             refuse("on the sampler grid, which is not random", seed=self.seed)
-        return {"n": self.count, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
+        n = 400_000 if self.n is None else self.n
+        return {"n": n, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
 
 
 SAMPLING = Sampling()
@@ -261,21 +257,12 @@ def say_limits(arm: sr.Manipulator) -> None:
         warn(text)
 
 
-_POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".mat", ".ply", ".stl", ".obj")
-"""Suffixes of points, surfaces and tables, which are no designs."""
-
-
 def _unchanged(text: str) -> sr.Manipulator:
     names = sr.designs.__all__
     if text in names:
         return getattr(sr.designs, text)()
     path = Path(text)
     suffix = path.suffix.lower()
-    if suffix in _POINTS:
-        raise NotPossible(
-            f"{text} is no design: give a .toml file; in Python, softreach.concave_hull(points, "
-            "alpha=0.05) computes the volume of points [m] of shape (n, 3)"
-        )
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
         return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
@@ -425,3 +412,10 @@ def save_picture(figure: Any, path: Path, overwrite: bool) -> None:
     sr.plot.save_figure(figure, path, overwrite=overwrite)
     if note := getattr(figure, "note", ""):
         console.note(f"{path}: {note}")
+
+
+def save_mesh(mesh: Any, arm: sr.Manipulator, path: Path, overwrite: bool) -> None:
+    """Write a surface, and say the unit of its lengths."""
+    written = written_unit(arm)
+    sr.export.export_mesh(mesh, path, unit=written, overwrite=overwrite)
+    console.written(path, written)

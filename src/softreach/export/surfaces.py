@@ -199,7 +199,6 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
 
 
 def _write_3mf(scene: Scene, file: BufferedWriter) -> None:
-    """An object for each part, in a unit that the file names (3MF core specification)."""
     if scene.unit.relative:
         raise InvalidInput("unit", "L", f"{', '.join(_UNITS_3MF)} for a .3mf file")
     colors = ["#" + bytes(_colors(part)[0]).hex().upper() for part in scene.parts]

@@ -22,7 +22,16 @@ from softreach.plot import coloring
 from softreach.plot.axes import view_extent
 from softreach.plot.reach import drawn_tips, plot_opposite_sides, point_size
 from softreach.plot.statistics import SIDES, plot_curvature
-from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes, unit_of
+from softreach.plot.style import (
+    DPI,
+    PAGE,
+    Axes,
+    Figure,
+    figure_style,
+    place_panels,
+    styled_axes,
+    unit_of,
+)
 from softreach.schema import is_stable
 from softreach.support import parallel
 from softreach.support.arguments import as_integer
@@ -32,8 +41,6 @@ from softreach.support.palette import STEEL, activation_colors
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
 _KEY = 0.45  # inches for the key of colors at least
@@ -209,7 +216,6 @@ def _sheet(
 def _label_sheet(
     figure: Figure, grid: NDArray[Any], axes: Sequence[SheetAxis], atlas: xr.Dataset, top: float
 ) -> None:
-    """Both parameters: their values beside the panels, and how many of them are shown."""
     for ax in grid.ravel().tolist():
         ax.patch.set_visible(False)
         ax.spines[:].set(color="0.88", linewidth=0.4)
@@ -248,7 +254,6 @@ def _draw_scale(figure: Figure, panel: Axes) -> None:
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
-    """As many designs along each parameter as there are panels at most, the ends among them."""
     sizes = {str(dim): atlas.sizes[dim] for dim in atlas["status"].dims}
     return atlas.isel({dim: evenly(size, panels) for dim, size in sizes.items()})
 
@@ -261,7 +266,6 @@ def evenly(size: int, most: int) -> Index:
 
 
 def _cloud_at(atlas: xr.Dataset, column: int, row: int) -> xr.Dataset | None:
-    """The cloud of the design there, if it is done and not damaged."""
     if int(atlas["status"][column, row]) != DONE:
         return None
     across, up = map(str, atlas["status"].dims)

@@ -11,7 +11,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.material import Material
 from softreach.arm.section import Section
-from softreach.plot.style import LENGTH, PLACE, Unit, some_bundles, styled_axes, unit_for
+from softreach.plot.style import LENGTH, PLACE, Axes, Unit, some_bundles, styled_axes, unit_for
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, Color, bundle_color, material_fill
@@ -19,7 +19,6 @@ from softreach.support.units import METER, readable_unit
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Patch, Wedge
 
@@ -192,8 +191,6 @@ def _annulus(low: float, high: float, fill: Any) -> Patch:
 
 @dataclass(frozen=True)
 class _Placed:
-    """One bundle that acts in a section."""
-
     index: int
     shape: str
     course: str

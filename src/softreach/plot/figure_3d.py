@@ -236,7 +236,6 @@ class Scene:
             self.keys.append(key)
 
     def _name(self, word: str) -> str:
-        """The word, with a number from the second part of that name on."""
         number = 1 + len({p.name for p in self.parts if p.name.split(" #")[0] == word})
         return word if number == 1 else f"{word} #{number}"
 

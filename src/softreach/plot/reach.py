@@ -18,6 +18,7 @@ from softreach.picture.zbuffer import ZBuffer, draw_mesh
 from softreach.plot import coloring, style
 from softreach.plot.arm import arm_images, arm_points, draw_markers, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
+from softreach.plot.style import Axes, Figure
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
@@ -29,8 +30,6 @@ from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _LARGEST = 8.0  # pixels
 _THICKNESS = 1 / 50  # of L, or of the cloud's extent

@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
+from softreach.picture.projection import View, on_paper, view_angles
 from softreach.plot import style
-from softreach.plot.axes import bounding_box, draw_box, view_extent
+from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import COLORMAP
+from softreach.plot.style import Axes, Figure
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import BEST, MET, MISSED
 from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _WIDTH = 7.2  # inches
 _SPACE, _ROW = 3.6, 1.75  # heights of the upper part and of each row of inputs [inch]
@@ -116,7 +115,6 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
 
     near = np.isfinite(shown.distance) & (shown.distance <= shown.top)
     places = shown.measured[near], shown.predicted[near]
-    box = bounding_box(*places)
     colors = [shown.colors[k] for k in np.nonzero(near)[1]]
     here, there = (on_paper(points, view) for points in places)
     lines = np.stack([here, there], axis=1)
@@ -126,13 +124,8 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
     ax.scatter(*here.T, s=size, color=_MEASURED, linewidths=0, zorder=3, label="measured")
     ax.scatter(*there.T, s=size, edgecolors=colors, zorder=4, **hollow)
     ax.scatter([], [], s=10, edgecolors="0.2", label="predicted", **hollow)
-    left, right, low, high = view_extent(box, view)
-    mirror = -1 if is_mirrored(view) else 1
-    ax.set(xlim=(mirror * left, mirror * right), ylim=(low, high), aspect="equal")
-    if plane := plane_of(view):
-        ax.set(xlabel=shown.unit.label(plane[0]), ylabel=shown.unit.label(plane[1]))
-    else:
-        draw_box(ax, box, view, shown.unit)
+    ax.set_aspect("equal")
+    Panel(ax, bounding_box(*places), view, shown.unit).frame()
     style.legend_above(ax, 2, handletextpad=0.2)
 
 
@@ -288,7 +281,6 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_missed(ax: Axes, shown: _Designs) -> None:
-    """Excess of each design, in their order; infinite ones stand at the upper edge."""
     excess = shown.data["excess"].values
     never = ~np.isfinite(excess) & ~shown.final
     missed = shown.missed & ~never
@@ -302,7 +294,6 @@ def _draw_missed(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_objectives(ax: Axes, shown: _Designs) -> None:
-    """The front over three or more objectives: a line for each design, the better end up."""
     rows = np.flatnonzero(shown.front & shown.feasible)[:_MOST_LINES]
     values = shown.values[rows]
     if not len(rows):

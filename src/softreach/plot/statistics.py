@@ -14,14 +14,13 @@ from softreach.picture.projection import View, project
 from softreach.plot import coloring, style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.reach import drawn_tips, plot_cloud, plot_slab
+from softreach.plot.style import Axes, Figure
 from softreach.schema import a_cloud
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number, as_one_of
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"

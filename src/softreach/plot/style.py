@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:  # matplotlib is imported where it draws
+    Axes = Figure = Any
 
 Unit = str | LengthUnit | None  # one asked for, "m", "cm", "mm" or "L"; None for L if known, else m
 DPI = 250  # pixels per inch of images inside figures, and of saved PNG files
@@ -167,8 +169,11 @@ def save_figure(
 
 
 def legend_above(ax: Axes, columns: int = 3, **more: Any) -> None:
-    """A legend over the upper edge of axes."""
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, **more)
+    """A legend over the upper edge of axes, each label once; none without labels."""
+    handles, labels = ax.get_legend_handles_labels()
+    if kinds := dict(zip(labels, handles, strict=True)):
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": columns}
+        ax.legend(kinds.values(), kinds.keys(), **place, **more)
 
 
 def remark(ax: Axes, text: str) -> None:
