@@ -201,10 +201,8 @@ def for_machines(rows: Rows, length: float | None = None) -> dict[str, Any]:
     for name, (value, unit) in rows.items():
         values = {unit: value}
         if length is not None and (power := POWERS.get(unit)):
-            import numpy as np
-
             relative = LengthUnit("L", length)
-            values[relative.symbol(power)] = np.asarray(plain(value), float) / relative.scale(power)
+            values[relative.symbol(power)] = relative.of(plain(value), power)
         for own, number in values.items():
             key = written_name(name.translate(_PLAIN), own or "1").translate(_PLAIN)
             fields[key] = plain(number)

@@ -15,17 +15,9 @@ from cyclopts import Group, Parameter, Token
 
 import softreach as sr
 from softreach.cli.console import console
-from softreach.support import quantity
+from softreach.support import errors, quantity
 from softreach.support.arguments import POSITIVE, as_one_of
-from softreach.support.errors import (
-    InvalidDesign,
-    InvalidInput,
-    NotPossible,
-    Range,
-    check_installed,
-    did_you_mean,
-    warn,
-)
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, Range
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
 from softreach.support.files.text import MEGABYTE, read_text
@@ -254,7 +246,11 @@ def say_limits(arm: sr.Manipulator) -> None:
     from softreach.arm.lines import law_warning
 
     if text := law_warning(arm):
-        warn(text)
+        errors.warn(text)
+
+
+# suffixes of points, surfaces and tables, which are no designs
+_POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".mat", ".ply", ".stl", ".obj")
 
 
 def _unchanged(text: str) -> sr.Manipulator:
@@ -263,10 +259,13 @@ def _unchanged(text: str) -> sr.Manipulator:
         return getattr(sr.designs, text)()
     path = Path(text)
     suffix = path.suffix.lower()
+    if suffix in _POINTS:
+        hint = "in Python, softreach.concave_hull(points, alpha=0.05) computes the volume of points"
+        raise NotPossible(f"{text} is no design: give a .toml file; {hint} [m] of shape (n, 3)")
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
         return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
-    hint = did_you_mean(text, names)
+    hint = errors.did_you_mean(text, names)
     if suffix == ".json":
         hint = f"if it is a filament: softreach import {text} {text[:-5]}.toml"
     raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(names)}", hint)
@@ -383,7 +382,7 @@ def check_output(
     if not paths:
         refuse("without --out", overwrite=overwrite)
     known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
-    check_installed(*(name for each in known for name in each.libraries), *libraries)
+    errors.check_installed(*(name for each in known for name in each.libraries), *libraries)
     for path in paths:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")

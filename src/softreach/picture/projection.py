@@ -25,13 +25,8 @@ from -x. "oblique" is from the front, a little from the right and above.
 """
 
 # right and up on the paper, and the axis of sight
-_PLANES = {
-    "front": ("x", "z", "y"),
-    "back": ("x", "z", "y"),
-    "side": ("y", "z", "x"),
-    "left": ("y", "z", "x"),
-    "top": ("x", "y", "z"),
-}
+_PLANES = dict.fromkeys(("front", "back"), ("x", "z", "y"))
+_PLANES |= {"side": ("y", "z", "x"), "left": ("y", "z", "x"), "top": ("x", "y", "z")}
 
 
 def view_axes(view: View) -> Array:

@@ -20,12 +20,12 @@ from softreach.plot.style import Axes, Figure
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
 from softreach.support.arrays import Array, as_floats, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, MET, MISSED, bundle_color
 from softreach.support.quantity import round_below
-from softreach.support.units import LengthUnit, in_lengths
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -190,16 +190,18 @@ def plot_designs(
         InvalidInput: A station off an arm, or an unknown view.
         MissingExtra: matplotlib is not installed.
     """
-    if not isinstance(panels, list | tuple) or not panels:
+    known = isinstance(panels, list | tuple) and all(isinstance(p, DesignPanel) for p in panels)
+    if not known or not panels:
         raise InvalidInput("panels", as_given(panels), "a list or tuple of DesignPanels")
-    for k, panel in enumerate(panels):
-        as_instance(f"panels[{k}]", panel, DesignPanel, "a DesignPanel")
     stations = as_stations("stations_over_length", stations_over_length).tolist()
     least = _LEAST if all(plane_of(p.view) for p in panels) else _LEAST_OBLIQUE
     usual = max(_LEAST * len(panels), least)
     width = usual if width is None else as_number("width", width, style.WIDTH)
     box = bounding_box(
-        *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
+        *(
+            arm_points(p.arm, rest_configuration(p.arm), LengthUnit("L", p.arm.length))
+            for p in panels
+        )
     )
     places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
@@ -210,13 +212,12 @@ def plot_designs(
         axes = figure.subplots(*shape, height_ratios=heights, squeeze=False)
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
-            drawn, shown = panel.bundles, length * box
-            plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown, unit=unit)
+            shared: dict[str, Any] = {"bundles": panel.bundles, "unit": unit}
+            plot_arm(arm, ax=axes[0, k], view=panel.view, box=length * box, **shared)
             axes[0, k].set_title(fill(panel.title, round(_LETTERS * width / len(panels))))
+            shared |= {"half_width": reach * length, "legend": False}
             for ax, station in zip(axes[1:, k], stations, strict=True):
-                z, half = station * length, reach * length
-                shared = {"bundles": drawn, "half_width": half, "legend": False, "unit": unit}
-                plot_cross_section(arm, z, ax=ax, **shared)
+                plot_cross_section(arm, station * length, ax=ax, **shared)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])

@@ -157,9 +157,8 @@ def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
 def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
     """Names of the bundles, or their numbers from 1 up if the cloud has none."""
     activation = bundle_activations(cloud)
-    bundle, count = activation.dims[1], activation.shape[1]
-    named = bundle in activation.coords
-    return tuple(map(str, activation[bundle].values if named else range(1, count + 1)))
+    bundle, numbers = activation.dims[1], range(1, activation.shape[1] + 1)
+    return tuple(map(str, activation[bundle].values if bundle in activation.coords else numbers))
 
 
 def draw_key(ax: Axes, key: Key | None) -> None:

@@ -258,8 +258,8 @@ def plot_opposite_sides(
     key = coloring.color_samples(first, "rgb").key
     room, columns = max(_ROOM, coloring.key_height(key)), [1.0] * len(clouds)
     beside, right = (0.58, 0.26) if style.unit_of(first["tip"], unit).relative else (0.75, 0.48)
-    titles = [f"({k + 1})  {title}" for k, title in enumerate(clouds)]
-    titles = [fill(title, round(_LETTERS / len(clouds))) for title in titles]
+    wide = round(_LETTERS / len(clouds))
+    titles = [fill(f"({k})  {title}", wide) for k, title in enumerate(clouds, 1)]
     top = room + 0.16 * max(1 + title.count("\n") for title in titles)
     with style.figure_style():
         edges = (beside + 0.07, right, 0.45, top)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -132,12 +133,11 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
 def _draw_markers(ax: Axes, shown: _Errors) -> None:
     apart = 0.25 * (2.0 * np.random.default_rng(0).random(shown.distance.T.shape) - 1.0)
     shown.scatter(ax, np.arange(len(apart))[:, None] + apart)
-    for k in range(len(shown.markers)):
-        for rows, look in ((~shown.held, "-"), (shown.held, ":")):
-            own = shown.distance[rows, k]
-            if np.isfinite(own).any():
-                rms = float(np.sqrt(np.nanmean(own**2)))
-                ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=look, zorder=4)
+    for k, (rows, look) in product(range(len(apart)), ((~shown.held, "-"), (shown.held, ":"))):
+        own = shown.distance[rows, k]
+        if np.isfinite(own).any():
+            rms = float(np.sqrt(np.nanmean(own**2)))
+            ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=look, zorder=4)
     ax.set_xticks(range(len(shown.markers)), shown.markers)
     if len(shown.markers) > 4 or len("".join(shown.markers)) > _LETTERS:
         ax.tick_params(axis="x", labelrotation=40)
@@ -246,17 +246,16 @@ def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
     rows = np.flatnonzero(shown.final & shown.feasible)
     before = shown.data["coarse_design"].values[rows]
     rows, before = rows[before >= 0], before[before >= 0]
-    coarse, full = shown.values[before, 0], shown.values[rows, 0]
-    known = np.isfinite(coarse)
+    known = np.isfinite(shown.values[before, 0])
     if not known.any():
         ax.set_axis_off()
         return
-    errors = shown.errors[rows[known], 0], shown.errors[before[known], 0]
+    rows, before = rows[known], before[known]
+    coarse, full = shown.values[before, 0], shown.values[rows, 0]
     bars = {**_BARS, "ecolor": "0.5", "elinewidth": 0.7, "capsize": 2, "zorder": 2}
-    ax.errorbar(coarse[known], full[known], *errors, **bars)
-    ax.scatter(coarse[known], full[known], **_FINAL)
-    first = float(full[known][0])
-    ax.axline((first, first), slope=1.0, color="0.7", lw=0.7, zorder=1)
+    ax.errorbar(coarse, full, shown.errors[rows, 0], shown.errors[before, 0], **bars)
+    ax.scatter(coarse, full, **_FINAL)
+    ax.axline((full[0], full[0]), slope=1.0, color="0.7", lw=0.7, zorder=1)
     ax.set(xlabel=fill(f"{shown.labels[0]}, coarse", 2 * _LETTERS // 3), ylabel="full accuracy")
     style.remark(ax, "the best, judged again")
     ax.locator_params(nbins=4)
@@ -320,11 +319,7 @@ def _draw_ranges(ax: Axes, shown: _Designs) -> None:
     data, small = shown.data, {"s": 9, "linewidths": 0.5, "alpha": 0.6}
     low, high = data["low"].values, data["high"].values
     shares = (data["value"].values - low) / np.where(high > low, high - low, 1.0)
-    styles = (
-        (shown.met, {**_COARSE, **small}),
-        (shown.missed, {**_OUT, **small}),
-        (shown.front, _FINAL),
-    )
+    styles = [(shown.met, _COARSE | small), (shown.missed, _OUT | small), (shown.front, _FINAL)]
     for k in range(len(low)):
         ax.hlines(k, 0.0, 1.0, color="0.85", lw=0.8, zorder=0)
         for rows, look in styles:

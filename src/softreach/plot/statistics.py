@@ -213,8 +213,7 @@ def plot_curvature(
         if other.shape != places.shape or not np.allclose(other, places):
             raise InvalidInput("stations", other.tolist(), f"those of the first: {places.tolist()}")
     symbol, per_length = _SYMBOLS[quantity], quantity != "extension"
-    if per_length:
-        symbol += "L" if counted.relative else f" [1/{counted.name}]"
+    symbol += ("L" if counted.relative else f" [1/{counted.name}]") * per_length
     with style.styled_axes(ax) as ax:
         sides = (-1, 1) if len(statistics) == 2 else (0,)
         for (label, data), side, color in zip(statistics.items(), sides, SIDES, strict=False):

@@ -21,7 +21,7 @@ from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
-from softreach.support.units import LengthUnit, as_unit, in_lengths
+from softreach.support.units import METER, LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -238,7 +238,9 @@ def unit_of(data: xr.Dataset | xr.DataArray, unit: Unit = None) -> LengthUnit:
 
 def unit_for(length: float | None, unit: Unit = None) -> LengthUnit:
     """The unit asked for, else L of an arm of that length [m], else the meter."""
-    return in_lengths(length) if unit is None else as_unit(unit, length)
+    if unit is not None:
+        return as_unit(unit, length)
+    return METER if length is None else LengthUnit("L", length)
 
 
 def common_unit(units: list[LengthUnit]) -> LengthUnit:

@@ -182,18 +182,18 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
         if not shared[k]:
             yield body
         for place, first, fiber in zip(places, firsts, arm.fibers, strict=False):
-            if place == k:
-                angle = fiber.helical_angle_on(arm.profile, arm.section)
-                pairs = (fiber.bounds * body.scale).tolist()
-                yield replace(
-                    body,
-                    angle=angle if isinstance(angle, Pieces) else float(angle),  # pyright: ignore[reportArgumentType]
-                    extent=fiber.extent,
-                    offset=fiber.offset,
-                    bounds=tuple((low, high) for low, high in pairs),
-                    bundles=tuple(range(first, first + fiber.bundles)),
-                    name=fiber.name,
-                )
+            if place != k:
+                continue
+            angle: Any = fiber.helical_angle_on(arm.profile, arm.section)
+            yield replace(
+                body,
+                angle=angle if isinstance(angle, Pieces) else float(angle),
+                extent=fiber.extent,
+                offset=fiber.offset,
+                bounds=tuple(map(tuple, (fiber.bounds * body.scale).tolist())),
+                bundles=tuple(range(first, first + fiber.bundles)),
+                name=fiber.name,
+            )
 
 
 def _modulus(material: Material) -> float:
