@@ -251,10 +251,11 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
     from softreach.calibration.free_numbers import POSE, SCALE
 
     names, result = Written.of(arm), {}
+    of_pose: dict[str, str] = dict(zip((*POSE, SCALE), [*"mmm", *["rad"] * 3, "1"], strict=True))
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
     for name, text in pairs_in("prior", texts, allowed).items():
         first = name.split("=")[0].strip()
-        unit = dict(zip((*POSE, SCALE), ["m"] * 3 + ["rad"] * 3 + ["1"], strict=True)).get(first)
+        unit = of_pose.get(first)
         if unit is None and first not in names.by_key:
             raise InvalidInput("prior", name, "NAME=WIDTH with the full name of a free number")
         try:

@@ -443,7 +443,7 @@ def _middle(grid: xr.Dataset, axis: str) -> float:
 def _draw_slice(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
     from matplotlib.colors import ListedColormap
 
-    across, up = plane_of(view) or ("x", "z")  # the view is along an axis
+    across, up = plane_of(view) or "xz"  # the view is along an axis
     name = "count" if "count" in layer else "occupied"
     shown = np.minimum(layer[name].transpose(up, across).values.astype(int), len(_COLORS) - 1)
     x, y = unit.of(layer[across].values), unit.of(layer[up].values)
