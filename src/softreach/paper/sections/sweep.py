@@ -152,8 +152,8 @@ def decline(n: Numbers) -> Finding:
 def curling(n: Numbers) -> Finding:
     plain, tapered = _curvatures(n, 0.5)
     ratio = tapered / plain
-    words = f"median κL of the tapered design rises from {tapered[0]:.1f} at midlength to "
-    words += f"{tapered[-1]:.1f} at the tip, {ratio[0]:.1f} and {ratio[-1]:.1f} times the other's"
+    words = f"median κL rises from {tapered[0]:.1f} at midlength to {tapered[-1]:.1f} at the tip "
+    words += f"with taper, {ratio[0]:.1f} and {ratio[-1]:.1f} times that without"
     return judged(words, ratio.min() > 1 and ratio[-1] == ratio.max(), ratio[-1] > 1)
 
 
