@@ -52,7 +52,7 @@ def trunk() -> Manipulator:
 def coarse() -> Iterator[None]:
     """Few pixels, since laws do not depend on their number, and PDF files without fonts."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("atlas", "axes", "style"):
+        for module in ("axes", "style"):
             patch.setattr(f"softreach.plot.{module}.DPI", 60)
         patch.setitem(style._SAVING, "pdf.use14corefonts", True)
         yield

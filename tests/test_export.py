@@ -78,7 +78,11 @@ class TestCloud:
         for name in ("pyarrow", "pyarrow.csv"):
             monkeypatch.setitem(sys.modules, name, None)
         export_cloud(some, tmp_path / "without.csv", unit="mm")
-        assert (tmp_path / "with.csv").read_bytes() == (tmp_path / "without.csv").read_bytes()
+        files = ((tmp_path / name).read_text().splitlines() for name in ("with.csv", "without.csv"))
+        heads, *rows = zip(*files, strict=True)
+        assert len({head.replace('"', "") for head in heads}) == 1
+        numbers = [[[float(x) for x in line.split(",")] for line in pair] for pair in rows]
+        np.testing.assert_array_equal(*np.moveaxis(numbers, 1, 0))
 
     @pytest.mark.parametrize("suffix", ["npz", "mat"])
     def test_arrays_read_back_equal_without_pickle(self, suffix, cloud, tmp_path):

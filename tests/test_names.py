@@ -21,17 +21,18 @@ NAMED = """
     arm arm.designs arm.parameters atlas calibration cloud cloud.cells cloud.curvature
     cloud.dexterity
     support.errors exchange.activefilaments export forces inverse inverse.path workspace.payload
-    plot optimization requirements cloud.redundancy rest rod stiffness cloud.volume workspace
+    plot optimization requirements cloud.redundancy rod rod.rest stiffness cloud.volume workspace
 """
 MODULES = [importlib.import_module(f"softreach.{name}") for name in NAMED.split()]
 TOP = [name for name in dir(sr) if not isinstance(getattr(sr, name), ModuleType)]
 
 
 def public_objects() -> Iterator[tuple[str, object]]:
-    """Everything public, by the shortest name that a user types."""
+    """Everything public but modules, by the shortest name that a user types."""
     for module in MODULES:
         for name in module.__all__:
-            yield f"{module.__name__.removeprefix('softreach.')}.{name}", getattr(module, name)
+            if not isinstance(thing := getattr(module, name), ModuleType):
+                yield f"{module.__name__.removeprefix('softreach.')}.{name}", thing
 
 
 def public_functions() -> dict[str, Callable]:

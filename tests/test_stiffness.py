@@ -17,9 +17,9 @@ from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.dexterity import dexterity, solution_measure
 from softreach.inverse import solve_inverse
-from softreach.rest import rest
 from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import tip_jacobian, tip_positions
+from softreach.rod.rest import rest
 from softreach.rod.rods import as_tip_map, free_bundles
 from softreach.rod.tip_map import TipStatus
 from softreach.stiffness import principal_compliances, stiffness_along, tip_compliance

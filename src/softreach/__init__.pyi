@@ -1,7 +1,7 @@
 # ruff: noqa: I001  (several names a line)
 from . import arm as arm, atlas as atlas, calibration as calibration, cloud as cloud
 from . import exchange as exchange, export as export, forces as forces, inverse as inverse
-from . import optimization as optimization, plot as plot, requirements as requirements, rest as rest
+from . import optimization as optimization, plot as plot, requirements as requirements
 from . import rod as rod, stiffness as stiffness, workspace as workspace
 from .arm import Base as Base, Chamber as Chamber, FiberArchitecture as FiberArchitecture
 from .arm import LinearTaper as LinearTaper, Loads as Loads, Manipulator as Manipulator
@@ -22,7 +22,7 @@ from .inverse.path import track_path as track_path
 from .optimization import search as search
 from .requirements import Requirements as Requirements, check as check
 from .rod import configuration as configuration, describe as describe, equilibria as equilibria
-from .rod import tip_jacobian as tip_jacobian, tip_positions as tip_positions
+from .rod import rest as rest, tip_jacobian as tip_jacobian, tip_positions as tip_positions
 from .support import errors as errors
 from .support.errors import InvalidDesign as InvalidDesign, InvalidInput as InvalidInput
 from .support.errors import NotPossible as NotPossible

@@ -136,11 +136,20 @@ def test_bending_beyond_the_theory_and_large_activations_are_warned_of():
     assert design_warnings(single(activation_bounds=(-0.9, 0.0))) == ()
 
 
-def test_a_summary_prints_equal_neighbors_once():
-    summary = describe(designs.three_tendon_robot())
-    lines = str(summary).splitlines()
-    assert "bundle strain     3 × -0.07866 to 0" in lines
-    assert lines[-len(summary.validity) :] == list(summary.validity)
+@pytest.mark.parametrize("name", ["three_tendon_robot", "minimal_trunk"])
+def test_a_summary_prints_what_the_command_does(name, capsys):
+    from softreach.cli.app import run
+
+    summary = describe(getattr(designs, name)())
+    assert run(["design", name]) == 0
+    (title, *lines), warnings = map(str.splitlines, capsys.readouterr())
+    assert title == f"design {name}"
+    assert [line.removeprefix("  ") for line in lines] + warnings == str(summary).splitlines()
+
+
+def test_a_summary_prints_equal_tendons_as_one_line():
+    (line,) = [x for x in str(describe(designs.three_tendon_robot())).splitlines() if "|κ| R2" in x]
+    assert line.startswith("activation tendon 1 to tendon 3  0 to 8 N: length -7.866 to 0 %")
 
 
 # Laws of the range of bending: zonogons against all corners, their extremes along the arm

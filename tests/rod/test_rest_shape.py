@@ -15,9 +15,9 @@ from softreach.arm import FiberArchitecture, ObliqueMuscle, Pieces, RestShape, S
 from softreach.arm.base import POINTS
 from softreach.arm.loads import PointLoad
 from softreach.forces import blocked_force
-from softreach.rest import rest
 from softreach.rod import as_tip_map
 from softreach.rod.bending import bending_at
+from softreach.rod.rest import rest
 from softreach.rod.rods import free_bundles
 from softreach.stiffness import cloud_compliance, tip_compliance
 from softreach.support.errors import InvalidInput

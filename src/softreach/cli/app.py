@@ -132,7 +132,6 @@ def run(arguments: list[str]) -> int:
 
 
 def _message(error: Exception) -> str:
-    """The error in one line; of an option that cannot be read, in our words."""
     if isinstance(error, CycloptsError) and isinstance(error.__cause__, SoftreachError):
         error = error.__cause__
     if isinstance(error, MemoryError):

@@ -157,15 +157,12 @@ def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
 
 def _numbers(found: xr.Dataset) -> list[dict[str, Any]]:
     records = []
-    for k, unit in enumerate(found["unit"].values.tolist()):
-        record: dict[str, Any] = {"number": str(found["number"].values[k])}
-        for name in ("value", "sigma", "start"):
-            values = found[name if name in found else "value"].values
-            record[name], read_in = as_read(values[k], unit)
-        record["unit"] = read_in
-        if "at_bound" in found:
-            record["at_bound"] = bool(found["at_bound"].values[k])
-        records.append(record)
+    for number in (found.isel(number=k) for k in range(found.sizes["number"])):
+        names, unit = ("value", "sigma", "start"), str(number["unit"].item())
+        read = {x: as_read(number[x if x in found else "value"].item(), unit) for x in names}
+        record = {"number": str(number["number"].item())} | {x: y for x, (y, _) in read.items()}
+        bound = {"at_bound": bool(number["at_bound"])} if "at_bound" in found else {}
+        records.append({**record, "unit": read["value"][1], **bound})
     return records
 
 
@@ -220,13 +217,10 @@ def plan_poses(
         poses = {"inputs": found["input"].values, "poses": found["activation"].values}
         console.json({"noise_m": width, **poses, "numbers": _numbers(found)})
     else:
-        seen = ", ".join(plan.markers)
-        console.line(
-            f"{n} poses of {design} with {seen}, "
-            f"noise {arm.length_unit.rounded(width, digits='.5g')}"
-        )
-        for line in columns([("number", "to be known", "share"), *_rows(found, arm.length_unit)]):
-            console.line(f"  {line}")
+        seen, noise = ", ".join(plan.markers), arm.length_unit.rounded(width, digits=".5g")
+        lines = columns([("number", "to be known", "share"), *_rows(found, arm.length_unit)])
+        title = f"{n} poses of {design} with {seen}, noise {noise}"
+        console.line("\n  ".join([title, *lines]))
     if out is not None:
         plan.save(out, overwrite=output.overwrite)
 
@@ -257,11 +251,11 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
     from softreach.calibration.free_numbers import POSE, SCALE
 
     names, result = Written.of(arm), {}
+    of_pose: dict[str, str] = dict(zip((*POSE, SCALE), [*"mmm", *["rad"] * 3, "1"], strict=True))
     allowed = "NAME=WIDTH or NAME=MEAN:WIDTH, such as taper=1deg"
     for name, text in pairs_in("prior", texts, allowed).items():
         first = name.split("=")[0].strip()
-        of_pose = zip((*POSE, SCALE), ["m"] * 3 + ["rad"] * 3 + ["1"], strict=True)
-        unit = next((unit for name, unit in of_pose if name == first), None)
+        unit = of_pose.get(first)
         if unit is None and first not in names.by_key:
             raise InvalidInput("prior", name, "NAME=WIDTH with the full name of a free number")
         try:

@@ -13,7 +13,7 @@ import re
 import shutil
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from enum import Enum
 from io import TextIOWrapper
@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING, Any
 import softreach as sr
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
-from softreach.support.quantity import columns, five_digits, quantity
+from softreach.support.quantity import columns
+from softreach.support.rows import Rows, lines_of, shown, to_degrees
 from softreach.support.units import METER, POWERS, LengthUnit
 
 if TYPE_CHECKING:
@@ -30,8 +31,6 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-Rows = dict[str, tuple[Any, str]]  # name -> (value, unit)
-ERROR = " error"  # behind the name of a row with the error of another
 _READ_AS = {"m2": "m²", "m3": "m³", "1": ""}
 _PLAIN = str.maketrans({"³": "3", "²": "2", "/": "_per_", " ": "_", "(": "", ")": ""})
 _NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
@@ -74,7 +73,7 @@ class Console:
             return
         self.line(title)
         unit = METER if arm is None else arm.length_unit
-        for line in columns([*for_people(rows, unit)]):
+        for line in lines_of(rows, unit):
             self.line(f"  {line}")
 
     def table(self, records: Sequence[Mapping[str, Any]], as_json: bool) -> None:
@@ -172,13 +171,6 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: object) -
         console.note(f"warning: {message}")
 
 
-def to_degrees(angles: Any) -> Any:
-    """Angles [rad] in degrees, without the digits that come of the conversion."""
-    import numpy as np
-
-    return np.round(np.degrees(angles), 9).tolist()
-
-
 def as_read(values: Any, unit: str) -> tuple[Any, str]:
     """Numbers and their unit as people read them: degrees for radians, m³ for m3."""
     if unit == "rad":
@@ -201,28 +193,6 @@ def fields_of(values: Mapping[str, Any], *lengths: str) -> Rows:
     return {name: (value, "m" if name in lengths else "") for name, value in values.items()}
 
 
-def for_people(rows: Rows, unit: LengthUnit) -> Iterable[tuple[str, str]]:
-    """The rows as text: lengths, areas and volumes in the unit, and errors beside their values."""
-    for name, (value, symbol) in rows.items():
-        if name.endswith(ERROR) and name.removesuffix(ERROR) in rows:
-            continue  # it stands beside the value
-        size, power = 1.0, POWERS.get(symbol)
-        if power is not None:
-            size, symbol = unit.scale(power), unit.symbol(power)
-        text = _shown_in(value, rows.get(f"{name}{ERROR}", (None, ""))[0], size)
-        yield name, f"{text} {'' if text == '-' else symbol}".rstrip()
-
-
-def _shown_in(value: Any, error: Any, size: float) -> str:
-    """Numbers in a unit of this size, each to the first digit of its error if that is known."""
-    if isinstance(value, list):
-        errors = error if isinstance(error, list) else [error] * len(value)
-        return ", ".join(_shown_in(*pair, size) for pair in zip(value, errors, strict=True))
-    if value is None or error is None:
-        return shown(value if value is None or size == 1.0 else value / size)
-    return quantity(value / size, "", error / size)
-
-
 def for_machines(rows: Rows, length: float | None = None) -> dict[str, Any]:
     """The rows by names with their units; lengths, areas and volumes in SI units and in L."""
     from softreach.arm.parameters import written_name
@@ -231,27 +201,12 @@ def for_machines(rows: Rows, length: float | None = None) -> dict[str, Any]:
     for name, (value, unit) in rows.items():
         values = {unit: value}
         if length is not None and (power := POWERS.get(unit)):
-            import numpy as np
-
             relative = LengthUnit("L", length)
-            values[relative.symbol(power)] = np.asarray(plain(value), float) / relative.scale(power)
+            values[relative.symbol(power)] = relative.of(plain(value), power)
         for own, number in values.items():
             key = written_name(name.translate(_PLAIN), own or "1").translate(_PLAIN)
             fields[key] = plain(number)
     return fields
-
-
-def shown(value: Any) -> str:
-    """A value in a table, with five digits that count; a dash where there is none."""
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
-        return "-"
-    if isinstance(value, float):
-        return five_digits(value)
-    if isinstance(value, int) and not isinstance(value, bool):
-        return f"{value:,}"
-    if isinstance(value, list | tuple):
-        return ", ".join(shown(item) for item in value)
-    return str(value)
 
 
 def plain(value: Any) -> Any:

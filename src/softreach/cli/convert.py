@@ -9,9 +9,10 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import Rows, console
+from softreach.cli.console import console
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible
+from softreach.support.rows import Rows
 
 Format = Annotated[
     str | None,
@@ -85,12 +86,9 @@ def _export_pair(source: str, out: Path, overwrite: bool, unit: str | None) -> N
     from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
 
     options.refuse(_OTHER, unit=unit)
-    written = out, gamma_path(out)
-    for path in written:
-        options.check_output(path, CLOUD_PAIR, overwrite)
+    options.check_output(written := [out, gamma_path(out)], CLOUD_PAIR, overwrite)
     write_cloud(sr.open_cloud(source), out, overwrite=overwrite)
-    for path in written:
-        console.line(path)
+    console.line("\n".join(map(str, written)))
 
 
 def import_file(

@@ -80,9 +80,8 @@ def demo(
         figure = sr.plot.plot_views(cloud, arm, shape, unit=arm.length_unit)
         sr.plot.save_figure(figure, out / "cloud.png", overwrite=output.overwrite)
         concave, convex = made()
-    sr.export.export_mesh(concave, out / "hull.ply", unit=written, overwrite=output.overwrite)
-    for name in ("cloud.ply", "hull.ply"):
-        console.written(out / name, written)
+    console.written(out / "cloud.ply", written)
+    options.save_mesh(concave, arm, out / "hull.ply", output.overwrite)
     rows = volume_rows(concave, convex)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
@@ -267,10 +266,9 @@ def warmup(*, only: str | None = None) -> int:
     """
     from softreach.kernels.compiler import not_kept
 
-    if only is not None:
-        as_one_of("only", only, [*_JOBS])
+    asked = [*_JOBS] if only is None else [as_one_of("only", only, _JOBS)]
     with bar("compiling", None) as done, no_warnings():  # of clouds and grids too coarse
-        for _ in chain(*(jobs() for name, jobs in _JOBS.items() if only in (None, name))):
+        for _ in chain(*(_JOBS[name]() for name in asked)):
             if not_kept:
                 break
             done(1)
@@ -330,15 +328,15 @@ def _hulls() -> None:
     from softreach.geometry.alpha_shape import alpha_hull
     from softreach.geometry.surface import Surface
 
-    cloud = sr.compute_cloud(sr.designs.minimal_trunk(), 2000)
-    sr.concave_hull(cloud.tip, alpha=0.2)
-    hull = sr.concave_hull(cloud.tip, alpha="critical")
-    Surface(vertices=hull.vertices, faces=hull.faces).distance(hull.vertices[:2])
+    designs = sr.designs.minimal_trunk(), sr.designs.redundant_trunk()
+    cloud, other = (sr.compute_cloud(design, 2000) for design in designs)
     tips = cloud.tip.values
+    sr.concave_hull(tips, alpha=0.2)
+    hull = sr.concave_hull(tips, alpha="critical")
+    Surface(vertices=hull.vertices, faces=hull.faces).distance(hull.vertices[:2])
     alpha_hull(tips, 0.1, boxes=2)
     sr.concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
-    for design in (sr.designs.minimal_trunk(), sr.designs.redundant_trunk()):
-        sr.activation_distance(sr.compute_cloud(design, 2000), 0.1)
+    _ = sr.activation_distance(cloud, 0.1), sr.activation_distance(other, 0.1)
 
 
 def _loaded() -> Iterator[object]:

@@ -15,17 +15,9 @@ from cyclopts import Group, Parameter, Token
 
 import softreach as sr
 from softreach.cli.console import console
-from softreach.support import quantity
+from softreach.support import errors, quantity
 from softreach.support.arguments import POSITIVE, as_one_of
-from softreach.support.errors import (
-    InvalidDesign,
-    InvalidInput,
-    NotPossible,
-    Range,
-    check_installed,
-    did_you_mean,
-    warn,
-)
+from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, Range
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
 from softreach.support.files.text import MEGABYTE, read_text
@@ -137,16 +129,12 @@ class Sampling:
     sampler: str | None = None
 
     @property
-    def count(self) -> int:
-        """Number of samples."""
-        return 400_000 if self.n is None else self.n
-
-    @property
     def arguments(self) -> dict[str, Any]:
         """Arguments of `compute_cloud` and `build_atlas`."""
         if self.sampler == "grid":
             refuse("on the sampler grid, which is not random", seed=self.seed)
-        return {"n": self.count, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
+        n = 400_000 if self.n is None else self.n
+        return {"n": n, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
 
 
 SAMPLING = Sampling()
@@ -259,11 +247,11 @@ def say_limits(arm: sr.Manipulator) -> None:
     from softreach.arm.lines import law_warning
 
     if text := law_warning(arm):
-        warn(text)
+        errors.warn(text)
 
 
+# suffixes of points, surfaces and tables, which are no designs
 _POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".mat", ".ply", ".stl", ".obj")
-"""Suffixes of points, surfaces and tables, which are no designs."""
 
 
 def _unchanged(text: str) -> sr.Manipulator:
@@ -273,14 +261,12 @@ def _unchanged(text: str) -> sr.Manipulator:
     path = Path(text)
     suffix = path.suffix.lower()
     if suffix in _POINTS:
-        raise NotPossible(
-            f"{text} is no design: give a .toml file; in Python, softreach.concave_hull(points, "
-            "alpha=0.05) computes the volume of points [m] of shape (n, 3)"
-        )
+        hint = "in Python, softreach.concave_hull(points, alpha=0.05) computes the volume of points"
+        raise NotPossible(f"{text} is no design: give a .toml file; {hint} [m] of shape (n, 3)")
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
         return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
-    hint = did_you_mean(text, names)
+    hint = errors.did_you_mean(text, names)
     if suffix == ".json":
         hint = f"if it is a filament: softreach import {text} {text[:-5]}.toml"
     raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(names)}", hint)
@@ -397,7 +383,7 @@ def check_output(
     if not paths:
         refuse("without --out", overwrite=overwrite)
     known = [formats.get(path.suffix.lower(), FileFormat()) for path in paths]
-    check_installed(*(name for each in known for name in each.libraries), *libraries)
+    errors.check_installed(*(name for each in known for name in each.libraries), *libraries)
     for path in paths:
         foreign = format_of(path, formats, "out").foreign
         check_place(path, overwrite=overwrite, foreign=foreign, name="out")
@@ -426,3 +412,10 @@ def save_picture(figure: Any, path: Path, overwrite: bool) -> None:
     sr.plot.save_figure(figure, path, overwrite=overwrite)
     if note := getattr(figure, "note", ""):
         console.note(f"{path}: {note}")
+
+
+def save_mesh(mesh: Any, arm: sr.Manipulator, path: Path, overwrite: bool) -> None:
+    """Write a surface, and say the unit of its lengths."""
+    written = written_unit(arm)
+    sr.export.export_mesh(mesh, path, unit=written, overwrite=overwrite)
+    console.written(path, written)

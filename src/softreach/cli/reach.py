@@ -10,14 +10,14 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import ERROR, Rows, as_read, console, rows_of
-from softreach.cli.design import load_rows
+from softreach.cli.console import as_read, console, rows_of
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, read_mass
 from softreach.support import progress
 from softreach.support.arguments import as_number
 from softreach.support.errors import NotPossible, Range, counted
 from softreach.support.files.formats import PAGES, PICTURES
 from softreach.support.memory import check_memory
+from softreach.support.rows import ERROR, Rows
 
 HULL_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
 
@@ -47,6 +47,7 @@ def reach(
     """
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.inverse.request import position_in
+    from softreach.rod.summary import load_rows
 
     arm = design_from(design, changes, output.unit)
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
@@ -54,8 +55,7 @@ def reach(
     options.check_output(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, output.overwrite, *meshed)
     free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:
-        if not options.is_page(path) and free < (3 if _is_drawn(path) else 2):
-            raise _too_few(path)
+        _check_dimension(path, free)
     if not any(map(_is_drawn, outs)):
         options.refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)
@@ -93,21 +93,20 @@ def _write(
     at: list[float] | None,
     overwrite: bool,
 ) -> None:
+    _check_dimension(path, reached.dimension)
     unit = arm.length_unit
     if options.is_page(path):
         options.save_picture(sr.plot.plot_3d([reached, arm], unit=unit), path, overwrite)
-    elif _is_drawn(path) and reached.dimension == 3:
+    elif _is_drawn(path):
         options.save_picture(sr.plot.plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
-    elif not _is_drawn(path) and reached.dimension >= 2:
-        written = options.written_unit(arm)
-        sr.export.export_mesh(reached.surface(), path, unit=written, overwrite=overwrite)
-        console.written(path, written)
     else:
-        raise _too_few(path)
+        options.save_mesh(reached.surface(), arm, path, overwrite)
 
 
-def _too_few(path: Path) -> NotPossible:
-    return NotPossible(f"{path} cannot be written: slices need three free bundles, surfaces two")
+def _check_dimension(path: Path, dimension: int) -> None:
+    if not options.is_page(path) and dimension < (3 if _is_drawn(path) else 2):
+        needed = "slices need three free bundles, surfaces two"
+        raise NotPossible(f"{path} cannot be written: {needed}")
 
 
 def payload(
@@ -215,6 +214,7 @@ def cloud(
         out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
     from softreach.cloud.clouds import CLOUD_STORE
+    from softreach.rod.summary import load_rows
 
     arm = design_from(design, changes, output.unit)
     out = out or Path(f"{Path(design).stem}.zarr")
@@ -225,7 +225,7 @@ def cloud(
     seconds = perf_counter() - start
     sr.save_cloud(dataset, out, overwrite=output.overwrite)
     rows: Rows = {
-        "samples": (sampling.count, ""),
+        "samples": (arguments["n"], ""),
         "sampler": (arguments["sampler"], ""),
         "seed": (arguments["seed"], ""),
         "steps per arm": (sr.rod.as_tip_map(arm, tol).steps, ""),
@@ -270,7 +270,7 @@ def volume(
     options.check_output(out, SURFACE_FILES, output.overwrite)
     options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
     if not options.is_stored(source):
-        check_memory("n", sampling.count, HULL_BYTES * sampling.count)
+        check_memory("n", n := sampling.arguments["n"], HULL_BYTES * n)
     cloud, arm = options.cloud_of(source, sampling, changes, output.unit)
     bias = cloud.attrs["sampler"] == "uniform"
     concave = sr.concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
@@ -283,9 +283,7 @@ def volume(
         rows["unreachability"] = (share, "")
     console.rows(f"volume of {source}", rows, output.json, arm)
     if out is not None:
-        written = options.written_unit(arm)
-        sr.export.export_mesh(concave, out, unit=written, overwrite=output.overwrite)
-        console.written(out, written)
+        options.save_mesh(concave, arm, out, output.overwrite)
 
 
 def volume_rows(concave: sr.volume.Hull, convex: sr.volume.Hull) -> Rows:

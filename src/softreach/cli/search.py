@@ -140,19 +140,15 @@ def search(
     if storage is None:
         out.mkdir(parents=True, exist_ok=True)
         storage = out / "search.journal"
-    result = _searched(asked, storage)
+    watch = _Watch()
+    with progress.bar(watch.label, asked.get("designs", 200)) as step:
+        result = sr.search(**asked, storage=storage, follow=watch, progress=step)
     if output.json:
         console.json(_found(result, out))
     else:
         console.line(result.report(arm.length_unit.name))
     result.save(out, unit=arm.display_unit, overwrite=output.overwrite)
     return _EXIT[result.verdict]
-
-
-def _searched(asked: dict[str, Any], storage: Path) -> sr.optimization.Search:
-    watch = _Watch()
-    with progress.bar(watch.label, asked.get("designs", 200)) as step:
-        return sr.search(**asked, storage=storage, follow=watch, progress=step)
 
 
 class _Watch:

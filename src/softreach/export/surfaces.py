@@ -182,14 +182,10 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     # as a node and not in the numbers, so that a reader gets back the vertices we have
     meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
     for part in scene.parts:
-        material = trimesh.visual.material.PBRMaterial(
-            name=part.name,
-            baseColorFactor=[*part.color, part.opacity],
-            alphaMode="BLEND" if part.opacity < 1 else None,
-            metallicFactor=0.0,
-            roughnessFactor=0.6,
-            doubleSided=True,
-        )
+        look = {"metallicFactor": 0.0, "roughnessFactor": 0.6, "doubleSided": True}
+        look |= {"baseColorFactor": [*part.color, part.opacity]}
+        look |= {"alphaMode": "BLEND" if part.opacity < 1 else None}
+        material = trimesh.visual.material.PBRMaterial(name=part.name, **look)
         visual = trimesh.visual.TextureVisuals(material=material)
         mesh = trimesh.Trimesh(part.vertices, part.faces, visual=visual, process=False)
         names = {"node_name": part.name, "geom_name": part.name}
@@ -198,7 +194,6 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
 
 
 def _write_3mf(scene: Scene, file: BufferedWriter) -> None:
-    """An object for each part, in a unit that the file names (3MF core specification)."""
     if scene.unit.relative:
         raise InvalidInput("unit", "L", f"{', '.join(_UNITS_3MF)} for a .3mf file")
     colors = ["#" + bytes(_colors(part)[0]).hex().upper() for part in scene.parts]

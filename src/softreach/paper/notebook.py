@@ -1,7 +1,5 @@
 """What sections of the report share: sizes of clouds, numbers and figures on disk, findings."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,6 +8,8 @@ from pathlib import Path
 from time import perf_counter
 from types import SimpleNamespace
 from typing import Any, NamedTuple, Self
+
+import numpy as np
 
 from softreach.plot.style import pyplot, save_figure
 from softreach.support.files.text import write_text
@@ -32,13 +32,12 @@ class Finding(NamedTuple):
     """Result of a check."""
 
     text: str
-    verdict: Verdict
+    verdict: Verdict = Verdict.OPEN
 
 
-def judged(text: str, agrees: object, nearly: object = False) -> Finding:
-    """A finding whose verdict follows from whether it agrees, or nearly does."""
-    verdict = Verdict.AGREES if agrees else Verdict.NEARLY if nearly else Verdict.DIFFERS
-    return Finding(text, verdict)
+def judged(text: str, yes: object, near: object = False, no: Verdict = Verdict.DIFFERS) -> Finding:
+    """A finding whose verdict follows from whether the statement agrees, or nearly does."""
+    return Finding(text, Verdict.AGREES if yes else Verdict.NEARLY if near else no)
 
 
 @dataclass(frozen=True)
@@ -55,9 +54,7 @@ class Settings:
     seed: int = 0  # Seed of every cloud
 
 
-FULL = Settings(16, 400_000, 0.05, 7, 3e-3, 2_000_000, 10_000)
-"""The sizes that the paper states (sections 3 and 5)."""
-
+FULL = Settings(16, 400_000, 0.05, 7, 3e-3, 2_000_000, 10_000)  # As sections 3 and 5 state
 QUICK = Settings(4, 10_000, 0.13, 2, 5e-2, 50_000, 1_000)  # Coarse numbers in under a minute
 
 
@@ -67,12 +64,10 @@ class Notebook:
 
     folder: Path  # Of the figures, within that of all results
     part: str
-    key: Mapping[str, Any]
-    """Everything that the results depend on; a notebook of another key is stale."""
+    key: Mapping[str, Any]  # All that the results depend on; a notebook of another key is stale
     numbers: dict[str, Any] = field(default_factory=dict)  # What JSON can hold
     pictures: list[tuple[str, str, str]] = field(default_factory=list)
-    """Number of each figure in the paper, such as "2a", or empty for one of our own; name of its
-    files, without suffix; caption."""
+    """Number of each figure in the paper, empty for our own; name without suffix; caption."""
     seconds: float = 0.0
 
     def draw(self, label: str, name: str, caption: str, figure: Any) -> None:
@@ -82,10 +77,10 @@ class Notebook:
         pyplot().close(figure.get_figure(root=True))
         self.pictures.append((label, name, caption))
 
-    def fill(self, compute: Callable[[Settings, Notebook], Any], settings: Settings) -> Self:
+    def fill(self, compute: Callable[[Settings, "Notebook"], Any], settings: Settings) -> Self:
         """Compute the part, and write what was found."""
         start = perf_counter()
-        self.numbers = json.loads(json.dumps(compute(settings, self)))
+        self.numbers = json.loads(json.dumps(compute(settings, self), default=np.ndarray.tolist))
         self.seconds = perf_counter() - start
         content = {name: value for name, value in vars(self).items() if name != "folder"}
         write_text(self.folder / f"{self.part}.json", json.dumps(content, indent=1), overwrite=True)

@@ -1,7 +1,5 @@
 """The whole paper, part by part, and its report; what is done stays done, so a rerun continues."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -9,11 +7,9 @@ import platform
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import version
-from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -56,19 +52,13 @@ class Claim(NamedTuple):
         return getattr(SECTIONS[self.part], self.judge)(Numbers(**known))
 
 
-_TEXT = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
+_CLAIMS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
 CLAIMS = tuple(
     Claim(*name.split("."), section=section, **row)
-    for section, rows in tomllib.loads(_TEXT).items()
+    for section, rows in _CLAIMS.items()
     for name, row in rows.items()
 )
 """Every statement that is checked, in the paper's order."""
-
-_PAPER = (
-    "Kaczmarski, Moulton, Goriely, Kuhl: Minimal activation with maximal reach: Reachability "
-    "clouds of bio-inspired slender manipulators, Extreme Mechanics Letters 71 (2024) 102207, "
-    "arXiv 2403.18841"
-)
 
 
 def reproduce_paper(
@@ -96,8 +86,7 @@ def reproduce_paper(
         InvalidInput: Something is where the report or its figures go.
         NotWritten: The folder cannot be written to.
     """
-    # What is missing is reported now, not after a quarter of an hour.
-    check_installed("matplotlib", "skimage", "jinja2")
+    check_installed("matplotlib", "skimage", "jinja2")  # now, not after a quarter of an hour
     pyplot()
     settings = QUICK if quick else FULL
     folder = Path(as_path("out", out)) / ("quick" if quick else "")
@@ -106,51 +95,40 @@ def reproduce_paper(
     code = b"".join(p.read_bytes() for p in sorted(Path(__file__).parents[1].rglob("*.py")))
     source = hashlib.sha256(code).hexdigest()  # what other code computed is computed again
     key = {**asdict(settings), "softreach": version("softreach"), "source": source}
-    _claim(pages, key, overwrite=overwrite)
-    notebooks: dict[str, Notebook] = {}
+    begun = pages / "begun.json"  # says that the figures are ours: a rerun replaces its own
+    others = [path for path in pages.glob("*") if not path.name.startswith(MARK)]
+    if others and not begun.exists() and not overwrite:
+        hint = "choose another folder, or pass --overwrite (in Python overwrite=True)"
+        raise InvalidInput("out", f"{pages}", "a folder without other figures", hint)
+    write_text(begun, json.dumps(key, indent=1), overwrite=True)
+    books: dict[str, Notebook] = {}
     for number, (name, section) in enumerate(SECTIONS.items(), 1):
         say(f"[{number}/{len(SECTIONS)}] {name}")
-        notes = Notebook.opened(pages, name, key)
-        notes = notes or Notebook(pages, name, key).fill(getattr(section, name), settings)
-        notebooks[name] = notes
-        say(f"      {notes.seconds:.1f} s")
-    _report(notebooks, settings, quick).save(path, overwrite=overwrite)
+        found = Notebook.opened(pages, name, key)
+        books[name] = found or Notebook(pages, name, key).fill(getattr(section, name), settings)
+        say(f"      {books[name].seconds:.1f} s")
+    _report(books, settings, quick).save(path, overwrite=overwrite)
     return path
 
 
-def _claim(pages: Path, key: Mapping[str, Any], *, overwrite: bool) -> None:
-    """Write that the figures in a folder are ours: an interrupted call replaces its own."""
-    begun = pages / "begun.json"
-    with suppress(FileNotFoundError):
-        found = [path for path in pages.iterdir() if not path.name.startswith(MARK)]
-        if found and not begun.exists() and not overwrite:
-            hint = "choose another folder, or pass --overwrite (in Python overwrite=True)"
-            raise InvalidInput("out", f"{pages}", "a folder without other figures", hint)
-    write_text(begun, json.dumps(key, indent=1), overwrite=True)
-
-
-def _report(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) -> Report:
+def _report(books: Mapping[str, Notebook], settings: Settings, quick: bool) -> Report:
     rows = list[tuple[str, ...]]()
     for claim in CLAIMS:
-        text, verdict = claim.check(notebooks[claim.part].numbers)
+        text, verdict = claim.check(books[claim.part].numbers)
         verdict = Verdict.UNTESTED if quick and claim.full else verdict
         rows.append((claim.section, claim.says, text, claim.how, verdict))
     counts = Counter(row[-1] for row in rows)
-    facts = [
-        _PAPER,
-        f"Every number and every verdict is computed by softreach {version('softreach')}; only the "
-        "paper's statements, their sections and how each is checked were written by hand",
-        f"Written on {datetime.now(UTC):%Y-%m-%d}",
-    ]
+    paper = "Kaczmarski, Moulton, Goriely, Kuhl: Minimal activation with maximal reach, "
+    paper += "Extreme Mechanics Letters 71 (2024) 102207, arXiv 2403.18841"
+    by = f"softreach {version('softreach')} computed every number and every verdict; the paper's "
+    by += "statements and how each is checked were written by hand"
+    machine = f"{os.cpu_count()} cores, {platform.platform()}"
+    seconds = sum(book.seconds for book in books.values())
+    when = f"Computed in {seconds:.0f} s on {machine}, and written on {datetime.now(UTC):%Y-%m-%d}"
+    facts = [paper, by, when]
     if quick:
-        designs, samples = settings.designs, settings.samples
-        facts.append(
-            f"A quick run with small clouds: {designs} × {designs} designs of {samples:,} points. "
-            "Its numbers are coarse; what only the full sizes test is marked so"
-        )
-    times = [(name, f"{notes.seconds:.1f} s") for name, notes in notebooks.items()]
-    machine = f"{os.cpu_count()} cores, {platform.system()} on {platform.machine()}"
-    note = f"{machine}, Python {platform.python_version()}. A first run compiles, too."
+        clouds = f"{settings.designs} × {settings.designs} clouds of {settings.samples:,} points"
+        facts.append(f"A quick run with {clouds}: what needs more is not tested")
     head = ("Section", "The paper says", "softreach finds", "How", "Verdict")
     return Report(
         title="Minimal activation with maximal reach, recomputed",
@@ -159,15 +137,14 @@ def _report(notebooks: Mapping[str, Notebook], settings: Settings, quick: bool) 
         facts=facts,
         sections=[
             Section(title="The paper says, softreach finds", head=head, rows=rows),
-            Section(title="Figures", figures=lambda: _figures(notebooks)),
-            Section(title="Run times", head=("Part", "Time"), rows=times, note=note),
+            Section(title="Figures", figures=lambda: _figures(books)),
         ],
     )
 
 
-def _figures(notebooks: Mapping[str, Notebook]) -> Iterator[tuple[bytes, str]]:
+def _figures(books: Mapping[str, Notebook]) -> Iterator[tuple[bytes, str]]:
     """PNG and caption: figures in the paper's order, our own after them."""
-    pages = [(*page, notes.folder) for notes in notebooks.values() for page in notes.pictures]
+    pages = [(*page, book.folder) for book in books.values() for page in book.pictures]
     for label, name, caption, folder in sorted(pages, key=lambda page: page[0] or "9"):
         title = f"Figure {label}" if label else "Beyond the paper"
         yield (folder / f"{name}.png").read_bytes(), f"{title}. {caption}"

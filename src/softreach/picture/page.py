@@ -59,10 +59,8 @@ class ColorScale(NamedTuple):
 class Figure3D:
     """A figure that turns in a browser; `save_figure` writes it as .html, notebooks show it."""
 
-    html: str = field(repr=False)
-    """The page."""
-    note: str
-    """Points and triangles that it shows, and of how many; empty for arms alone."""
+    html: str = field(repr=False)  # The page
+    note: str  # Points and triangles that it shows, and of how many; empty for arms alone
 
     def _repr_html_(self) -> str:
         page = html.escape(self.html, quote=True)
@@ -101,7 +99,7 @@ def web_page(
         "keys": [key._asdict() for key in keys],
         "caption": caption,
         "note": note,
-        "parts": [part if isinstance(part, dict) else _packed(part, box) for part in parts],
+        "parts": [part if isinstance(part, dict) else packed(part, box) for part in parts],
     }
     page = files("softreach.picture").joinpath("page.html").read_text(encoding="utf-8")
     title = html.escape(caption.partition("\n")[0] or "softreach")
@@ -116,18 +114,8 @@ def script_text(content: Any) -> str:
 
 
 def packed(part: PagePart, box: Array) -> PackedPart:
-    """A part in a box of its own, shape (2, 3), around it."""
-    return _packed(part, box) | {"box": box.tolist()}
-
-
-def css_color(rgb: ArrayLike) -> str:
-    """A color of channels from 0 to 1, as CSS has it."""
-    red, green, blue = np.rint(255 * np.asarray(rgb, float)).astype(int)
-    return f"#{red:02x}{green:02x}{blue:02x}"
-
-
-def _packed(part: PagePart, box: Array) -> PackedPart:
-    shape, common = part.shape, {"name": part.name, "through": part.through}
+    """A part with places in a box around it, shape (2, 3)."""
+    shape, common = part.shape, {"name": part.name, "through": part.through, "box": box.tolist()}
     common |= {"opacity": 1.0 if part.surface else part.opacity, "surface": part.surface}
     if isinstance(shape, Dots):
         points = np.asarray(shape.points, float)
@@ -142,6 +130,12 @@ def _packed(part: PagePart, box: Array) -> PackedPart:
         "color": list(shape.color),
         "start": part.opacity,
     }
+
+
+def css_color(rgb: ArrayLike) -> str:
+    """A color of channels from 0 to 1, as CSS has it."""
+    red, green, blue = np.rint(255 * np.asarray(rgb, float)).astype(int)
+    return f"#{red:02x}{green:02x}{blue:02x}"
 
 
 def _places(points: Array, box: Array) -> str:

@@ -25,13 +25,7 @@ from -x. "oblique" is from the front, a little from the right and above.
 """
 
 # right and up on the paper, and the axis of sight
-_PLANES = {
-    "front": ("x", "z", "y"),
-    "back": ("x", "z", "y"),
-    "side": ("y", "z", "x"),
-    "left": ("y", "z", "x"),
-    "top": ("x", "y", "z"),
-}
+_PLANES = {"front": "xzy", "back": "xzy", "side": "yzx", "left": "yzx", "top": "xyz"}
 
 
 def view_axes(view: View) -> Array:
@@ -53,7 +47,7 @@ def on_paper(points: ArrayLike, view: View) -> Array:
     return project(points, view)[..., :2] * (-1 if is_mirrored(view) else 1, 1)
 
 
-def plane_of(view: View) -> tuple[str, str] | None:
+def plane_of(view: View) -> str | None:
     """The coordinates to the right and up of a view along an axis; None for any other."""
     return _PLANES[view][:2] if isinstance(view, str) and view in _PLANES else None
 

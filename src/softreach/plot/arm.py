@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,20 +16,19 @@ from softreach.picture.zbuffer import ZBuffer, draw_mesh, faces_to_eye
 from softreach.plot import style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
+from softreach.plot.style import Axes, Figure
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
 from softreach.support.arrays import Array, as_floats, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, MET, MISSED, bundle_color
 from softreach.support.quantity import round_below
-from softreach.support.units import LengthUnit, in_lengths
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
@@ -52,7 +51,6 @@ _FOLLOWED, _STABLE, _UNSTABLE = "0.05", "#1f4e9e", "0.55"
 _BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
 _ARROW = 26  # length of the arrow of gravity [points]
 _SHORTEST_ARROW = 0.1  # part of a direction in the paper, below which an arrow says nothing
-_LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
 _LARGEST = 0.2  # L, the longest half axis if the force is not given
 _CORNERS = 120
 _COLOR = "tab:orange"
@@ -170,8 +168,7 @@ class DesignPanel(NamedTuple):
     title: str
     arm: Manipulator
     view: View = "front"
-    bundles: Collection[int] | None = None
-    """Bundles to draw, by index; None for all."""
+    bundles: Collection[int] | None = None  # Bundles to draw, by index; None for all
 
 
 def plot_designs(
@@ -193,16 +190,18 @@ def plot_designs(
         InvalidInput: A station off an arm, or an unknown view.
         MissingExtra: matplotlib is not installed.
     """
-    if not isinstance(panels, list | tuple) or not panels:
+    known = isinstance(panels, list | tuple) and all(isinstance(p, DesignPanel) for p in panels)
+    if not known or not panels:
         raise InvalidInput("panels", as_given(panels), "a list or tuple of DesignPanels")
-    for k, panel in enumerate(panels):
-        as_instance(f"panels[{k}]", panel, DesignPanel, "a DesignPanel")
     stations = as_stations("stations_over_length", stations_over_length).tolist()
     least = _LEAST if all(plane_of(p.view) for p in panels) else _LEAST_OBLIQUE
     usual = max(_LEAST * len(panels), least)
     width = usual if width is None else as_number("width", width, style.WIDTH)
     box = bounding_box(
-        *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
+        *(
+            arm_points(p.arm, rest_configuration(p.arm), LengthUnit("L", p.arm.length))
+            for p in panels
+        )
     )
     places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
@@ -213,13 +212,12 @@ def plot_designs(
         axes = figure.subplots(*shape, height_ratios=heights, squeeze=False)
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
-            drawn, shown = panel.bundles, length * box
-            plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown, unit=unit)
+            shared: dict[str, Any] = {"bundles": panel.bundles, "unit": unit}
+            plot_arm(arm, ax=axes[0, k], view=panel.view, box=length * box, **shared)
             axes[0, k].set_title(fill(panel.title, round(_LETTERS * width / len(panels))))
+            shared |= {"half_width": reach * length, "legend": False}
             for ax, station in zip(axes[1:, k], stations, strict=True):
-                z, half = station * length, reach * length
-                shared = {"bundles": drawn, "half_width": half, "legend": False, "unit": unit}
-                plot_cross_section(arm, z, ax=ax, **shared)
+                plot_cross_section(arm, station * length, ax=ax, **shared)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])
@@ -261,30 +259,24 @@ def plot_check(
             look = {"linewidth": 0.9, **_REGIONS[kind]}
             words = {each.verdict for each in check.findings if each.kind == kind} - {"met"}
             look["label"] = ": ".join([str(look["label"]), *sorted(words)])
-            _draw_lines(panel, each, look)
+            for line in each:
+                panel.plot(line, **look)
         _draw_places(panel, check)
-        if panel.ax.get_legend_handles_labels()[1]:
-            style.legend_above(panel.ax)
+        style.legend_above(panel.ax)
     return panel.ax
 
 
 def _draw_places(panel: Panel, check: Any) -> None:
     met = check.reached.all(axis=0)
     load = (~check.reached).sum(axis=1).argmax()  # under which most are missed
-    gaps = np.stack([check.places[~met], check.nearest[load, ~met]], axis=1)
-    _draw_lines(panel, panel.unit.of(gaps), {"color": MISSED, "linewidth": 1.0, "label": "gap"})
+    for gap in np.stack([check.places[~met], check.nearest[load, ~met]], axis=1):
+        panel.plot(panel.unit.of(gap), color=MISSED, linewidth=1.0, label="gap")
     styles = ((met, "o", MET, "reached", 4.5), (~met, "X", MISSED, "missed", 6.0))
     for rows, marks, color, label, size in styles:
         if rows.any():
             edge = {"markeredgecolor": "white", "markeredgewidth": 0.5, "zorder": 5}
             look = {"color": color, "markersize": size, "label": label}
             panel.plot(panel.unit.of(check.places[rows]), marks, **look, **edge)
-
-
-def _draw_lines(panel: Panel, lines: Iterable[Array], look: dict[str, Any]) -> None:
-    for line in lines:
-        panel.plot(line, **look)
-        look = {**look, "label": None}
 
 
 def plot_equilibria(
@@ -342,7 +334,7 @@ def plot_equilibria(
             panel.plot(counted.of(shape["position"].values), linewidth=wide, **look)
         panel.plot(rim, color="0.2", linewidth=2.0, solid_capstyle="round")
         _gravity_arrow(panel, equilibria)
-        _add_legend(panel.ax, own_figure=ax is None)
+        style.legend_above(panel.ax, 1)
     return panel.ax
 
 
@@ -380,11 +372,9 @@ def plot_compliance(
     values = as_floats("compliance", compliance)
     force = None if force is None else as_number("force", force, POSITIVE)
     matrices = values if values.ndim == 3 else values[None]
-    if matrices.shape[1:] != (3, 3):
-        raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
-    if len(matrices) != len(shapes):
-        allowed = f"{len(shapes)}, one for each configuration"
-        raise InvalidInput("compliance", f"{len(matrices)} matrices", allowed)
+    if matrices.shape != (len(shapes), 3, 3):
+        allowed = f"of shape (3, 3) or ({len(shapes)}, 3, 3), a matrix for each configuration"
+        raise InvalidInput("compliance.shape", values.shape, allowed)
     if force is None:  # that keeps the ellipsoids small
         softest = float(np.linalg.norm(matrices, ord=2, axis=(1, 2)).max())
         if not 0 < softest < np.inf:
@@ -429,10 +419,9 @@ def plot_payload_curve(
         (line,) = ax.plot(mass, share, linewidth=1.2)
         look = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
         ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **look)
-        for point in largest:
-            ax.vlines(point.payload, 0.0, point.share, color="0.3", linewidth=0.8, linestyle=":")
-            ax.hlines(point.share, 0.0, point.payload, color="0.3", linewidth=0.8, linestyle=":")
-            ax.plot(point.payload, point.share, "o", markersize=4, mfc="white", color="0.3")
+        for mass, share in ((point.payload, point.share) for point in largest):
+            ax.plot([0.0, mass, mass], [share, share, 0.0], color="0.3", linewidth=0.8, ls=":")
+            ax.plot(mass, share, "o", markersize=4, mfc="white", color="0.3")
         ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
         ax.set(xlim=(0.0, None), ylim=(0.0, None))
     return ax
@@ -459,20 +448,6 @@ def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
     look = {"ha": "center", "va": "center", "fontsize": 8, **place}
     arrow = {"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0}
     panel.ax.annotate(word, (0.09, 0.86), tail, arrowprops=arrow, **look)
-
-
-def _add_legend(ax: Axes, *, own_figure: bool) -> None:
-    """One entry for each kind: under the picture where the figure is ours."""
-    handles, labels = ax.get_legend_handles_labels()
-    kinds = dict(zip(labels, handles, strict=True))
-    if not own_figure:
-        ax.legend(kinds.values(), kinds.keys())
-        return
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    width, height = figure.get_size_inches()
-    figure.set_size_inches(max(width, _LEAST_WIDTH), height + _ENTRY * len(kinds))
-    figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
 
 
 def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:

@@ -18,11 +18,11 @@ from softreach.cloud.volume import concave_hull
 from softreach.geometry.hull import Hull
 from softreach.picture.projection import View, view_axes
 from softreach.picture.zbuffer import Extent, ZBuffer, draw_mesh
-from softreach.plot import coloring
+from softreach.plot import coloring, style
 from softreach.plot.axes import view_extent
 from softreach.plot.reach import drawn_tips, plot_opposite_sides, point_size
 from softreach.plot.statistics import SIDES, plot_curvature
-from softreach.plot.style import DPI, PAGE, figure_style, place_panels, styled_axes, unit_of
+from softreach.plot.style import Axes, Figure
 from softreach.schema import is_stable
 from softreach.support import parallel
 from softreach.support.arguments import as_integer
@@ -32,8 +32,6 @@ from softreach.support.palette import STEEL, activation_colors
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
 _KEY = 0.45  # inches for the key of colors at least
@@ -105,7 +103,7 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
     box = box_over_length(atlas)
 
     def image(cloud: xr.Dataset, extent: Extent, columns: int) -> ZBuffer:
-        tips = drawn_tips(cloud, unit_of(cloud["tip"]))
+        tips = drawn_tips(cloud, style.unit_of(cloud["tip"]))
         pixels = point_size(len(tips), box) * columns / extent.size[0]
         buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
         colors = activation_colors(coloring.bundle_activations(cloud).values)
@@ -178,7 +176,7 @@ def _sheet(
     """A sheet of images of clouds; the threads read and draw them, the caller places them."""
     picked = _thinned(atlas, as_integer("panels", panels, 1))
     across, up = sheet_axes(picked)
-    with figure_style():
+    with style.figure_style():
         places = np.ndindex(picked["status"].shape if keyed else (0,))
         clouds = (_cloud_at(picked, *at) for at in places)
         first = next((cloud.isel(sample=slice(1)) for cloud in clouds if cloud is not None), None)
@@ -187,10 +185,10 @@ def _sheet(
         wide, high = extent.size.tolist()
         columns, rows = [wide] * len(across.values), [high] * len(up.values)
         top = max(_KEY, coloring.key_height(key)) if keyed else _TOP
-        figure, grid = place_panels(PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
+        figure, grid = style.place_panels(style.PAGE, columns, rows, (_LEFT, _RIGHT, _BOTTOM, top))
         grid = grid[::-1]  # row 0 at the bottom
         _label_sheet(figure, grid, (across, up), atlas, top)
-        across_each = max(16, round(grid[0, 0].get_position().width * PAGE * DPI))
+        across_each = max(16, round(grid[0, 0].get_position().width * style.PAGE * style.DPI))
 
         def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
             cloud = _cloud_at(picked, column, row)
@@ -209,7 +207,6 @@ def _sheet(
 def _label_sheet(
     figure: Figure, grid: NDArray[Any], axes: Sequence[SheetAxis], atlas: xr.Dataset, top: float
 ) -> None:
-    """Both parameters: their values beside the panels, and how many of them are shown."""
     for ax in grid.ravel().tolist():
         ax.patch.set_visible(False)
         ax.spines[:].set(color="0.88", linewidth=0.4)
@@ -236,8 +233,8 @@ def _draw_scale(figure: Figure, panel: Axes) -> None:
     ax.set_axis_off()
     start, center = 0.08 * inch, np.array([0.22, 0.27]) * inch
     # of a sheet of few columns it is longer than the margin is wide
-    style = {"color": "0.2", "lw": 1.2, "solid_capstyle": "butt", "clip_on": False}
-    ax.plot([start, start + 0.5], [start] * 2, **style)
+    line = {"color": "0.2", "lw": 1.2, "solid_capstyle": "butt", "clip_on": False}
+    ax.plot([start, start + 0.5], [start] * 2, **line)
     ax.text(start + 0.5 + 0.04 * inch, start, "L/2", fontsize=7, va="center")
     for name, direction in zip("xyz", view_axes(_VIEW)[:2].T, strict=True):
         x, y = center + 0.15 * inch * direction
@@ -248,9 +245,7 @@ def _draw_scale(figure: Figure, panel: Axes) -> None:
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
-    """As many designs along each parameter as there are panels at most, the ends among them."""
-    sizes = {str(dim): atlas.sizes[dim] for dim in atlas["status"].dims}
-    return atlas.isel({dim: evenly(size, panels) for dim, size in sizes.items()})
+    return atlas.isel({dim: evenly(atlas.sizes[dim], panels) for dim in atlas["status"].dims})
 
 
 def evenly(size: int, most: int) -> Index:
@@ -261,13 +256,11 @@ def evenly(size: int, most: int) -> Index:
 
 
 def _cloud_at(atlas: xr.Dataset, column: int, row: int) -> xr.Dataset | None:
-    """The cloud of the design there, if it is done and not damaged."""
     if int(atlas["status"][column, row]) != DONE:
         return None
-    across, up = map(str, atlas["status"].dims)
+    places = zip(map(str, atlas["status"].dims), (column, row), strict=True)
     try:
-        at = {across: float(atlas[across][column]), up: float(atlas[up][row])}
-        return atlas_cloud(atlas, **at)
+        return atlas_cloud(atlas, **{dim: float(atlas[dim][k]) for dim, k in places})
     except DamagedStore as error:
         warn(f"a cloud is left out: {error}")
         return None
@@ -288,11 +281,9 @@ class SheetAxis(NamedTuple):
 
 def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:
     """The two parameters of an atlas, for the horizontal and the vertical edge."""
-    dims = atlas["status"].dims
-    if len(dims) != 2:
+    if len(dims := atlas["status"].dims) != 2:
         raise InvalidInput("atlas", f"of dimensions {dims}", "a grid of two parameters")
-    across, up = (_axis(atlas[dim]) for dim in dims)
-    return across, up
+    return _axis(atlas[dims[0]]), _axis(atlas[dims[1]])
 
 
 def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -> Axes:
@@ -314,7 +305,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
     if metric not in atlas or atlas[metric].dims != atlas["status"].dims:
         raise InvalidInput("metric", metric, "a metric of the atlas")
     values = over_length(atlas, metric).values.T
-    with styled_axes(ax) as ax:
+    with style.styled_axes(ax) as ax:
         filled = _fill(ax, across, up, np.ma.masked_invalid(values))
         if np.isfinite(values).any():
             _mark_best(ax, across, up, values, smallest="unreachability" in metric)

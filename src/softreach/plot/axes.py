@@ -6,20 +6,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import permutations
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, project, view_axes
 from softreach.picture.zbuffer import Extent, ZBuffer, seen_through
-from softreach.plot.style import DPI, as_axes, as_box, figure_style, small_axes
+from softreach.plot.style import DPI, Axes, as_axes, as_box, figure_style, small_axes
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.units import LengthUnit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 _TICK_GAP = 4.0  # points between an edge and its numbers
 _LABEL_GAP = np.array([23.0, 15.0])  # points between an edge beside or above its label and that
@@ -90,26 +87,34 @@ class Panel:
 
     def show(self, buffer: ZBuffer, within: ZBuffer | None = None) -> None:
         """Place the image, and what shows through it, beside what is there, and label the axes."""
-        ax, first, plane = self.ax, not self.ax.images, plane_of(self.view)
+        ax, first = self.ax, not self.ax.images
         marks = [str(image.get_label()).partition(_UNIT_MARK) for image in ax.images]
         if others := {name for _, mark, name in marks if mark} - {self.unit.name}:
             hint = "give one unit= to all that shares axes, or length= to all of it or to none"
             counted = f"counted in {', '.join(others)}"
             raise InvalidInput("ax", counted, f"in {self.unit.name}", hint)
-        mirror = -1 if is_mirrored(self.view) else 1
-        left, right, bottom, top = buffer.extent
-        extent, order = (mirror * left, mirror * right, bottom, top), 2 + len(ax.images) / 100
+        extent, order = self.frame(first), 2 + len(ax.images) / 100
         pixels = buffer.rgba() if within is None else seen_through(buffer.rgba(), within.rgba())
         # "none": vector files get the pixels as they are
         image = ax.imshow(pixels, extent=extent, interpolation="none", zorder=order)
         image.set_label(_UNIT_MARK + self.unit.name)
-        _widen(ax, extent, first, mirror)
+
+    def frame(self, first: bool = True) -> tuple[float, float, float, float]:
+        """Show all of the panel, beside what is there unless first, and label it; its extent."""
+        mirror, plane = (-1 if is_mirrored(self.view) else 1), plane_of(self.view)
+        ax, (left, right, bottom, top) = self.ax, self.extent
+        x, y = sorted((mirror * left, mirror * right)), [bottom, top]
+        if not first:
+            x = [min(x[0], *ax.get_xlim()), max(x[1], *ax.get_xlim())]
+            y = [min(y[0], *ax.get_ylim()), max(y[1], *ax.get_ylim())]
+        ax.set(xlim=x[::mirror], ylim=y)
         if plane:
             ax.set(xlabel=self.unit.label(plane[0]), ylabel=self.unit.label(plane[1]))
-            for axis, length in zip((ax.xaxis, ax.yaxis), _inches(ax, buffer.extent), strict=True):
+            for axis, length in zip((ax.xaxis, ax.yaxis), _inches(ax, self.extent), strict=True):
                 axis.set_major_locator(_round_numbers(int(np.clip(length / _TICK_ROOM, 1, 6))))
         elif first:
             draw_box(ax, self.box, self.view, self.unit)
+        return mirror * left, mirror * right, bottom, top
 
     def plot(self, points: Array, *marks: str, **style: Any) -> None:
         """Draw a line or marks over the image, in the units of the axes, shape (n, 3)."""
@@ -142,7 +147,6 @@ def view_extent(box: Array, view: View) -> Extent:
 
 
 def _ticks(ax: Axes, box: Array, view: View, edges: list[Array]) -> list[Array]:
-    """Round numbers along each axis, as many as its edge has room for on paper."""
     extent, ticks = view_extent(box, view), []
     lengths = np.linalg.norm(project(np.ptp(edges, axis=1), view)[:, :2], axis=1)
     inches = lengths * (_inches(ax, extent) / extent.size).min()
@@ -197,12 +201,3 @@ def _round_numbers(count: int) -> Any:
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(count, steps=[1, 2, 5, 10], min_n_ticks=1)
-
-
-def _widen(ax: Axes, extent: tuple[float, float, float, float], first: bool, mirror: int) -> None:
-    x, y = sorted(extent[:2]), sorted(extent[2:])
-    if not first:
-        x = [min(x[0], *ax.get_xlim()), max(x[1], *ax.get_xlim())]
-        y = [min(y[0], *ax.get_ylim()), max(y[1], *ax.get_ylim())]
-    ax.set_xlim(*x[::mirror])
-    ax.set_ylim(*y)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.plot.style import Axes, Figure
 from softreach.schema import activation_symbols, activation_units
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
@@ -17,8 +18,6 @@ from softreach.support.palette import activation_colors, bundle_color
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Pixels = NDArray[np.uint8]  # RGB from 0 to 255
 COLORMAP = "viridis"
@@ -125,7 +124,6 @@ def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring
 
 
 def _comparable(activation: Array, units: Sequence[str]) -> Array:
-    """Activations as they are; where units differ, each over its largest magnitude."""
     if len(set(units)) == 1:
         return activation
     largest = np.nanmax(np.abs(activation), axis=0, initial=0.0)
@@ -142,7 +140,6 @@ def _strongest(shares: Array, names: tuple[str, ...], symbols: tuple[str, ...]) 
 
 
 def _effort(magnitude: Array, symbols: tuple[str, ...]) -> Coloring:
-    """Mean of |γ| over the largest of the cloud, of all bundles that act somewhere."""
     largest = np.asarray(np.nanmax(magnitude, axis=0, initial=0.0))
     acts = largest > 0.0
     share = (magnitude[:, acts] / largest[acts]).sum(axis=1) / max(np.count_nonzero(acts), 1)
@@ -160,9 +157,8 @@ def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
 def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
     """Names of the bundles, or their numbers from 1 up if the cloud has none."""
     activation = bundle_activations(cloud)
-    bundle, count = activation.dims[1], activation.shape[1]
-    named = bundle in activation.coords
-    return tuple(map(str, activation[bundle].values if named else range(1, count + 1)))
+    bundle, numbers = activation.dims[1], range(1, activation.shape[1] + 1)
+    return tuple(map(str, activation[bundle].values if bundle in activation.coords else numbers))
 
 
 def draw_key(ax: Axes, key: Key | None) -> None:

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.section import Material, Section
-from softreach.plot.style import LENGTH, PLACE, Unit, some_bundles, styled_axes, unit_for
+from softreach.plot.style import LENGTH, PLACE, Axes, Unit, some_bundles, styled_axes, unit_for
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
-from softreach.support.palette import BODY, Color, bundle_color, material_fill
-from softreach.support.units import METER, readable_unit
+from softreach.support.palette import BODY, bundle_color, material_fill
+from softreach.support.units import METER, readable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Patch, Wedge
 
@@ -131,8 +131,7 @@ def _material_entries(section: Section) -> Iterator[tuple[Artist, str]]:
         patch, label = Patch(**_material_style(k)), material.name or part
         patch.set_hatch_linewidth(0.4)
         if (modulus := material.young_modulus) is not None:
-            unit, size = readable_unit("Pa", modulus, METER)
-            label += f": E = {modulus / size:.3g} {unit}"
+            label += f": E = {readable(float(f'{modulus:.3g}'), 'Pa', METER)}"
         yield patch, label
 
 
@@ -155,15 +154,13 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
     materials = [*_materials(section)]
 
     def draw(low: float, high: float, material: Material | None, alpha: float = 1.0) -> None:
+        color: Any = "white" if material is None else BODY
         if material is not None and len(materials) > 1:
-            fill = _annulus(outer * low, outer * high, "none")
+            fill, color = _annulus(outer * low, outer * high, "none"), "none"
             style = _material_style(materials.index(material.replace(name="")))
             fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
             fill.set_hatch_linewidth(0.4)
             ax.add_patch(fill)
-            color: Any = "none"
-        else:
-            color = "white" if material is None else BODY
         ax.add_patch(_annulus(outer * low, outer * high, color))
 
     ax.add_patch(Circle((0, 0), outer, facecolor="0.97", edgecolor=_EDGE, linewidth=0.6))
@@ -191,8 +188,6 @@ def _annulus(low: float, high: float, fill: Any) -> Patch:
 
 @dataclass(frozen=True)
 class _Placed:
-    """One bundle that acts in a section."""
-
     index: int
     shape: str
     course: str
@@ -202,17 +197,13 @@ class _Placed:
     outer: float  # radius in the unit of the axes
 
     @property
-    def color(self) -> Color:
-        return bundle_color(self.index)
-
-    @property
     def middle(self) -> tuple[float, float]:
         radius = 0.5 * (self.inner + self.outer)
         return radius * np.cos(self.center), radius * np.sin(self.center)
 
     @property
     def style(self) -> dict[str, Any]:
-        color = self.color
+        color = bundle_color(self.index)
         if self.shape == "line":
             edge = {"markeredgecolor": "white", "markeredgewidth": 0.6}
             return {"marker": "o", "markersize": 5.5, "linestyle": "none", "color": color, **edge}
@@ -250,7 +241,7 @@ class _Placed:
         angles = self.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
         ends = (self.inner, angles - lean / 2), (self.outer, angles + lean / 2)
         points = [r * np.column_stack([np.cos(at), np.sin(at)]) for r, at in ends]
-        ink = "white" if np.dot(self.color, _LIGHTNESS) < 0.55 else "0.3"
+        ink = "white" if np.dot(bundle_color(self.index), _LIGHTNESS) < 0.55 else "0.3"
         return LineCollection(list(np.stack(points, axis=1)), colors=ink, linewidths=0.7)
 
 
@@ -275,13 +266,12 @@ def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
     )
     for bundle in sectors:
         ax.add_patch(bundle.sector(linewidth=0, **bundle.style))
-    for k, bundle in enumerate(sectors):
-        for above in sectors[k + 1 :]:
-            for part in bundle.overlaps(above):
-                look = {"facecolor": "none", "edgecolor": part.color, "linewidth": 0.0}
-                stripes = part.sector(hatch="//////", **look)
-                stripes.set_hatch_linewidth(1.2)
-                ax.add_patch(stripes)
+    for below, above in combinations(sectors, 2):
+        for part in below.overlaps(above):
+            look = {"facecolor": "none", "edgecolor": bundle_color(part.index), "linewidth": 0.0}
+            stripes = part.sector(hatch="//////", **look)
+            stripes.set_hatch_linewidth(1.2)
+            ax.add_patch(stripes)
     for bundle in sectors:
         if bundle.course != "along":
             ax.add_collection(bundle.strokes())

@@ -78,14 +78,13 @@ def plot_3d(
     things = list(data) if isinstance(data, list | tuple) else [data]
     kinds = [_kind(thing) for thing in things]
     view_angles(view)
-    said = None if caption is None else as_text("caption", caption)
     pairs = zip(kinds, things, strict=True)
     lengths = {_LENGTHS[kind](thing) for kind, thing in pairs if kind in _LENGTHS} - {None}
     shown_in = unit_for(lengths.pop() if len(lengths) == 1 else None, unit)
     scene = Scene(shown_in, color, kinds)
     scene.add(things)
     box = bounding_box(*scene.points())
-    said = ". ".join(scene.captions) if said is None else said
+    said = ". ".join(scene.captions) if caption is None else as_text("caption", caption)
     words = {"caption": said, "note": ". ".join([*scene.notes, _HELP])}
     page = web_page(scene.parts, box, shown_in, keys=scene.keys, view=view, **words)
     return Figure3D(page, "; ".join(scene.notes))
@@ -130,11 +129,10 @@ class Scene:
         chosen = np.flatnonzero(np.isfinite(tips).all(axis=1))
         of = f"{len(chosen):,}"
         self.captions.append(f"Cloud of {of} tips")
+        self.notes.append(f"{of} points")
         if len(chosen) > _POINTS:
             chosen = np.sort(np.random.default_rng(0).choice(chosen, _POINTS, replace=False))
-            self.notes.append(f"{_POINTS:,} of {of} points, at random")
-        else:
-            self.notes.append(f"{of} points")
+            self.notes[-1] = f"{_POINTS:,} of {of} points, at random"
         tips, rgb = tips[chosen], coloring.rgb[chosen]
         size = point_size(len(tips), np.array([tips.min(axis=0), tips.max(axis=0)]))
         self.parts.append(PagePart(self._name("cloud"), Dots(tips, rgb), size=size))
@@ -229,13 +227,11 @@ class Scene:
         self.parts.append(PagePart(name, skin, opacity, through=True))
 
     def _explain_bundles(self, arm: Manipulator) -> None:
-        names = enumerate(arm.bundle_names)
-        key = Swatches([(name, css_color(bundle_color(k))) for k, name in names])
+        key = Swatches([(x, css_color(bundle_color(k))) for k, x in enumerate(arm.bundle_names)])
         if "cloud" not in self.kinds and key not in self.keys:
             self.keys.append(key)
 
     def _name(self, word: str) -> str:
-        """The word, with a number from the second part of that name on."""
         number = 1 + len({p.name for p in self.parts if p.name.split(" #")[0] == word})
         return word if number == 1 else f"{word} #{number}"
 

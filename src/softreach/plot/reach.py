@@ -18,6 +18,7 @@ from softreach.picture.zbuffer import ZBuffer, draw_mesh
 from softreach.plot import coloring, style
 from softreach.plot.arm import arm_images, arm_points, draw_markers, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
+from softreach.plot.style import Axes, Figure
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
@@ -29,8 +30,6 @@ from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _LARGEST = 8.0  # pixels
 _THICKNESS = 1 / 50  # of L, or of the cloud's extent
@@ -259,8 +258,8 @@ def plot_opposite_sides(
     key = coloring.color_samples(first, "rgb").key
     room, columns = max(_ROOM, coloring.key_height(key)), [1.0] * len(clouds)
     beside, right = (0.58, 0.26) if style.unit_of(first["tip"], unit).relative else (0.75, 0.48)
-    titles = [f"({k + 1})  {title}" for k, title in enumerate(clouds)]
-    titles = [fill(title, round(_LETTERS / len(clouds))) for title in titles]
+    wide = round(_LETTERS / len(clouds))
+    titles = [fill(f"({k})  {title}", wide) for k, title in enumerate(clouds, 1)]
     top = room + 0.16 * max(1 + title.count("\n") for title in titles)
     with style.figure_style():
         edges = (beside + 0.07, right, 0.45, top)
@@ -444,7 +443,7 @@ def _middle(grid: xr.Dataset, axis: str) -> float:
 def _draw_slice(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
     from matplotlib.colors import ListedColormap
 
-    across, up = plane_of(view) or ("x", "z")  # the view is along an axis
+    across, up = plane_of(view) or "xz"  # the view is along an axis
     name = "count" if "count" in layer else "occupied"
     shown = np.minimum(layer[name].transpose(up, across).values.astype(int), len(_COLORS) - 1)
     x, y = unit.of(layer[across].values), unit.of(layer[up].values)

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, view_angles
+from softreach.picture.projection import View, on_paper, view_angles
 from softreach.plot import style
-from softreach.plot.axes import bounding_box, draw_box, view_extent
+from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import COLORMAP
+from softreach.plot.style import Axes, Figure
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import BEST, MET, MISSED
 from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _WIDTH = 7.2  # inches
 _SPACE, _ROW = 3.6, 1.75  # heights of the upper part and of each row of inputs [inch]
@@ -116,7 +116,6 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
 
     near = np.isfinite(shown.distance) & (shown.distance <= shown.top)
     places = shown.measured[near], shown.predicted[near]
-    box = bounding_box(*places)
     colors = [shown.colors[k] for k in np.nonzero(near)[1]]
     here, there = (on_paper(points, view) for points in places)
     lines = np.stack([here, there], axis=1)
@@ -126,25 +125,19 @@ def _draw_places(ax: Axes, shown: _Errors, view: View) -> None:
     ax.scatter(*here.T, s=size, color=_MEASURED, linewidths=0, zorder=3, label="measured")
     ax.scatter(*there.T, s=size, edgecolors=colors, zorder=4, **hollow)
     ax.scatter([], [], s=10, edgecolors="0.2", label="predicted", **hollow)
-    left, right, low, high = view_extent(box, view)
-    mirror = -1 if is_mirrored(view) else 1
-    ax.set(xlim=(mirror * left, mirror * right), ylim=(low, high), aspect="equal")
-    if plane := plane_of(view):
-        ax.set(xlabel=shown.unit.label(plane[0]), ylabel=shown.unit.label(plane[1]))
-    else:
-        draw_box(ax, box, view, shown.unit)
+    ax.set_aspect("equal")
+    Panel(ax, bounding_box(*places), view, shown.unit).frame()
     style.legend_above(ax, 2, handletextpad=0.2)
 
 
 def _draw_markers(ax: Axes, shown: _Errors) -> None:
     apart = 0.25 * (2.0 * np.random.default_rng(0).random(shown.distance.T.shape) - 1.0)
     shown.scatter(ax, np.arange(len(apart))[:, None] + apart)
-    for k in range(len(shown.markers)):
-        for rows, look in ((~shown.held, "-"), (shown.held, ":")):
-            own = shown.distance[rows, k]
-            if np.isfinite(own).any():
-                rms = float(np.sqrt(np.nanmean(own**2)))
-                ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=look, zorder=4)
+    for k, (rows, look) in product(range(len(apart)), ((~shown.held, "-"), (shown.held, ":"))):
+        own = shown.distance[rows, k]
+        if np.isfinite(own).any():
+            rms = float(np.sqrt(np.nanmean(own**2)))
+            ax.hlines(rms, k - 0.38, k + 0.38, color="0.1", lw=1.2, ls=look, zorder=4)
     ax.set_xticks(range(len(shown.markers)), shown.markers)
     if len(shown.markers) > 4 or len("".join(shown.markers)) > _LETTERS:
         ax.tick_params(axis="x", labelrotation=40)
@@ -253,17 +246,16 @@ def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
     rows = np.flatnonzero(shown.final & shown.feasible)
     before = shown.data["coarse_design"].values[rows]
     rows, before = rows[before >= 0], before[before >= 0]
-    coarse, full = shown.values[before, 0], shown.values[rows, 0]
-    known = np.isfinite(coarse)
+    known = np.isfinite(shown.values[before, 0])
     if not known.any():
         ax.set_axis_off()
         return
-    errors = shown.errors[rows[known], 0], shown.errors[before[known], 0]
+    rows, before = rows[known], before[known]
+    coarse, full = shown.values[before, 0], shown.values[rows, 0]
     bars = {**_BARS, "ecolor": "0.5", "elinewidth": 0.7, "capsize": 2, "zorder": 2}
-    ax.errorbar(coarse[known], full[known], *errors, **bars)
-    ax.scatter(coarse[known], full[known], **_FINAL)
-    first = float(full[known][0])
-    ax.axline((first, first), slope=1.0, color="0.7", lw=0.7, zorder=1)
+    ax.errorbar(coarse, full, shown.errors[rows, 0], shown.errors[before, 0], **bars)
+    ax.scatter(coarse, full, **_FINAL)
+    ax.axline((full[0], full[0]), slope=1.0, color="0.7", lw=0.7, zorder=1)
     ax.set(xlabel=fill(f"{shown.labels[0]}, coarse", 2 * _LETTERS // 3), ylabel="full accuracy")
     style.remark(ax, "the best, judged again")
     ax.locator_params(nbins=4)
@@ -288,7 +280,6 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_missed(ax: Axes, shown: _Designs) -> None:
-    """Excess of each design, in their order; infinite ones stand at the upper edge."""
     excess = shown.data["excess"].values
     never = ~np.isfinite(excess) & ~shown.final
     missed = shown.missed & ~never
@@ -302,7 +293,6 @@ def _draw_missed(ax: Axes, shown: _Designs) -> None:
 
 
 def _draw_objectives(ax: Axes, shown: _Designs) -> None:
-    """The front over three or more objectives: a line for each design, the better end up."""
     rows = np.flatnonzero(shown.front & shown.feasible)[:_MOST_LINES]
     values = shown.values[rows]
     if not len(rows):
@@ -329,11 +319,7 @@ def _draw_ranges(ax: Axes, shown: _Designs) -> None:
     data, small = shown.data, {"s": 9, "linewidths": 0.5, "alpha": 0.6}
     low, high = data["low"].values, data["high"].values
     shares = (data["value"].values - low) / np.where(high > low, high - low, 1.0)
-    styles = (
-        (shown.met, {**_COARSE, **small}),
-        (shown.missed, {**_OUT, **small}),
-        (shown.front, _FINAL),
-    )
+    styles = [(shown.met, _COARSE | small), (shown.missed, _OUT | small), (shown.front, _FINAL)]
     for k in range(len(low)):
         ax.hlines(k, 0.0, 1.0, color="0.85", lw=0.8, zorder=0)
         for rows, look in styles:

@@ -14,14 +14,13 @@ from softreach.picture.projection import View, project
 from softreach.plot import coloring, style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.reach import drawn_tips, plot_cloud, plot_slab
+from softreach.plot.style import Axes, Figure
 from softreach.schema import a_cloud
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number, as_one_of
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
@@ -214,8 +213,7 @@ def plot_curvature(
         if other.shape != places.shape or not np.allclose(other, places):
             raise InvalidInput("stations", other.tolist(), f"those of the first: {places.tolist()}")
     symbol, per_length = _SYMBOLS[quantity], quantity != "extension"
-    if per_length:
-        symbol += "L" if counted.relative else f" [1/{counted.name}]"
+    symbol += ("L" if counted.relative else f" [1/{counted.name}]") * per_length
     with style.styled_axes(ax) as ax:
         sides = (-1, 1) if len(statistics) == 2 else (0,)
         for (label, data), side, color in zip(statistics.items(), sides, SIDES, strict=False):

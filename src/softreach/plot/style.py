@@ -21,12 +21,14 @@ from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
-from softreach.support.units import LengthUnit, as_unit, in_lengths
+from softreach.support.units import METER, LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:  # matplotlib is imported where it draws
+    Axes = Figure = Any
 
 Unit = str | LengthUnit | None  # one asked for, "m", "cm", "mm" or "L"; None for L if known, else m
 DPI = 250  # pixels per inch of images inside figures, and of saved PNG files
@@ -167,8 +169,11 @@ def save_figure(
 
 
 def legend_above(ax: Axes, columns: int = 3, **more: Any) -> None:
-    """A legend over the upper edge of axes."""
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, **more)
+    """A legend over the upper edge of axes, each label once; none without labels."""
+    handles, labels = ax.get_legend_handles_labels()
+    if kinds := dict(zip(labels, handles, strict=True)):
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": columns}
+        ax.legend(kinds.values(), kinds.keys(), **place, **more)
 
 
 def remark(ax: Axes, text: str) -> None:
@@ -233,7 +238,9 @@ def unit_of(data: xr.Dataset | xr.DataArray, unit: Unit = None) -> LengthUnit:
 
 def unit_for(length: float | None, unit: Unit = None) -> LengthUnit:
     """The unit asked for, else L of an arm of that length [m], else the meter."""
-    return in_lengths(length) if unit is None else as_unit(unit, length)
+    if unit is not None:
+        return as_unit(unit, length)
+    return METER if length is None else LengthUnit("L", length)
 
 
 def common_unit(units: list[LengthUnit]) -> LengthUnit:

@@ -1,3 +1,4 @@
+from . import rest as rest
 from .inputs import ActivationBox as ActivationBox
 from .kinematics import configuration as configuration
 from .kinematics import marker_positions as marker_positions

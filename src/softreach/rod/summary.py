@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
+from softreach.arm.base import Base
 from softreach.arm.body import (
     VERIFIED_LOAD_NUMBER,
     is_overloaded,
@@ -19,25 +22,26 @@ from softreach.arm.body import (
 )
 from softreach.arm.driving import extension_range
 from softreach.arm.lines import law_warning, line_strains
+from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
+from softreach.arm.number import fields_of
 from softreach.arm.part import AlongArm
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, Extreme, bending_over_bounds
+from softreach.rod.rest import Rest, rest
+from softreach.rod.tip_map import InvalidLoads
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidInput
-from softreach.support.quantity import columns
-
-_TEXTS = ("lacking", "validity", "warnings")
-_UNITS = {"helical_angles": "rad", "revolutions": "rad", "base_radius": "m", "tip_radius": "m"}
-_UNITS |= {"breakpoints": "m", "mass": "kg"}
-_UNITS |= {"stiffness": "(K0 [N], K1, K3 [N m²], at base and tip)"}
+from softreach.support.rows import Rows, lines_of, to_degrees
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DesignSummary:
-    """The numbers that a design implies."""
+    """The numbers that a design implies; as text they are what `softreach design` prints."""
 
+    arm: Manipulator
+    """The design."""
     helical_angles: Array
     """α of each architecture where it begins [rad]."""
     revolutions: Array
@@ -79,25 +83,75 @@ class DesignSummary:
     """Limits that the design touches, each with its number."""
 
     def __str__(self) -> str:
-        rows, texts = [], [*self.lacking, *self.validity, *self.warnings]
-        for name, value in vars(self).items():
-            if value is not None and np.size(value) and name not in _TEXTS:
-                numbers = ", ".join(f"{number:.4g}" for number in np.ravel(value))
-                if isinstance(value, np.ndarray) and value.ndim == 2:
-                    numbers = _spans(value)
-                rows.append((name.replace("_", " "), f"{numbers} {_UNITS.get(name, '')}".rstrip()))
-        return "\n".join([*columns(rows), *texts])
+        return "\n".join([self.table, *(f"warning: {each}" for each in self.warnings)])
+
+    __repr__ = __str__
+
+    @property
+    def table(self) -> str:
+        """All but the warnings and the limits of the linear laws, a line each."""
+        lines = lines_of(self.rows | self._bundle_rows(), self.arm.length_unit)
+        return "\n".join([*lines, *self.lacking])
+
+    @property
+    def rows(self) -> Rows:
+        """Values and SI units by name, angles in degrees; the arm at rest is computed for them."""
+        arm, measured = self.arm, self.arm.section.measured
+        given = () if measured is None else fields_of(type(measured)).values()
+        stiffness = zip(("K0", "K1", "K3"), self.stiffness or (), strict=False)
+        pieces = enumerate(arm.rigid_pieces)
+        rows: Rows = {
+            "bundles": (arm.bundles, ""),
+            "bundle names": (list(arm.bundle_names), ""),
+            "helical angle": (to_degrees(self.helical_angles), "deg"),
+            "revolution": (to_degrees(self.revolutions), "deg"),
+            "length": (arm.length, "m"),
+            "outer radius at base": (self.base_radius, "m"),
+            "outer radius at tip": (self.tip_radius, "m"),
+            "base to tip ratio": (self.taper_ratio, ""),
+            "inner to outer radius": (self.radius_ratio, ""),
+            "breakpoints": (list(self.breakpoints), "m"),
+            **{f"station {name}": (z, "m") for name, z in arm.stations.items()},
+            **{f"rigid piece {k}": (list(each.span(arm.length)), "m") for k, each in pieces},
+            "markers": ([marker.name for marker in arm.markers], ""),
+            "extension": (list(self.extension), ""),
+            "curvature times L": (list(self.curvature), ""),
+            "measured": ([x.meaning for x in given if getattr(measured, x.field) is not None], ""),
+            **{
+                f"{name} at base and tip": (values.tolist(), "N" if name == "K0" else "N m²")
+                for name, values in stiffness
+            },
+            "mass": (self.mass, "kg"),
+            "load number": (self.load_number, ""),
+        }
+        known = {name: row for name, row in rows.items() if row[0] not in (None, [])}
+        return known | load_rows(arm) | _rest_rows(arm)
+
+    def _bundle_rows(self) -> Rows:
+        """Bounds and effects of each activation; neighbors that are equal share a line."""
+        arm = self.arm
+        texts = [
+            f"{_span(arm.bounds[k], unit)}: length {_span(100.0 * self.bundle_strain[k])} %, "
+            f"ζ {_span(self.bundle_extension[k])}, |κ| R2 {_span(self.bundle_bending[k])}"
+            for k, unit in enumerate(arm.bundle_units)
+        ]
+        rows: Rows = {}
+        for text, group in groupby(zip(texts, arm.bundle_names, strict=True), itemgetter(0)):
+            first, *others = [name for _, name in group]
+            label = f"{first} to {others[-1]}" if len(others) > 1 else ", ".join([first, *others])
+            rows[f"activation {label}"] = (text, "")
+        for drive in arm.drives:
+            gains = ", ".join(f"{gain:+g} {name}" for name, gain in drive.gains.items())
+            rows[f"drive {drive.name}"] = (f"{_span(drive.bounds, drive.unit)}: {gains}", "")
+        return rows
 
 
-def _spans(ends: Array) -> str:
-    """Ranges, of which neighbors that are equal stand once: "3 × 0.9 to 1"."""
-    texts = [f"{low:.4g} to {high:.4g}" for low, high in ends]
-    counts = [(len([*same]), text) for text, same in groupby(texts)]
-    return ", ".join(f"{count} × {text}" if count > 1 else text for count, text in counts)
+def _span(ends: Any, unit: str = "1") -> str:
+    return f"{ends[0]:.4g} to {ends[1]:.4g}{'' if unit == '1' else f' {unit}'}"
 
 
 def describe(arm: Manipulator) -> DesignSummary:
-    """Everything that `softreach design` prints.
+    """All that a design implies, as `softreach design` prints it.
 
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
@@ -108,6 +162,7 @@ def describe(arm: Manipulator) -> DesignSummary:
     bent = [(each.gentlest, each.sharpest.value) for each in map(bending_over_bounds, alone)]
     limits = (f"{part.default_name}: {part.validity}" for part in arm.actuators if part.validity)
     return DesignSummary(
+        arm=arm,
         helical_angles=np.array([_angle_at_start(fiber, arm) for fiber in arm.fibers]),
         revolutions=np.array([fiber.revolution_on(*body) for fiber in arm.fibers]),
         base_radius=base_radius,
@@ -254,3 +309,53 @@ def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float
     if touching[first] and first > 0 and shares[first - 1]:
         begins = float(np.interp(0.0, depth[first - 1 : first + 1], z[first - 1 : first + 1]))
     return float(deepest.max()), begins
+
+
+def load_rows(arm: Manipulator) -> Rows:
+    """Posture of the base, gravity, and all other loads that are not 0; all of it in the world."""
+    loads, posed = arm.loads, not arm.base.is_identity
+    rows: Rows = {"base": (str(arm.base), "")} if posed else {}
+    if loads is None:
+        return rows
+    if any(loads.gravity):
+        gravity = loads.seen_from(arm.base).gravity  # a straight arm points along +z there
+        angle = to_degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
+        words = {0: "upright", 90: "sideways", 180: "hanging"}
+        posture = words.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
+        posture += f": {arm.base}" if posed else ""
+        rows = {"gravity": (list(loads.gravity), "m/s²"), "base": (posture, "")}
+    for field, number in fields_of(type(loads)).items():
+        value = getattr(loads, field)
+        if field != "gravity" and (any(value) if isinstance(value, tuple) else value):
+            rows[field.replace("_", " ")] = (value, number.unit)
+    return rows | ({"point loads": (len(loads.point_loads), "")} if loads.point_loads else {})
+
+
+def _rest_rows(arm: Manipulator) -> Rows:
+    """Sag and stability of the arm without activation.
+
+    Without loads: the sag under its own weight of an arm held sideways, and whether it would stand
+    upright; nothing where moduli or densities are not known.
+    """
+    if load_number_faults(arm):
+        return {}
+    sideways, upright = " sideways", " upright"
+    if arm.loads is not None:
+        held = stood = _rest(arm)
+        sideways = upright = ""
+    else:
+        ways = (Loads(gravity=GRAVITIES[way]) for way in ("sideways", "down"))
+        held, stood = (_rest(arm.replace(loads=loads, base=Base())) for loads in ways)
+    status = stood.status.name.lower() if stood else "unknown: the loads are too large"
+    return {
+        f"sag at rest{sideways}": (held.sag if held else None, "m"),
+        f"at rest{upright}": (status.replace("_", " "), ""),
+    }
+
+
+def _rest(arm: Manipulator) -> Rest | None:
+    """The arm at rest; None under loads too large to compute it."""
+    try:
+        return rest(arm)
+    except InvalidLoads:
+        return None

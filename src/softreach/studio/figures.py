@@ -98,7 +98,7 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
         plot_slice(grid, ax=ax, view=view, at=at, unit=unit.name)
         (cells,) = ax.images
         cells.set_alpha((np.asarray(cells.get_array()) > 0).astype(float))
-    names = cast("tuple[str, str]", plane_of(view))
+    names = plane_of(view) or "xz"
     across, up = map("xyz".index, names)
     lines = [unit.of(curve[:, [across, up]] * arm.length) for curve in curves]
     for line in lines:

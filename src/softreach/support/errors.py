@@ -81,8 +81,7 @@ class Range(NamedTuple):
     open_low: bool = False
     open_high: bool = False
     whole: bool = False
-    why: str = ""
-    """Reason for the limits, if they follow from other values."""
+    why: str = ""  # Reason for the limits, if they follow from other values
 
     def admits(self, value: object) -> bool:
         """True if the value is a finite number (an integer where asked) in the range."""
@@ -113,12 +112,9 @@ class Range(NamedTuple):
 class Fault(NamedTuple):
     """One thing wrong with a design."""
 
-    path: str
-    """Place of the fault: ``taper``, or ``fibers[1].extent``."""
-    value: object
-    """The value that was given; None if there was none."""
-    allowed: Range | str
-    """Values that are allowed, and what to do."""
+    path: str  # Place of the fault: ``taper``, or ``fibers[1].extent``
+    value: object  # The value that was given; None if there was none
+    allowed: Range | str  # Values that are allowed, and what to do
 
     def __str__(self) -> str:
         if self.value is None:

@@ -45,8 +45,7 @@ class Report:
     state: str
     """Kind of verdict, by which the page is colored: met, missed, undecided, noise and so on."""
     sections: Sequence[Section]
-    facts: Sequence[str] = ()
-    """Remarks on the whole."""
+    facts: Sequence[str] = ()  # Remarks on the whole
 
     def __str__(self) -> str:
         lines = [self.verdict, *self.facts]

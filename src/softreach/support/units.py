@@ -77,22 +77,13 @@ class LengthUnit(NamedTuple):
 METER = LengthUnit("m", 1.0)
 
 
-def in_lengths(length: float | None) -> LengthUnit:
-    """L for a given length [m], the meter for None."""
-    if length is None:
-        return METER
-    if not length > 0:
-        raise InvalidInput("length", length, "> 0 m")
-    return LengthUnit("L", length)
-
-
 def as_unit(unit: object, length: float | None = None) -> LengthUnit:
     """The unit of that name, of which L is one where the length [m] of the arm is known."""
     if isinstance(unit, LengthUnit):
         return unit
     name = unit if isinstance(unit, str) else ""
     if name == "L" and length is not None:
-        return in_lengths(length)
+        return LengthUnit(name, length)
     if name in _SIZES:
         return LengthUnit(name, _SIZES[name])
     known = UNITS if length is not None else tuple(_SIZES)

@@ -109,7 +109,6 @@ def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool
 
 
 def _write(file: BufferedWriter, values: Array) -> None:
-    """Rows of the shortest numbers that read back to the same ones."""
     for first in range(0, len(values), _BLOCK):
         rows = values[first : first + _BLOCK].tolist()
         file.write("".join(",".join(map(repr, row)) + "\n" for row in rows).encode("ascii"))

@@ -19,7 +19,7 @@ from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Material, Ring, Section
 from softreach.support.arguments import POSITIVE, as_given, as_number, as_path
 from softreach.support.arrays import Array, Index
-from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, Range
+from softreach.support.errors import InvalidDesign, InvalidInput, Range
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.text import MEGABYTE, read_text, write_text
 
@@ -166,12 +166,8 @@ def is_from_inside_out(radii: Sequence[tuple[float, float]]) -> bool:
 
 def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
     base, section = float(arm.profile.radius(0.0)), arm.section
-    names = [ring.name for ring in section.rings]
     firsts = np.cumsum([0, *(fiber.bundles for fiber in arm.fibers)]).tolist()
-    places = [
-        fiber.ring % len(names) if isinstance(fiber.ring, int) else names.index(fiber.ring)
-        for fiber in arm.fibers
-    ]
+    places = [section.ring_index(fiber.ring) for fiber in arm.fibers]
     shared = Counter(places)
     for k, ring in enumerate(section.rings):
         share = max(shared[k], 1)
@@ -185,21 +181,18 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
         if not shared[k]:
             yield body
         for place, first, fiber in zip(places, firsts, arm.fibers, strict=False):
-            if place == k and isinstance(fiber.offset, tuple):
-                hint = f"give {fiber.name!r} one offset, or make each of its bundles a fiber"
-                raise NotPossible(f"ActiveFilaments.jl spaces bundles evenly: {hint}")
-            if place == k:
-                angle = fiber.helical_angle_on(arm.profile, arm.section)
-                pairs = (fiber.bounds * body.scale).tolist()
-                yield replace(
-                    body,
-                    angle=angle if isinstance(angle, Pieces) else float(angle),  # pyright: ignore[reportArgumentType]
-                    extent=fiber.extent,
-                    offset=fiber.offset,
-                    bounds=tuple((low, high) for low, high in pairs),
-                    bundles=tuple(range(first, first + fiber.bundles)),
-                    name=fiber.name,
-                )
+            if place != k:
+                continue
+            angle: Any = fiber.helical_angle_on(arm.profile, arm.section)
+            yield replace(
+                body,
+                angle=angle if isinstance(angle, Pieces) else float(angle),
+                extent=fiber.extent,
+                offset=fiber.offset,
+                bounds=tuple(map(tuple, (fiber.bounds * body.scale).tolist())),
+                bundles=tuple(range(first, first + fiber.bundles)),
+                name=fiber.name,
+            )
 
 
 def _modulus(material: Material) -> float:
@@ -207,7 +200,6 @@ def _modulus(material: Material) -> float:
 
 
 def _faults(arm: Manipulator) -> Iterator[tuple[str, object, str]]:
-    """What no filament there has: name, value and what there is."""
     if not arm.base.is_identity:
         yield "base", str(arm.base), "upright at the origin, as arm.replace(base=Base()) is,"
     if not isinstance(arm.profile, LinearTaper):
@@ -227,6 +219,8 @@ def _faults(arm: Manipulator) -> Iterator[tuple[str, object, str]]:
             yield actuator.name, type(actuator).__name__, "a FiberArchitecture"
             return
         stretch, angle = actuator.span_over_length(arm.length), actuator.helical_angle
+        if isinstance(actuator.offset, tuple):
+            yield f"offset of {actuator.name}", actuator.offset, "one, as bundles are evenly spaced"
         if stretch != (0.0, 1.0):
             yield f"stretch of {actuator.name}", stretch, "all of the arm"
         if isinstance(angle, AlongArm) and (taper != 0 or not isinstance(angle, Pieces)):

@@ -1,7 +1,5 @@
 """Sections 5 and 6: redundancy (figures 4a to 4d), and places reached with several activations."""
 
-from __future__ import annotations
-
 from time import perf_counter
 from typing import Any
 
@@ -11,12 +9,13 @@ from scipy.ndimage import binary_erosion
 
 from softreach import plot
 from softreach.arm.designs import minimal_trunk, redundant_trunk
+from softreach.atlas import open_atlas
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.dexterity import solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
 from softreach.inverse import solve_inverse
-from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, Verdict, judged
-from softreach.paper.sections.sweep import swept_atlas
+from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, judged
+from softreach.paper.sections.sweep import STORE
 from softreach.rod.kinematics import configuration
 from softreach.support.arrays import Array
 from softreach.workspace import ReachableSet, reachable_set
@@ -29,9 +28,7 @@ _LABEL = "reached more than once / %"
 def redundancy(settings: Settings, notes: Notebook) -> dict[str, Any]:
     """Clouds, activation distances, density, and how many activations reach each place."""
     arms = {"minimal": minimal_trunk(), "redundant": redundant_trunk()}
-    clouds: dict[str, xr.Dataset] = {}
-    distances: dict[str, xr.DataArray] = {}
-    numbers: dict[str, Any] = {}
+    clouds, distances, numbers = {}, {}, dict[str, Any]()
     for name, arm in arms.items():
         start = perf_counter()
         clouds[name] = compute_cloud(arm, settings.redundant_samples, seed=settings.seed)
@@ -41,20 +38,15 @@ def redundancy(settings: Settings, notes: Notebook) -> dict[str, Any]:
     words = "The minimal and the redundant design, above their cross-sections at the base."
     panels = [plot.DesignPanel(name, arm) for name, arm in arms.items()]
     notes.draw("4a", "figure_4a_designs", words, plot.plot_designs(panels))
-    words = (
-        "Clouds colored by |γ| of the last longitudinal bundle (b), slices through the origin in "
-        "the frontal and the right-facing plane (c), and the mean activation-space distance (d); "
-        "isolated points are light gray."
-    )
+    words = "Clouds by |γ| of the last bundle (b), slabs through the base (c), and the mean "
+    words += "activation-space distance (d); isolated points are light gray."
     notes.draw("4b-d", "figure_4bcd_redundancy", words, plot.plot_redundancy(clouds, distances))
     words = "Distribution of the mean activation-space distance in both clouds."
     notes.draw("", "distances", words, plot.plot_distance_histograms(distances))
     outline = arms["redundant"].outline(0.0)
     return numbers | {
         "samples": settings.redundant_samples,
-        "queries": settings.queries,
-        "radius": _RADIUS,
-        "offsets_deg": np.degrees(outline.center[0][2:]).round(9).tolist(),
+        "offsets_deg": np.degrees(outline.center[0][2:]).round(9),
         "extent_deg": np.degrees(outline.extent[2]).round(9),
     }
 
@@ -66,23 +58,17 @@ def cost(n: Numbers) -> Finding:
 
 
 def split(n: Numbers) -> Finding:
-    first, second = n.offsets_deg
-    words = (
-        "neither their places nor their extents are printed. We keep the extent of "
-        f"{n.extent_deg:g}° for each and put them side by side, at {first:g}° and {second:g}°"
-    )
-    return Finding(words, Verdict.OPEN)
+    words = "neither their places nor their extents are printed. We keep the extent of "
+    words += "{:g}° for each and put them side by side, at {:g}° and {:g}°"
+    return Finding(words.format(n.extent_deg, *n.offsets_deg))
 
 
 def families(n: Numbers) -> Finding:
-    three, four = n.minimal, n.redundant
-    words = (
-        f"three fibers: {three['solution_median']:.2f} activations reach a place (median over "
-        f"inner cells); four: curves of activations, {four['solution_median']:.2f} long in the "
-        f"median, below {four['solution_low']:.2f} in a twentieth of the cells, "
-        f"{four['solution_largest']:.1f} at most"
-    )
-    return judged(words, abs(three["solution_median"] - 1) < 0.1 < four["solution_low"])
+    three, (median, low, largest) = n.minimal["solutions"][0], n.redundant["solutions"]
+    words = f"three fibers: {three:.2f} activations reach a place (median over inner cells); "
+    words += f"four: curves of activations, {median:.2f} long in the median, "
+    words += f"below {low:.2f} in a twentieth of the cells, {largest:.1f} at most"
+    return judged(words, abs(three - 1) < 0.1 < low)
 
 
 def uneven(n: Numbers) -> Finding:
@@ -92,13 +78,9 @@ def uneven(n: Numbers) -> Finding:
 
 
 def front(n: Numbers) -> Finding:
-    dense, sparse = n.redundant["density_front"], n.redundant["density_behind"]
-    near, behind = n.redundant["distance_front"], n.redundant["distance_behind"]
-    words = (
-        f"{dense:.3g} points/m³ in front against {sparse:.3g} behind; median D̄ {near:.2f} "
-        f"against {behind:.2f}"
-    )
-    return judged(words, dense > sparse and near > behind)
+    (dense, sparse), (near, far) = n.redundant["densities"], n.redundant["distances"]
+    words = f"{dense:.3g} points/m³ in front against {sparse:.3g} behind; median D̄ {near:.2f} "
+    return judged(f"{words}against {far:.2f}", dense > sparse and near > far)
 
 
 def small(n: Numbers) -> Finding:
@@ -107,12 +89,9 @@ def small(n: Numbers) -> Finding:
 
 
 def large(n: Numbers) -> Finding:
-    data, most = n.redundant, n.redundant["quantiles"]["0.95"]
-    words = (
-        f"median {data['median']:.3f}, 95 % below {most:.3f}; above {data['threshold']:g} in "
-        f"{data['redundant_volume']:.0%} of the volume, against "
-        f"{n.minimal['redundant_volume']:.0%}"
-    )
+    data, most, other = n.redundant, n.redundant["quantiles"]["0.95"], n.minimal["redundant_volume"]
+    words = f"median {data['median']:.3f}, 95 % below {most:.3f}; above {data['threshold']:g} in "
+    words += f"{data['redundant_volume']:.0%} of the volume, against {other:.0%}"
     return judged(words, most > 0.5 > n.minimal["quantiles"]["0.95"])
 
 
@@ -123,22 +102,18 @@ def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
     inner = measure[np.asarray(binary_erosion(measure > 0), bool)]
     filled, y = density["density"].where(density["density"] > 0), density.y
     depth = cloud.tip.values[distance["sample"].values, 1]
-    names = ("median", "quantiles", "isolated", "redundant_volume", "threshold")
+    names = ("median", "quantiles", "redundant_volume", "threshold")
     return {name: getattr(summary, name) for name in names} | {
         "heterogeneity": density.attrs["heterogeneity"],
-        "density_front": float(filled.where(y < 0).mean()),
-        "density_behind": float(filled.where(y > 0).mean()),
-        "distance_front": np.nanmedian(distance.values[depth < 0]),
-        "distance_behind": np.nanmedian(distance.values[depth > 0]),
-        "solution_median": np.median(inner),
-        "solution_low": np.quantile(inner, 0.05),
-        "solution_largest": inner.max(initial=0.0),
+        "densities": [float(filled.where(side).mean()) for side in (y < 0, y > 0)],
+        "distances": [np.nanmedian(distance.values[side]) for side in (depth < 0, depth > 0)],
+        "solutions": [np.median(inner), np.quantile(inner, 0.05), inner.max(initial=0.0)],
     }
 
 
 def uniqueness(settings: Settings, notes: Notebook) -> dict[str, Any]:
     """The share of the volume that several activations reach, and the clearest example."""
-    atlas = swept_atlas(notes.folder)
+    atlas = open_atlas(notes.folder.parent / STORE)
     share = atlas["multiple_volume"] / atlas["exact_volume"]
     worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
     turn, taper = float(worst["revolution"]), float(worst["taper"])
@@ -146,27 +121,24 @@ def uniqueness(settings: Settings, notes: Notebook) -> dict[str, Any]:
     paper, clearest = (reachable_set(arm, accuracy=settings.accuracy) for arm in arms)
     tip, activations = _clearest_pair(clearest)
     mapped = atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")})
-    words = (
-        "Share of the reachable volume that more than one activation reaches, over revolution and "
-        "taper: where it is 0, three fibers are single-valued."
-    )
+    words = "Share of the reachable volume that several activations reach: where it is 0, three "
+    words += "fibers are single-valued."
     notes.draw("", "uniqueness", words, plot.plot_metric_map(mapped, _LABEL))
     if len(activations):
         words = f"{len(activations)} activations of one three-fiber arm with the same tip."
-        shapes = configuration(arms[1], activations)
-        ax = plot.plot_arm(arms[1], shapes, view="oblique", rest=False)
-        notes.draw("", "same_tip", words, ax)
+        shown = arms[1], configuration(arms[1], activations)
+        notes.draw("", "same_tip", words, plot.plot_arm(*shown, view="oblique", rest=False))
     # two fibers, and one: areas and lengths for L = 1 m
     fewer = [arms[0].replace(actuators=arms[0].actuators[:count]) for count in (2, 1)]
     surface, curve = (reachable_set(arm) for arm in fewer)
     return {
-        "share": share.transpose("revolution", "taper").values.tolist(),
+        "share": share.transpose("revolution", "taper").values,
         "worst": float(worst),
         "revolution_deg": np.degrees(turn),
         "taper_deg": np.degrees(taper),
         "paper_share": 1 - paper.multiplicity[1] / paper.volume,
-        "tip": tip.tolist(),
-        "activations": activations.tolist(),
+        "tip": tip,
+        "activations": activations,
         "area": surface.area,
         "curve": curve.curve_length,
     }
@@ -175,23 +147,17 @@ def uniqueness(settings: Settings, notes: Notebook) -> dict[str, Any]:
 def unique(n: Numbers) -> Finding:
     example = "No place with two activations was found"
     if len(n.activations) > 1:
-        rows = [", ".join(f"{g:.3f}" for g in row) for row in n.activations]
-        tip = ", ".join(f"{x:.3f}" for x in n.tip)
+        *rows, tip = (", ".join(f"{x:.3f}" for x in row) for row in (*n.activations, n.tip))
         example = f"In the latter design γ = ({'); ('.join(rows)}) all reach ({tip}) m"
-    words = (
-        f"{n.paper_share:.2%} of the volume is reached by more than one activation at Ω = 108°, "
-        f"φ = 2°, up to {n.worst:.1%} at Ω = {n.revolution_deg:.4g}°, "
-        f"φ = {n.taper_deg:.3g}°; less than 0.1 % in {int((n.share < 1e-3).sum())} of "
-        f"{n.share.size} designs. {example}"
-    )
+    words = f"{n.paper_share:.2%} of the volume is reached by more than one activation at Ω = 108°,"
+    words += f" φ = 2°, up to {n.worst:.1%} at Ω = {n.revolution_deg:.4g}°, φ = {n.taper_deg:.3g}°;"
+    words += f" less than 0.1 % in {(n.share < 1e-3).sum()} of {n.share.size} designs. {example}"
     return judged(words, len(n.activations) < 2, n.worst < 0.1)
 
 
 def dimension(n: Numbers) -> Finding:
-    words = (
-        f"two fibers sweep a surface of {n.area:.3f} L², one fiber a curve of "
-        f"{n.curve:.3f} L (of the minimal design, in the order of its fibers)"
-    )
+    words = f"two fibers sweep a surface of {n.area:.3f} L², one fiber a curve of {n.curve:.3f} L "
+    words += "(of the minimal design, in the order of its fibers)"
     return judged(words, min(n.area, n.curve) > 1e-6)
 
 
@@ -199,8 +165,7 @@ def _clearest_pair(reached: ReachableSet) -> tuple[Array, Array]:
     """Tip and activations, of places that several activations reach, where these differ most."""
     places = np.argwhere(reached.grid["count"].values > 1)
     places = places[:: max(1, len(places) // _TARGETS)]
-    axes = [reached.grid[axis].values for axis in "xyz"]
-    tips = np.stack([axes[k][places[:, k]] for k in range(3)], axis=1)
+    tips = np.stack([reached.grid[x].values[k] for x, k in zip("xyz", places.T, strict=True)], 1)
     solutions = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
     if not solutions:
         return np.zeros(3), np.empty((0, 3))

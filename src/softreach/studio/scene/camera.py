@@ -14,7 +14,7 @@ from softreach.picture.axes_box import axes_box, round_box, seen_from
 from softreach.studio.state import Camera, vector
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.units import in_lengths
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     from viser import ClientHandle, SceneApi
@@ -130,7 +130,7 @@ class NumberedBox:
     def __init__(self, api: SceneApi) -> None:
         self._api, self._lock = api, threading.RLock()
         self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
-        self._unit, self._scale = in_lengths(1.0), 1.0  # of the numbers, and L in it
+        self._unit, self._scale = LengthUnit("L", 1.0), 1.0  # of the numbers, and L in it
         self._camera: tuple[Array, float] = np.array([50.0, -80.0, 30.0]), np.inf
         self._drawn: object = None  # what the numbers were drawn for
 

@@ -17,22 +17,9 @@ def tables_of(text: str, number: Callable[[str], Any] = float) -> dict[str, Any]
     `number` makes values of numbers with a point or an exponent.
     """
     try:
-        tables = tomllib.loads(text, parse_float=number)
-        if _fit_64_bits(tables):
-            return tables
-    except tomllib.TOMLDecodeError:
-        raise
+        return tomllib.loads(text, parse_float=number)
     except RecursionError:
         raise ValueError("lists or tables are nested too deep") from None
-    except (ValueError, OverflowError):  # of thousands of digits, which Python refuses itself
-        pass
-    raise ValueError("a whole number has more than 64 bits")
-
-
-def _fit_64_bits(value: Any) -> bool:
-    if isinstance(value, dict | list):
-        return all(map(_fit_64_bits, value.values() if isinstance(value, dict) else value))
-    return not isinstance(value, int) or -(2**63) <= value < 2**63
 
 
 def document_of(
