@@ -89,8 +89,10 @@ class Job:
         if not (was and wanted):
             return was != wanted
         read = attrgetter("__class__", *map(in_session, self.depends_on.split()))
-        pairs = zip(read(old), read(new), strict=True)
-        return any(a is not b and (isinstance(b, np.ndarray) or bool(a != b)) for a, b in pairs)
+        for a, b in zip(read(old), read(new), strict=True):
+            if a is not b and (isinstance(b, np.ndarray) or a != b):
+                return True
+        return False
 
 
 def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job]:
