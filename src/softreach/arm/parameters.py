@@ -106,14 +106,19 @@ class Parameter:
         the same.
         """
         first, *others = self.values(arm)
-        same = all(math.isclose(first, other, rel_tol=_ROUNDING) for other in others)
-        return first if same else math.nan
+        for other in others:
+            if not math.isclose(first, other, rel_tol=_ROUNDING):
+                return math.nan
+        return first
 
     def values(self, arm: Manipulator) -> tuple[float, ...]:
         """Its value in each part that shares it, and of each bundle that a bound is of [unit]."""
         if self.read is not None:
             return self.read(arm)
-        return tuple(value for place in self.places for value in _values(arm, place))
+        values: list[float] = []
+        for place in self.places:
+            values += _values(arm, place)
+        return tuple(values)
 
     def edits(self, arm: Manipulator, new: Rule) -> dict[Address, float]:
         """New values of numbers of parts by which each of its values becomes new(value)."""

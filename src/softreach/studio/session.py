@@ -235,7 +235,7 @@ class Session:
     @property
     def busy(self) -> bool:
         """True while any job has something to do."""
-        return any(worker.busy for worker in self._workers.values())
+        return True in [worker.busy for worker in self._workers.values()]
 
     def cancel(self) -> None:
         """Stop all that is being computed; what is known already stays."""

@@ -210,8 +210,8 @@ class Actuator(Span, ABC):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations inside (0, L) where its load jumps or is not smooth [m]."""
-        places = (*self.span(profile.length), *(profile.length * x for x in self.breaks))
-        return tuple(z for z in places if 0.0 < z < profile.length)
+        places = [*self.span(profile.length), *[profile.length * x for x in self.breaks]]
+        return tuple([z for z in places if 0.0 < z < profile.length])
 
     def acts(self, profile: Profile, z: Array) -> Mask:
         """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
