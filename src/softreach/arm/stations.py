@@ -84,11 +84,11 @@ class Located(Part):
         """Faults of places that an arm of a length [m] does not have."""
         allowed = f"must be on the arm, at most {length:g} m"
         return [
-            Fault(field, z, allowed)
+            Fault(field, self.station_at(field, length), allowed)
             for field in self.places
-            # of a named station, the arm refuses that
-            if (z := self.station_at(field, length)) > length
-            and not isinstance(getattr(self, field), Station)
+            # over L it is, and of a named station the arm refuses that
+            if not isinstance(getattr(self, field), Station | None)
+            and self.station_at(field, length) > length
         ]
 
 
