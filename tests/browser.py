@@ -11,11 +11,12 @@ __all__ = ["MISSING", "browser", "heard"]
 CHROMIUM = shutil.which("chromium")
 MISSING = "no chromium on this machine"
 
-FLAGS = (
+_FLAGS = (
     "--no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
     "--disable-background-networking --disable-component-update --disable-default-apps "
     "--disable-sync --metrics-recording-only --no-first-run --no-pings --disable-gpu-compositing"
-).split()
+)
+FLAGS = _FLAGS.split()
 
 
 @pytest.fixture(scope="session")
