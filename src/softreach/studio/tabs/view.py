@@ -93,7 +93,8 @@ def _numbers(session: Session, found: Found, colors: str) -> str:
     below: list[list[Part]] = []
     if reach is not None:
         refusal: list[Part] = [f"No exact volume: {reach.refusal}"] * bool(reach.refusal)
-        notes: list[Part] = [f"{'; '.join(reach.notes)}."] * bool(reach.fine and reach.notes)
+        words = "; ".join(reach.notes if reach.fine else ())
+        notes: list[Part] = [f"{words[:1].upper()}{words[1:]}."] * bool(words)
         below = [legend_text(reach, free=found.free is not None), refusal, notes]
     lines = lambda lines: [markup.paragraph(*line) for line in lines]
     return markup.status(*lines(above), colors, *lines(below))
