@@ -418,7 +418,7 @@ def _assembled(
     changed: Iterable[PartKey],
     inside: Mapping[str, float],
 ) -> Manipulator:
-    kinds, changes = {key[0] for key in changed}, dict[str, Any]()
+    kinds, changes = {str(key[0]) for key in changed}, dict[str, Any]()
     if inside or kinds & {"rings", "core", "measured"}:
         rings = tuple(
             new["rings", k].replace(material=new["rings", k, "material"])

@@ -106,7 +106,7 @@ class StepRule:
         if known is None or known[0] != asked:
             edges = self.edges(steps, stations)
             ends = np.searchsorted(edges, self.arm.profile.slender_coordinate(stations))
-            known = vars(self)["_latest"] = asked, (self.packed(edges), read_only(ends))
+            known = vars(self)["_latest"] = asked, (self.packed(edges), ends)
         return known[1]
 
     def steps_for(self, tol: float) -> int:
