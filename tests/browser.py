@@ -11,11 +11,12 @@ __all__ = ["MISSING", "browser", "heard"]
 CHROMIUM = shutil.which("chromium")
 MISSING = "no chromium on this machine"
 
-FLAGS = (
+_FLAGS = (
     "--no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader "
     "--disable-background-networking --disable-component-update --disable-default-apps "
     "--disable-sync --metrics-recording-only --no-first-run --no-pings --disable-gpu-compositing"
 )
+FLAGS = _FLAGS.split()
 
 
 @pytest.fixture(scope="session")
@@ -26,7 +27,7 @@ def browser() -> Iterator[object]:
         pytest.skip(MISSING)
     sync_api = pytest.importorskip("playwright.sync_api")
     with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS.split())
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield browser
         browser.close()
 

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 import softreach as sr
 from softreach.arm import Loads, Manipulator, designs
+from softreach.picture.zbuffer import vertex_normals
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import Held
 from softreach.workspace import ReachableSet, reachable_set
@@ -109,6 +110,20 @@ def test_what_is_torn_is_one_surface_of_the_stated_volume(name, grams, points):
     assert (count == 2).all()
     assert connected_components(graph, directed=False)[0] <= 3
     assert surface.volume == pytest.approx(found.volume, rel=0.01)
+
+
+def test_pictures_of_loaded_sets_have_no_slivers_that_look_inward():
+    found = reachable_set(designs.lce_arm().replace(loads=Loads(payload=3e-4)), accuracy=0.05)
+
+    def turned(surface) -> int:
+        a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
+        normals = vertex_normals(surface.vertices, surface.faces)[surface.faces]
+        ahead = np.einsum("fki,fi->fk", normals, np.cross(b - a, c - a))
+        return int((ahead < 0.0).any(axis=1).sum())
+
+    surface, sheets = found.surface(), found.sheets()
+    assert turned(sheets) < 0.01 * turned(surface)
+    assert sheets.volume == pytest.approx(surface.volume, rel=2e-3)
 
 
 def test_sheets_of_two_bundles_hang_together():

@@ -148,8 +148,10 @@ _OPEN = ExitStack()
 """Servers that a flow needs until all is counted."""
 
 
-def _moved_slider(change: Callable[[Any, float], Any]) -> Callable[[], object]:
-    """A settled tab of the studio, without its widgets, whose state is changed to and fro."""
+def _moved_slider(
+    change: Callable[[Any, float], Any], *, widgets: bool = False
+) -> Callable[[], object]:
+    """A settled tab of the studio, with its widgets or not, whose state is changed to and fro."""
     from tests.studio.sockets import page
 
     from softreach.studio import Quality, Start, Studio, StudioState
@@ -158,7 +160,7 @@ def _moved_slider(change: Callable[[Any, float], Any]) -> Callable[[], object]:
     state = StudioState(design=sr.designs.minimal_trunk()).showing(level=14)
     studio = _OPEN.enter_context(Studio(Start(state=state, quality=quality)))
     session = _OPEN.enter_context(page(studio))
-    session.panels = []
+    session.panels = session.panels if widgets else []
     values = itertools.cycle((0.02, 0.03))
 
     def question() -> None:
@@ -169,11 +171,20 @@ def _moved_slider(change: Callable[[Any, float], Any]) -> Callable[[], object]:
     return question
 
 
-def slider() -> Callable[[], object]:
-    """One slider of a design in the studio, until its fine cloud is drawn."""
+def _tapered(state: Any, taper: float) -> Any:
     from softreach.arm.parameters import changed
 
-    return _moved_slider(lambda s, taper: s.replace(design=changed(s.design, {"taper": taper})))
+    return state.replace(design=changed(state.design, {"taper": taper}))
+
+
+def slider() -> Callable[[], object]:
+    """One slider of a design in the studio, until its fine cloud is drawn."""
+    return _moved_slider(_tapered)
+
+
+def slider_with_widgets() -> Callable[[], object]:
+    """The same with all that the widgets of the page follow."""
+    return _moved_slider(_tapered, widgets=True)
 
 
 def activation_slider() -> Callable[[], object]:
@@ -193,6 +204,7 @@ FLOWS: dict[str, Flow] = {
     "reach, raster": reach_by_raster,
     "reach, search": reach_by_search,
     "slider": slider,
+    "slider, with widgets": slider_with_widgets,
     "slider, activation": activation_slider,
 }
 

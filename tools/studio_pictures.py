@@ -27,7 +27,6 @@ PICTURES = Path(__file__).parent.parent / "docs" / "images"
 LAPTOP, PHONE = (1366, 768), (390, 844)
 COLORS = 255  # the palette of a picture: what keeps it below MOST
 MOST = 250_000  # bytes
-NOTICE = ".mantine-Notification-closeButton"  # of the note on missing graphics cards
 CURLED = (-0.7, -0.4, -0.9)
 FOLDED = designs.minimal_trunk(revolution=np.radians(36), taper=np.radians(3))
 PLACES = {"shelf": (0.37, 0.15, 0.85), "tray": (-0.1, -0.35, 0.6), "bin": (0.3, -0.3, 0.45)}
@@ -108,7 +107,6 @@ def take_picture(browser: object, running: Studio, name: str) -> None:
     tab = Tab(browser, running, (width, height))
     SCENES[name](tab)
     tab.settle()
-    tab.page.locator(NOTICE).first.click()
     tab.page.mouse.move(20, 0.45 * height)  # away from tooltips
     tab.page.wait_for_timeout(2500)  # notices fade, the page draws
     save(tab.page.screenshot(), PICTURES / f"{name}.png")

@@ -39,7 +39,7 @@ def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(t
     bare, other = StudioState(design=trunk), changed(trunk, {"taper": 0.01})
     full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk, needs=NEEDS)
     full = full.showing(section=True, sweep=True)
-    shown = {"reach", "slopes", "cloud", "surface", "arm", "camera", "theme", "drag"}
+    shown = {"reach", "slopes", "cloud", "surface", "arm", "axes", "camera", "theme", "drag"}
     aimed = bare.replace(target=(0.1, 0.0, 0.8)).showing(section=True, surface=False)
     changes = [
         (None, bare, shown),  # a first state
@@ -64,7 +64,7 @@ def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(t
     for old, new, jobs in changes:
         assert stale(old, new) == jobs
     reach = Found(reach=object.__new__(Reach))
-    assert stale(full, full, NOTHING, reach) == {"surface", "slopes", "section"}
+    assert stale(full, full, NOTHING, reach) == {"axes", "surface", "slopes", "section"}
     assert stale(full, full, reach, reach) == set()
 
 

@@ -131,10 +131,9 @@ class Body:
 
     def _settle(self) -> list[Fault]:
         """Give actuators names, and parts the places of the stations that they name."""
-        with faults_under("stations"):
-            places = self.stations
-            places = places if isinstance(places, Stations) else Stations(places)
-        object.__setattr__(self, "stations", places)
+        if not isinstance(self.stations, Stations):
+            with faults_under("stations"):
+                object.__setattr__(self, "stations", Stations(self.stations))
         actuators = [(each.name, each) for each in named_actuators(self.actuators)]
         pieces = [(f"rigid_pieces[{k}]", piece) for k, piece in enumerate(self.rigid_pieces)]
         return self._place("actuators", actuators) + self._place("rigid_pieces", pieces)

@@ -141,8 +141,19 @@ class Number:
 
     def refusal(self, value: object) -> Range | None:
         """The limits that a number is beyond: its own, or the sizes that no arm has; or None."""
-        limits = (self.allowed, self._sense)
-        return next((each for each in limits if not each.admits(value)), None)
+        if not self.allowed.admits(value):
+            return self.allowed
+        return None if self._sense.admits(value) else self._sense
+
+    @lazy
+    def usual(self) -> tuple[float, float]:
+        """Ends between which a float is neither refused nor changed, both included."""
+        if self.shape != "single" or self.allowed.whole:
+            return math.inf, -math.inf
+        each = self.allowed, self._sense
+        low = (math.nextafter(x.low, math.inf) if x.open_low else x.low for x in each)
+        high = (math.nextafter(x.high, -math.inf) if x.open_high else x.high for x in each)
+        return max(low), min(high)
 
     @lazy
     def _sense(self) -> Range:
@@ -301,6 +312,7 @@ def default_of(kind: type, field: str) -> Any:
     return getattr(kind, "__dataclass_fields__")[field].default  # noqa: B009
 
 
+@cache
 def own_fields(kind: type) -> frozenset[str]:
     """Numbers of a kind that are not softreach's; none for a kind of softreach."""
     ours = (fields_of(base) for base in kind.__mro__ if _is_ours(base))

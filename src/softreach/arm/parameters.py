@@ -104,14 +104,19 @@ class Parameter:
         the same.
         """
         first, *others = self.values(arm)
-        same = all(math.isclose(first, other, rel_tol=_ROUNDING) for other in others)
-        return first if same else math.nan
+        for other in others:
+            if not math.isclose(first, other, rel_tol=_ROUNDING):
+                return math.nan
+        return first
 
     def values(self, arm: Manipulator) -> tuple[float, ...]:
         """Its value in each part that shares it, and of each bundle that a bound is of [unit]."""
         if self.read is not None:
             return self.read(arm)
-        return tuple(value for place in self.places for value in _values(arm, place))
+        values: list[float] = []
+        for place in self.places:
+            values += _values(arm, place)
+        return tuple(values)
 
     def edits(self, arm: Manipulator, new: Rule) -> dict[Address, float]:
         """New values of numbers of parts by which each of its values becomes new(value)."""
@@ -129,7 +134,7 @@ class Parameter:
 
 def _values(arm: Manipulator, place: Address) -> tuple[float, ...]:
     part, called = place
-    return parts(arm)[part].values_of(called, arm.profile, arm.section)
+    return part_of(arm, part).values_of(called, arm.profile, arm.section)
 
 
 # Laws of parameters that are no numbers of parts.
@@ -163,7 +168,7 @@ def _revolutions(arm: Manipulator) -> dict[Address, float]:
     turns: dict[Address, float] = {}
     for actuator in arm.actuators:
         numbers = fields_of(type(actuator))
-        along = any(isinstance(getattr(actuator, field), AlongArm) for field in numbers)
+        along = [field for field in numbers if isinstance(getattr(actuator, field), AlongArm)]
         if not along and "revolution" in numbers and numbers["revolution"].unit == "rad":
             place = ("actuators", actuator.name), "revolution"
             turns[place] = _values(arm, place)[0]
@@ -202,6 +207,14 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
     keyed |= {key: part for key, part in inside.items() if part is not None}
     keyed |= {("drives", drive.name): drive for drive in arm.drives}
     return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
+
+
+def part_of(arm: Manipulator, key: PartKey) -> Any:
+    """The part of a key, as `parts` has it."""
+    for each in arm.actuators:  # whose most parameters are
+        if key == ("actuators", each.name):
+            return each
+    return arm.profile if key == ("profile",) else parts(arm)[key]
 
 
 def owner_of(key: PartKey) -> str:
@@ -373,7 +386,7 @@ def _add_edits(edits: _Edits, arm: Manipulator, by: Parameter, new: Rule) -> Non
         if not by.owner:
             numbers.setdefault(called, (value, by))
             continue
-        other = alternatives(type(parts(arm)[key])).get(called, "")
+        other = alternatives(type(part_of(arm, key))).get(called, "")
         if other in numbers and not numbers[other][1].owner:
             del numbers[other]
         numbers[called] = value, by
@@ -392,26 +405,30 @@ def _made(arm: Manipulator, edits: _Edits, given: Mapping[str, float]) -> Manipu
             new[key] = part.replace(**values)
     if not faults:
         with gathered(faults):
-            return _assembled(arm, new, inside)
+            return _assembled(arm, new, changes, inside)
     named = [_as_given(fault, edits, given) for fault in faults]
     raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in named}.values()])
 
 
 def _assembled(
-    arm: Manipulator, new: Mapping[PartKey, Any], inside: Mapping[str, float]
+    arm: Manipulator,
+    new: Mapping[PartKey, Any],
+    changed: Iterable[PartKey],
+    inside: Mapping[str, float],
 ) -> Manipulator:
-    rings = tuple(
-        new["rings", k].replace(material=new["rings", k, "material"])
-        for k in range(len(arm.section.rings))
-    )
-    own = {name: new[name,] for name in ("core", "measured") if (name,) in new}
-    section = arm.section.replace(rings=rings, **own, **inside)
-    alone = ("profile", "loads", "base", "rest", "stations")
-    changes = {name: new[name,] for name in alone if (name,) in new} | {
-        kind: tuple(part for key, part in new.items() if key[0] == kind)
-        for kind in ("rigid_pieces", "markers", "drives", "actuators")
-    }
-    return arm.replace(section=section, **changes)
+    kinds, changes = {str(key[0]) for key in changed}, dict[str, Any]()
+    if inside or kinds & {"rings", "core", "measured"}:
+        rings = tuple(
+            new["rings", k].replace(material=new["rings", k, "material"])
+            for k in range(len(arm.section.rings))
+        )
+        own = {name: new[name,] for name in ("core", "measured") if (name,) in new}
+        changes["section"] = arm.section.replace(rings=rings, **own, **inside)
+    alone = {"profile", "loads", "base", "rest", "stations"}
+    changes |= {name: new[name,] for name in kinds & alone}
+    for kind in kinds & {"rigid_pieces", "markers", "drives", "actuators"}:
+        changes[kind] = tuple([part for key, part in new.items() if key[0] == kind])
+    return arm.replace(**changes)
 
 
 def _as_given(fault: Fault, edits: _Edits, given: Mapping[str, float]) -> Fault:

@@ -60,7 +60,7 @@ class Material(Part):
 
     def same_matter(self, other: Material) -> bool:
         """All but the names are equal."""
-        return self.replace(name="") == other.replace(name="")
+        return self == other or self.replace(name="") == other.replace(name="")
 
 
 @dataclass(frozen=True)

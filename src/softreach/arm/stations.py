@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from softreach.arm.number import NamedFloats, Number, Station, fields_of, is_path_name, number
@@ -62,9 +63,9 @@ class Located(Part):
     """A part at places along the arm, each given over L, in m, or by the name of a station."""
 
     @property
-    def places(self) -> list[str]:
+    def places(self) -> tuple[str, ...]:
         """Fields that are places in m or by name, beside each of which one is over L."""
-        return [field for field, declared in fields_of(type(self)).items() if declared.named]
+        return _places(type(self))
 
     def station_at(self, field: str, length: float) -> float:
         """Z [m] of a place on an arm of a length [m].
@@ -83,12 +84,17 @@ class Located(Part):
         """Faults of places that an arm of a length [m] does not have."""
         allowed = f"must be on the arm, at most {length:g} m"
         return [
-            Fault(field, z, allowed)
+            Fault(field, self.station_at(field, length), allowed)
             for field in self.places
-            # of a named station, the arm refuses that
-            if (z := self.station_at(field, length)) > length
-            and not isinstance(getattr(self, field), Station)
+            # over L it is, and of a named station the arm refuses that
+            if not isinstance(getattr(self, field), Station | None)
+            and self.station_at(field, length) > length
         ]
+
+
+@cache
+def _places(kind: type) -> tuple[str, ...]:
+    return tuple(field for field, declared in fields_of(kind).items() if declared.named)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +116,8 @@ class Span(Located):
 
     def span(self, length: float) -> tuple[float, float]:
         """Stations [m] between which it is on an arm of a length [m]."""
+        if self.start is None and self.end is None:
+            return length * self.start_over_length, length * self.end_over_length
         return self.station_at("start", length), self.station_at("end", length)
 
     def span_over_length(self, length: float) -> tuple[float, float]:
@@ -184,18 +192,18 @@ Made = TypeVar("Made", bound=Located)
 
 def placed(part: Made, stations: Mapping[str, float]) -> Made:
     """The part where the stations that it names are; raises InvalidDesign for unknown ones."""
-    given = {field: getattr(part, field) for field in part.places}
     names = {
         field: place.name if isinstance(place, Station) else place
-        for field, place in given.items()
-        if isinstance(place, str | Station)
+        for field in part.places
+        if isinstance(place := getattr(part, field), str | Station)
     }
+    if not names:
+        return part
     unknown = {field: name for field, name in names.items() if name not in stations}
     if unknown:
         faults = (Fault(field, name, _allowed(name, stations)) for field, name in unknown.items())
         raise InvalidDesign([*faults])
-    places = {field: Station(name, stations[name]) for field, name in names.items()}
-    return part.replace(**places) if places else part
+    return part.replace(**{at: Station(name, stations[name]) for at, name in names.items()})
 
 
 def _allowed(name: str, stations: Mapping[str, float]) -> str:

@@ -94,8 +94,11 @@ def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
 
 
 @lru_cache(maxsize=64)
-def check_extension(arm: Body) -> None:
+def check_extension(arm: Body) -> float:
     """The theory ends where an activation would shorten the inner arm to nothing.
+
+    Returns:
+        The smallest ζ in the activation box and along the arm, or η if that is smaller [-].
 
     Raises:
         InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, dimensions too
@@ -116,13 +119,15 @@ def check_extension(arm: Body) -> None:
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
-    matter = table.rest_length_factor, " of matter itself, without forces"
-    for rates, of in ((table.extension, ""), matter):
+    ends, matter = list[float](), (table.rest_length_factor, " of matter itself, without forces")
+    for rates, of in ((table.extension, ""), matter)[: 1 + table.has_forces]:
         smallest, _ = range_of_extension(arm, rates)
+        ends.append(smallest)
         if smallest <= 0:
             kept = "must keep ζ > 0: narrow the bounds"
             allowed = f"reaches extension ζ = {smallest:.4g}{of}; {kept}"
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
+    return min(ends)
 
 
 def range_of_extension(arm: Body, extension: Array) -> tuple[float, float]:

@@ -55,11 +55,13 @@ class ArmRod(TipMap):
     arm: Manipulator
     tol: float = 1e-6
     fixed_steps: int | None = None
-    """Steps along the arm, if nothing breaks it, in place of those that `tol` needs."""
+    """Steps along the arm, if nothing breaks it, in place of those that `tol` needs; an arm in so
+    many steps is known to keep ζ > 0."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tol", check_tol(self.tol))
-        check_extension(self.arm)
+        if self.fixed_steps is None:
+            check_extension(self.arm)
 
     @property
     def frame(self) -> Frame:

@@ -44,7 +44,7 @@ class ActivationBox:
         pairs = as_rows("bounds", bounds, 2, "(lower, upper) of each bundle, shape (bundles, 2)")
         return cls(tuple((low, high) for low, high in pairs.tolist()), tuple(names))
 
-    @property
+    @lazy
     def bundles(self) -> int:
         """Number of bundles, free or fixed."""
         return len(self.bounds)

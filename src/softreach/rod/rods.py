@@ -13,6 +13,7 @@ from softreach.arm.body import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator, no_arm
 from softreach.arm.stations import Marker
+from softreach.arm.tables import check_extension
 from softreach.kernels.rod.frames import move, turn
 from softreach.rod.free import ArmRod, FreeRod
 from softreach.rod.inputs import ActivationBox, Inputs
@@ -347,15 +348,21 @@ def of_tip(tip_map: TipMap) -> ArmMap:
     return as_tip_map(tip_map)
 
 
-def in_steps(arm: Manipulator, steps: int, like: TipMap) -> TipMap:
+def in_steps(arm: Manipulator, steps: int, like: TipMap, *, extends: bool = False) -> TipMap:
     """The tip map of an arm in so many steps, which are not checked against its tolerance.
 
     Maps of neighboring designs in as many steps err by what is a smooth function of the design, so
     that differences between them do not see it; and none of them needs a search for its steps.
-    Tolerance, frame and effective inputs are those of a map that it is like.
+    Tolerance, frame and effective inputs are those of a map that it is like. Unless it is known
+    that the arm `extends`, ζ > 0 in all of its bounds, that is checked.
+
+    Raises:
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    driving = as_tip_map(like).inputs.driving
-    made = _made(arm, like.tol, like.frame, _rod(inner_arm(arm), like.tol, steps))
+    driving, inner = as_tip_map(like).inputs.driving, inner_arm(arm)
+    if not extends:
+        check_extension(inner)
+    made = _made(arm, like.tol, like.frame, _rod(inner, like.tol, steps))
     return effective(made) if driving is not None and driving.is_effective else made
 
 

@@ -97,10 +97,17 @@ class StepRule:
         return packed[: len(edges) - 1], packed[len(edges) - 1 :]
 
     def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
-        """Packed tables of steps that end at every station Z [m], and the steps up to each."""
-        edges = self.edges(steps, stations)
-        ends = np.searchsorted(edges, self.arm.profile.slender_coordinate(stations))
-        return self.packed(edges), ends
+        """Packed tables of steps that end at every station Z [m], and the steps up to each.
+
+        The latest are kept: an arm that moves is asked for its shape at the same stations.
+        """
+        asked = steps, stations.tobytes()
+        known = vars(self).get("_latest")
+        if known is None or known[0] != asked:
+            edges = self.edges(steps, stations)
+            ends = np.searchsorted(edges, self.arm.profile.slender_coordinate(stations))
+            known = vars(self)["_latest"] = asked, (self.packed(edges), ends)
+        return known[1]
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.

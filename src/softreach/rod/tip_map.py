@@ -7,6 +7,7 @@ Code that needs to know where an arm can go calls a tip map, and reads no field 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from enum import IntEnum
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -312,10 +313,11 @@ class TipMap(ABC):
         if len(room) > 1 and wanted != ("status",):
             size //= 16 if self.supports_unstable else 8  # an equilibrium takes a search
         self.prepare()
-        parallel.run(
-            partial(self.fill, gamma[b], TipOutputs(**{name: room[name][b] for name in room}))
-            for b in parallel.blocks(n, size)
-        )
+        tasks: list[Callable[[], object]] = []
+        for block in parallel.blocks(n, size):
+            out = TipOutputs(**{name: values[block] for name, values in room.items()})
+            tasks.append(partial(self.fill, gamma[block], out))
+        parallel.run(tasks)
         drop(lost, room.get("status"), *(room[name] for name in room if name != "status"))
         return tuple(room.values())
 

@@ -39,6 +39,7 @@ class Attribute(NamedTuple):
     read: Callable[[Any], Any]
     write: Callable[[Any, Any], Any]
     of: str = "state"
+    follows: str = ""  # path of all that decides the value; "" for any part of the owner
 
 
 def attribute(path: str) -> Attribute:
@@ -49,13 +50,13 @@ def attribute(path: str) -> Attribute:
     def write(owner: Any, value: Any) -> Any:
         return replace(owner, **{name: part.write(getattr(owner, name), value) if part else value})
 
-    return Attribute(attrgetter(path), write)
+    return Attribute(attrgetter(path), write, follows=path)
 
 
 def of_design(read: Callable[[Any], Any], write: Callable[[Any, Any], Any]) -> Attribute:
     """A value of the design, and the design with another one."""
     made = lambda state, value: state.replace(design=write(state.design, value))
-    return Attribute(lambda state: read(state.design), made)
+    return Attribute(lambda state: read(state.design), made, follows="design")
 
 
 class Fields:
@@ -146,6 +147,7 @@ class Fields:
     def dropdown(self, label: str, options: Names | Options, at: Attribute, hint: str) -> Any:
         """Add a menu; options say what each value is called, if need be in each state."""
         offered = options if callable(options) else lambda _: options
+        at = at._replace(follows="state") if callable(options) else at
         names = offered(self.session.state)
         labels, shown = tuple(names.values()), names[self._read(at)]
         widget = self.gui.add_dropdown(label, labels, initial_value=shown, hint=hint)
@@ -203,7 +205,7 @@ class Fields:
         act = self.session.learn if at.of == "found" else lambda change: self.apply(change, widget)
         widget.on_update(self._by_hand(lambda: act(binding.write)))
         self._bindings.append(binding)
-        self.follow("state", at.of, "tab.revision", show=lambda *_: binding.follow())
+        self.follow(at.follows or at.of, "tab.revision", show=lambda *_: binding.follow())
         return self.kept(widget)
 
     def _by_hand(self, action: Action) -> Callable[[Any], object]:
@@ -243,12 +245,13 @@ class Fields:
 
     def _seen_where(self, widget: Any, shown: Where) -> Any:
         def follow(state: StudioState, found: Found) -> None:
-            widget.visible = bool(at(state, found))
+            is_so = shown(state, found) if callable(shown) else read(self.session)
+            widget.visible = bool(is_so)
 
+        paths = ("state", "found") if callable(shown) else (shown,)
+        read = attrgetter(*map(in_session, paths))
         if shown:
-            value = lambda path: attrgetter(in_session(path))(self.session)
-            at = shown if callable(shown) else lambda *_: value(shown)
-            self.follow("state", "found", show=follow)
+            self.follow(*paths, show=follow)
         return self.kept(widget)
 
 

@@ -59,6 +59,7 @@ def _axes(height: float) -> Axes:
 
 def _pixels(ax: Axes) -> NDArray[np.uint8]:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.legend import Legend
     from matplotlib.text import Text
 
     figure = cast("Figure", ax.figure)
@@ -66,6 +67,8 @@ def _pixels(ax: Axes) -> NDArray[np.uint8]:
     ax.spines[:].set_edgecolor(_INK)
     for text in figure.findobj(Text):
         text.set_color(_INK)
+    for legend in figure.findobj(Legend):
+        legend.set_frame_on(False)
     for paper in (figure.patch, ax.patch):
         paper.set_alpha(0.0)
     canvas = FigureCanvasAgg(figure)

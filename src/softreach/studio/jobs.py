@@ -89,8 +89,10 @@ class Job:
         if not (was and wanted):
             return was != wanted
         read = attrgetter("__class__", *map(in_session, self.depends_on.split()))
-        pairs = zip(read(old), read(new), strict=True)
-        return any(a is not b and (isinstance(b, np.ndarray) or bool(a != b)) for a, b in pairs)
+        for a, b in zip(read(old), read(new), strict=True):
+            if a is not b and (isinstance(b, np.ndarray) or a != b):
+                return True
+        return False
 
 
 def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job]:
@@ -142,7 +144,6 @@ def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
         given.scene.remove(*_CLOUD.split())
         return None
     key = given.scene.draw_cloud(reach, look)
-    given.scene.draw_axes(reach, given.found.free)
     return {"key": key} if shows_cloud(reach, look) or not look.surface else None
 
 
@@ -240,6 +241,9 @@ def _compute_beside(given: Given, name: str) -> Results:
 
 def _draw_beside(given: Given, name: str) -> None:
     given.scene.draw_beside(f"/{name}", getattr(given.found, name), given.state.appearance.slice)
+
+
+def _draw_axes(given: Given) -> None:
     if given.found.reach is not None:
         given.scene.draw_axes(given.found.reach, given.found.free)
 
@@ -291,6 +295,8 @@ SCENE_JOBS = (
     ),
     Job("sweep", f"{DESIGN} appearance.swept", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
+    # The box with numbers, in a job of its own: of two that drew it, one might know an old unit
+    Job("axes", "found.reach found.free", draw=_draw_axes),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
     Job(
         "camera",

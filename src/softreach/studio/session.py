@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import fields, replace
+from operator import is_
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -62,6 +63,7 @@ class Session:
         self.note, self.doing = "", ""  # for the reader, the second on the work that is being done
         self.canceled = False  # true if the reader stopped what was being computed of this state
         self._compilation = compilation
+        self._shown: tuple[object, ...] = (object(),)
         kept = Job("keep", " ".join(field.name for field in fields(StudioState)), self._keep_soon)
         self._jobs = {job.name: job for job in (*jobs, *([kept] if work else []))}
         self._workers = {name: Latest(self.fail, self._rested) for name in self._jobs}
@@ -78,8 +80,8 @@ class Session:
     def update(self, change: Change, *, by_widget: bool = False, goes_on: bool = False) -> None:
         """Replace the state, unless the next is not valid, and start what follows from that.
 
-        `goes_on` lets the change be part of the step before. Where a widget shows it already,
-        others that hold something else are left alone: one that is dragged would jump back.
+        `goes_on` lets the change be part of the step before. Of a widget's, and of a job's, only
+        those follow whose value changes: one that is dragged would jump back.
         """
         with self.lock:
             new = change(self.state)
@@ -156,9 +158,12 @@ class Session:
         return f"compiling, once on this machine{done} ..."
 
     def show(self) -> None:
-        """Let all panels show what has changed."""
+        """Let all panels show what has changed, if anything has."""
         with self.lock:
-            for show in self.panels:
+            work = self.doing, self.busy, self.compiling, self.canceled
+            now = self.panels, self.state, self.found, self.revision, self.note, *work
+            before, self._shown = self._shown, now
+            for show in self.panels if not all(map(is_, before, now)) else ():
                 show()
 
     def say(self, note: str) -> None:
@@ -230,7 +235,7 @@ class Session:
     @property
     def busy(self) -> bool:
         """True while any job has something to do."""
-        return any(worker.busy for worker in self._workers.values())
+        return True in [worker.busy for worker in self._workers.values()]
 
     def cancel(self) -> None:
         """Stop all that is being computed; what is known already stays."""
@@ -268,7 +273,7 @@ class Session:
                 check()
                 self.learn(learned.found, quiet=True)
                 if learned.change is not None:
-                    self.update(learned.change, goes_on=True)
+                    self.update(learned.change, by_widget=True, goes_on=True)
                 if learned.ends_step:
                     self.end_step()
                 with self.client.atomic() if job.at_once else nullcontext():

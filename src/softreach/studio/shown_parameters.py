@@ -208,21 +208,36 @@ def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck)
 
 
 def _last(start: float, limit: float, near: float | None, exists: Callable[[float], bool]) -> float:
-    """The last value from a start toward a limit that exists, rounded to three digits inward."""
+    """The last value from a start toward a limit that exists, of three digits but for the start."""
     inside, outside = start, limit
-    if near is not None:
-        step = 10.0 ** -_decimals(near)
-        for tried in (near + math.copysign(step, limit - start), near):
-            if min(inside, outside) < tried < max(inside, outside):
-                inside, outside = (tried, outside) if exists(tried) else (inside, tried)
+    if near is not None and min(start, limit) < near < max(start, limit):
+        inside, outside = _around(near, start, limit, exists)
     if outside == limit and exists(limit):
         return limit
-    for _ in range(0 if inside == near else _HALVINGS):
+    for _ in range(_HALVINGS):
         middle = (inside + outside) / 2
+        middle = round(middle, _decimals(middle))
+        if not min(inside, outside) < middle < max(inside, outside):
+            break
         inside, outside = (middle, outside) if exists(middle) else (inside, middle)
-    power = 10 ** _decimals(inside)
-    rounded = (math.floor if limit > start else math.ceil)(inside * power) / power
-    return start if (rounded - start) * (limit - start) < 0 else rounded
+    return inside
+
+
+def _around(near: float, start: float, limit: float, exists: Callable[[float], bool]) -> Ends:
+    """A value that exists and one toward the limit that does not, ever farther from `near`.
+
+    The first may be the start, and the second the limit, of which it is not known.
+    """
+    here, digits = exists(near), _decimals(near)
+    last, end = near, limit if here else start
+    step = math.copysign(10.0**-digits, end - near)
+    while abs(step) < abs(end - last):
+        tried = round(last + step, digits)
+        if exists(tried) != here:
+            end = tried
+            break
+        last, step = tried, 2 * step
+    return (last, end) if here else (end, last)
 
 
 def _decimals(value: float) -> int:

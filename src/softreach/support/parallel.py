@@ -25,8 +25,9 @@ class _Here(threading.local):
     """Set once the pool of this thread, or one that it was started in, is given up."""
 
     def check_wanted(self) -> None:
-        if any(event.is_set() for event in self.given_up):
-            raise _Unwanted
+        for event in self.given_up:
+            if event.is_set():
+                raise _Unwanted
 
 
 _here = _Here()

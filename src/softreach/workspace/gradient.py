@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -201,9 +201,9 @@ _Swept = tuple[Array, Array]
 def _searched(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
     assert isinstance(solid.image, ReachedCells)
     if not solid.image.is_thick:
-        wrap, coarse = (_sum(each, tips) for each in (solid.image.wrap, solid.image.coarse))
+        wrap, coarse = _sums((solid.image.wrap, solid.image.coarse), tips)
         return wrap.value, wrap.error + _CHANGES * np.abs(wrap.value - coarse.value)
-    swept = _sum(boundary_samples(solid.image), tips)
+    (swept,) = _sums((boundary_samples(solid.image),), tips)
     # What no search meets is at rims of either sign.
     missing = _MISSING * solid.volume_error / solid.volume * swept.size
     return swept.value, swept.error + missing
@@ -213,14 +213,16 @@ def _flowing(solid: ReachableSet, tips: TipDerivatives, accuracy: float) -> _Swe
     """Derivatives of the volume of three: of the flux, and of what lines of sight add to it."""
     enough = 0.0 if solid.route == "flux" else FLUX_PART * accuracy
     flux = signed_volume(solid.tip_map, enough=enough)
-    sense = 1 if flux.value >= 0 else -1
-    whole = _sum(flux, tips)
+    sense, nodes = 1 if flux.value >= 0 else -1, list[_Nodes]([flux])
+    if solid.route != "flux":
+        assert isinstance(solid.image, Image)
+        images = solid.image.with_more_lines(_LINES), solid.image.coarse
+        nodes += [boundary_samples(image, sense) for image in images]
+    whole, *seen = _sums(nodes, tips)
     value, error = sense * whole.value, whole.error + flux.error / abs(flux.value) * whole.size
-    if solid.route == "flux":
+    if not seen:
         return value, error
-    assert isinstance(solid.image, Image)
-    fine = _sum(boundary_samples(solid.image.with_more_lines(_LINES), sense), tips)
-    coarse = _sum(boundary_samples(solid.image.coarse, sense), tips)
+    fine, coarse = seen
     removed = (fine.value - coarse.value) / 3.0
     return value + fine.value + removed, error + fine.error + np.abs(removed)
 
@@ -232,13 +234,16 @@ def _dragged(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
     may be wrong of each, and so may the part that hulls of corners lack of the convex volume.
     """
     corners = _hull_corners(solid)
-    fine, coarse = (_sum(each, tips) for each in corners)
+    fine, coarse = _sums(corners, tips)
     removed = (fine.value - coarse.value) / 3.0
     hull, rough = (each.volume for each in corners)
     missing = abs(hull + (hull - rough) / 3.0 - solid.convex_volume) / hull
     share = np.max(np.abs(removed) / np.maximum(fine.size, np.finfo(float).tiny))
     error = fine.error + np.abs(removed) + (share + missing) * fine.size
     return fine.value + removed, error
+
+
+_Nodes: TypeAlias = "BoundarySamples | HullCorners | Flux | Wrap"
 
 
 class _Sum(NamedTuple):
@@ -249,11 +254,17 @@ class _Sum(NamedTuple):
     error: Array  # by ∂r/∂p, and by where lines of sight lie
 
 
-def _sum(nodes: BoundarySamples | HullCorners | Flux | Wrap, tips: TipDerivatives) -> _Sum:
-    slopes = tips.at(nodes.cube)
+def _sums(several: Sequence[_Nodes], tips: TipDerivatives) -> list[_Sum]:
+    """Sums over each of several sets of nodes, whose tips are found together."""
+    ends = np.cumsum([len(nodes.cube) for nodes in several])[:-1]
+    slopes = np.split(tips.at(np.concatenate([nodes.cube for nodes in several])), ends)
+    return [_sum(nodes, own, tips.error) for nodes, own in zip(several, slopes, strict=True)]
+
+
+def _sum(nodes: _Nodes, slopes: Array, each: Array) -> _Sum:
     area = nodes.corner_areas if isinstance(nodes, Wrap) else nodes.area
     swept = np.einsum("ni,nip->np", area, slopes)
-    error = tips.error * float(np.linalg.norm(area, axis=1).sum())
+    error = each * float(np.linalg.norm(area, axis=1).sum())
     if isinstance(nodes, BoundarySamples):
         error += nodes.noise(slopes)
     return _Sum(swept.sum(axis=0), np.abs(swept).sum(axis=0), error)

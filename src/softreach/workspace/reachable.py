@@ -20,7 +20,7 @@ from softreach.support.quantity import quantity
 from softreach.workspace.cells import Covering, ReachedCells, cells_of
 from softreach.workspace.image import DIAGONAL, Image, boundary_surface, wrapped_surface
 from softreach.workspace.measure import Estimate, extrapolated, face_image
-from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets
+from softreach.workspace.sheets import Sheets, box_sheets, outer_sheets, unfolded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -256,8 +256,8 @@ class ReachableSet:
 
         Unlike `surface()` it is smooth, ends sharply at rims and where sheets cross, has parts of
         any thinness, and knows its `lines` and activations. It is for pictures: there may be gaps
-        where sheets meet. Of more than three free bundles, of maps with kinks, under loads where
-        the set folds, and of surfaces it is `surface()`.
+        where sheets meet. Of more than three free bundles, of maps with kinks and under loads where
+        the set folds it is `surface()` without slivers that look inward, of surfaces `surface()`.
 
         Raises:
             NotPossible: The set is a curve or a point.
@@ -446,7 +446,7 @@ class ReachableSet:
             return box_sheets(tip_map)
         if isinstance(self.covering, Image) and tip_map.is_smooth and not tip_map.supports_unstable:
             return outer_sheets(tip_map, self.covering)
-        return Sheets.of(self.surface())
+        return Sheets.of(unfolded(self.surface()) if self.dimension == 3 else self.surface())
 
     @lazy
     def _surface(self) -> Surface:

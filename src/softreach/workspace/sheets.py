@@ -32,6 +32,7 @@ _ASIDE = 0.02  # cells of the lattice beside a face where is looked for the reac
 _ROUGH = 0.5  # of second differences: by so much the fold of a linear image is off
 _NEAR = 3.0  # cells of the grid from a fold within which a face may be beneath it
 _STEP = 1e-3  # of the cube, for differences along the kernel of J
+_PASSES = 8  # of which the first two leave a twentieth of the turned faces
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -48,6 +49,26 @@ class Sheets(Surface):
         """A surface of which no more is known."""
         none = np.empty((0, 2), np.int32)
         return cls(vertices=surface.vertices, faces=surface.faces, lines=none, activation=None)
+
+
+def unfolded(surface: Surface) -> Surface:
+    """A closed surface whose slivers that look the other way are turned back, for pictures.
+
+    A surface through a raster has some at every other cell: a thirtieth of a face large, which are
+    seen as specks. Their vertices go half of the way to the middle of those beside them.
+    """
+    vertices, faces = surface.vertices.copy(), surface.faces
+    ends, others = (faces[:, order].ravel() for order in ([0, 1, 2, 0, 1, 2], [1, 2, 0, 2, 0, 1]))
+    count = np.bincount(ends, minlength=len(vertices)).clip(1)[:, None]
+    for _ in range(_PASSES):
+        a, b, c = np.moveaxis(vertices[faces], 1, 0)
+        normals = vertex_normals(vertices, faces)[faces]
+        ahead = np.einsum("fki,fi->fk", normals, np.cross(b - a, c - a))
+        if not len(moved := np.unique(faces[(ahead < 0.0).any(axis=1)])):
+            break
+        sums = [np.bincount(ends, x[others], len(vertices)) for x in vertices.T]
+        vertices[moved] += 0.5 * ((np.stack(sums, axis=1) / count)[moved] - vertices[moved])
+    return replace(surface, vertices=vertices)
 
 
 def outer_sheets(tip_map: TipMap, image: Image) -> Sheets:

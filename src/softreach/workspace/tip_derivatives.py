@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from softreach.arm.driving import inner_arm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, shifted
 from softreach.arm.tables import check_extension
@@ -25,6 +26,7 @@ _LOADED_STEP = 1e-3  # where they are as exact as an equilibrium is found
 _TRIES = 16  # numbers of steps
 _SAFETY = 10.0  # as an error of sixth order in the bending grows with the seventh power or so
 _ROUNDING = 1e-14  # of a tip, in L
+_ROOM = 100.0  # steps of a parameter, relative to it: with a larger ζ than that, neighbors have one
 
 
 class TipDerivatives:
@@ -75,7 +77,7 @@ def _neighbors(tip_map: TipMap, shifts: Shifts, fewest: int) -> list[tuple[float
     """Weights and tip maps of neighbors in one number of steps, that of breakpoints included."""
     used, rods = np.flatnonzero(shifts.weights), list[TipMap]()
     for steps in range(fewest, fewest + _TRIES):
-        rods = [in_steps(shifts.arms[k], steps, tip_map) for k in used]
+        rods = [in_steps(shifts.arms[k], steps, tip_map, extends=shifts.extends) for k in used]
         if len({each.steps for each in rods}) == 1:
             break
     return list(zip(shifts.weights[used].tolist(), rods, strict=True))
@@ -88,6 +90,7 @@ class Shifts:
     offsets: Array  # change of the parameter in steps, whole numbers, (n,)
     step: float  # size of a step, in the unit of the parameter
     arms: tuple[Manipulator, ...]  # the designs, in the same order; the design itself at 0
+    extends: bool  # true if ζ of the design is so large that no other's is 0
 
     @lazy
     def weights(self) -> Array:
@@ -122,12 +125,15 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
         allowed = "a parameter that the design gives as one number"
         raise InvalidInput("parameter", parameter.name, allowed)
     step = relative * min(filter(None, map(abs, values)), default=_scale(arm, parameter))
+    extends = min(map(check_extension, (arm, inner_arm(arm)))) > _ROOM * reach * relative
     ways = np.arange(-reach, reach + 1), np.arange(2 * reach + 1), -np.arange(2 * reach + 1)
     faults = list[InvalidDesign]()
     for offsets in ways:
         try:
-            arms = tuple(_shifted(arm, parameter, step * k) if k else arm for k in offsets)
-            return Shifts(offsets.astype(float), step, arms)
+            arms = [_shifted(arm, parameter, step * k) if k else arm for k in offsets]
+            for made in () if extends else arms:
+                check_extension(made)
+            return Shifts(offsets.astype(float), step, tuple(arms), extends)
         except InvalidDesign as error:
             faults.append(error)
     raise faults[0]
@@ -142,7 +148,6 @@ def _scale(arm: Manipulator, parameter: Parameter) -> float:
 
 def _shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
     made = shifted(arm, parameter, float(amount))
-    check_extension(made)
     free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.input_bounds, arm.input_bounds))
     if not np.array_equal(free, before):
         allowed = "one that neither holds a bundle nor frees one"

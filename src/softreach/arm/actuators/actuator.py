@@ -17,8 +17,9 @@ from softreach.arm.part import AlongArm
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.stations import Span
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array, Mask, read_only
 from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support.lazy import lazy
 
 Bounds = tuple[float, float] | tuple[tuple[float, float], ...]
 
@@ -209,8 +210,8 @@ class Actuator(Span, ABC):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations inside (0, L) where its load jumps or is not smooth [m]."""
-        places = (*self.span(profile.length), *(profile.length * x for x in self.breaks))
-        return tuple(z for z in places if 0.0 < z < profile.length)
+        places = [*self.span(profile.length), *[profile.length * x for x in self.breaks]]
+        return tuple([z for z in places if 0.0 < z < profile.length])
 
     def acts(self, profile: Profile, z: Array) -> Mask:
         """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
@@ -247,10 +248,10 @@ class PolarActuator(Actuator):
     """θ0, polar angle of the first bundle where it begins [rad]; the others stand evenly, counted
     toward larger angles. Or the angle of each bundle, in any order."""
 
-    @property
+    @lazy
     def start_angles(self) -> Array:
-        """θ0 + 2πj/n, polar angle of each bundle where it begins [rad], shape (bundle,)."""
-        return np.array(self.of_bundles("offset"))
+        """θ0 + 2πj/n, polar angle of each bundle where it begins [rad], (bundle,), read-only."""
+        return read_only(np.array(self.of_bundles("offset")))
 
     def _spread(self, field: str, value: float) -> tuple[float, ...]:
         turn = 2.0 * np.pi * np.arange(self.bundles) / self.bundles

@@ -203,6 +203,8 @@ class FiberArchitecture(SectorActuator):
         return self._angle(profile, section.ring(self.ring))
 
     def _angle(self, profile: Profile, ring: Ring) -> float | AlongArm:
+        if self.revolution == 0.0:
+            return 0.0
         given = self.helical_angle
         return _even_angle(self, profile, ring.outer_ratio) if given is None else given
 
@@ -225,6 +227,8 @@ class FiberArchitecture(SectorActuator):
 
     def rotation(self, profile: Profile, ring: Ring, z: Array) -> Array:
         """Θ(Z) = ∫ tan α dZ/(R cos φ) from where it begins [rad]: theory (50)."""
+        if self.helical_angle == 0.0 or self.revolution == 0.0:
+            return np.zeros(np.shape(z))
         angle, ratio = self._angle(profile, ring), ring.outer_ratio
         start = self.station_at("start", profile.length)
         if isinstance(angle, AlongArm):
@@ -241,7 +245,8 @@ def _even_angle(fiber: FiberArchitecture, profile: Profile, ratio: float) -> flo
 
 
 def _along_cone(profile: Profile, ratio: float, start: ArrayLike, end: ArrayLike) -> Array:
-    return profile.surface_coordinate(end, ratio) - profile.surface_coordinate(start, ratio)
+    whole = profile.surface_coordinate(end, ratio)
+    return whole - profile.surface_coordinate(start, ratio) if np.any(start) else whole
 
 
 def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Array) -> Array:

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
+from softreach.arm.skin import Centerline, arm_surface, bundle_skins, inside, marker_points
 from softreach.picture.zbuffer import vertex_normals
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
-from softreach.rod.kinematics import configuration, rest_configuration
+from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import NumberedBox, way_to
@@ -232,29 +232,31 @@ class Scene:
 
         Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
-        shape = configuration(rod or solvable_rod(arm), np.asarray(activation), _STATIONS)
-        return self._draw_shape(arm, shape, path, length or arm.length)
+        stations = np.linspace(0.0, arm.length, _STATIONS)
+        frames = with_unstable(rod or solvable_rod(arm)).frames([activation], stations)
+        line = Centerline(z=stations, position=frames.position[0], directors=frames.directors[0])
+        return self._draw_line(arm, line, path, length or arm.length)
 
     def draw_rest(self, state: StudioState) -> None:
         """The straight arm, if it is at rest, and a box around where it may go."""
         arm, look = state.design, state.appearance
-        shape = rest_configuration(arm, _STATIONS)
+        line = Centerline.unactivated(np.linspace(0.0, arm.length, _STATIONS), arm.base)
         bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
         if look.arm and not (bent or arm.drives or arm.markers):
-            self._draw_shape(arm, shape, "/arm", arm.length)
+            self._draw_line(arm, line, "/arm", arm.length)
         around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
-        self.axes.draw(around, shape["position"].values / arm.length, arm=arm)
+        self.axes.draw(around, line.position / arm.length, arm=arm)
 
-    def _draw_shape(self, arm: Manipulator, shape: Any, path: str, length: float) -> Array:
-        centers, radii = shape["position"].values, shape["radius"].values
+    def _draw_line(self, arm: Manipulator, line: Centerline, path: str, length: float) -> Array:
+        centers, radii = line.position, arm.profile.radius(line.z)
         if np.isnan(centers).any():
             self.remove(path)
             return np.full(3, np.nan)
         if path == "/arm":
-            self.pointing = shape["directors"].values[-1, 2]
-        skins = [arm_surface(arm, shape, _SIDES)]
+            self.pointing = line.directors[-1, 2]
+        skins = [arm_surface(arm, line, _SIDES)]
         if arm.bundles <= MOST_BUNDLES:
-            skins += bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)
+            skins += bundle_skins(arm, line, lift=_LIFT, step=_ACROSS)
         corners = [(skin.vertices / length).astype(np.float32) for skin in skins]
         known = self._arms.get(path)
         if known is not None and known.arm is arm:
@@ -273,7 +275,7 @@ class Scene:
                 for k, (v, f, color, opacity) in parts
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
-        markers = marker_points(arm.markers, shape) / length
+        markers = marker_points(arm.markers, line) / length
         self.dots(f"{path}/markers", markers, DARK, MARKER)
         return centers[-1] / length
 

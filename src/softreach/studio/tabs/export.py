@@ -110,10 +110,8 @@ def _write_surface(session: Session, path: Path) -> None:
 
 
 def _write_arm(session: Session, path: Path) -> None:
-    arm = session.state.design
-    if not np.isfinite(
-        (shape := configuration(session.state.design, session.state.activation)).position.values
-    ).all():
+    arm, shape = session.state.design, _shape(session.state)
+    if not np.isfinite(shape.position.values).all():
         raise InvalidInput("activation", session.state.activation, "one with an equilibrium")
     export_arm(arm, shape, path, unit=arm.length_unit)
 

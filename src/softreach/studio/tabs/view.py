@@ -57,18 +57,21 @@ _NOTHING = np.zeros((1, 1, 4), np.uint8)
 
 def status(panel: Fields) -> None:
     """Numbers, key and notes above all tabs; keys of the page press undo and redo."""
-    session = panel.session
+    session, colors = panel.session, [""]
     known = "found.reach", "found.free", "found.check", "found.key", "found.refusal"
-    panel.html("design", *known, *_WORK, content=lambda _, found: _numbers(session, found))
+    panel.follow("found.key", show=lambda _, found: colors.__setitem__(0, key_html(found.key)))
+    numbers = lambda _, found: _numbers(session, found, colors[0])
+    panel.html("design", *known, *_WORK, content=numbers)
     act = lambda: (session.cancel if session.busy else session.resume)()
     cancel = panel.button(_CANCEL, act, _ABOUT_CANCEL, visible=False)
 
     def offer(_: StudioState, found: Found) -> None:
         lacking = is_behind(session) and not found.refusal
         cancel.label = _GO_ON if lacking and not session.busy else _CANCEL
-        cancel.visible = lacking or session.busy
+        cancel.visible = lacking or (session.busy and not found.is_dragged)
 
-    panel.follow("design", "found.reach", "found.refusal", "tab.busy", show=offer)
+    follows = "design", "found.reach", "found.refusal", "found.is_dragged", "tab.busy"
+    panel.follow(*follows, show=offer)
     toasts: list[Any] = []
 
     def note(*_: object) -> None:
@@ -84,16 +87,17 @@ def status(panel: Fields) -> None:
     panel.choices("history", actions, _HISTORY_HINT)
 
 
-def _numbers(session: Session, found: Found) -> str:
+def _numbers(session: Session, found: Found, colors: str) -> str:
     check, reach = found.check, found.reach
     above = [_reach_line(session), [verdict_text(check)] if check is not None else []]
     below: list[list[Part]] = []
     if reach is not None:
         refusal: list[Part] = [f"No exact volume: {reach.refusal}"] * bool(reach.refusal)
-        notes: list[Part] = [f"{'; '.join(reach.notes)}."] * bool(reach.fine and reach.notes)
+        words = "; ".join(reach.notes if reach.fine else ())
+        notes: list[Part] = [f"{words[:1].upper()}{words[1:]}."] * bool(words)
         below = [legend_text(reach, free=found.free is not None), refusal, notes]
     lines = lambda lines: [markup.paragraph(*line) for line in lines]
-    return markup.status(*lines(above), key_html(found.key), *lines(below))
+    return markup.status(*lines(above), colors, *lines(below))
 
 
 def is_behind(session: Session) -> bool:
