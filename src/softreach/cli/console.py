@@ -62,17 +62,22 @@ class Console:
         self.line(json.dumps(plain(value), indent=indent, allow_nan=False))
 
     def rows(
-        self, title: str, rows: Rows, as_json: bool, arm: sr.Manipulator | None = None
+        self,
+        title: str,
+        rows: Rows,
+        as_json: bool,
+        arm: sr.Manipulator | None = None,
+        unit: LengthUnit = METER,
     ) -> None:
         """Named values in SI units below a title; in JSON, names with their units are the keys.
 
-        People see the unit of the arm, and machines values in its length L too.
+        People see the unit of the arm, or else `unit`, and machines values in its length L too.
         """
         if as_json:
             self.json(for_machines(rows, None if arm is None else arm.length))
             return
         self.line(title)
-        unit = METER if arm is None else arm.length_unit
+        unit = unit if arm is None else arm.length_unit
         for line in lines_of(rows, unit):
             self.line(f"  {line}")
 

@@ -81,7 +81,7 @@ def demo(
         sr.plot.save_figure(figure, out / "cloud.png", overwrite=output.overwrite)
         concave, convex = made()
     console.written(out / "cloud.ply", written)
-    options.save_mesh(concave, arm, out / "hull.ply", output.overwrite)
+    options.save_mesh(concave, options.written_unit(arm), out / "hull.ply", output.overwrite)
     rows = volume_rows(concave, convex)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")

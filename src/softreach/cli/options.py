@@ -86,6 +86,8 @@ def _output(help: str, name: str | None = None) -> Parameter:
 _DESIGN = "Design file (.toml), or a built-in design such as minimal_trunk."
 Design = Annotated[str, Parameter(help=_DESIGN)]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
+_SOURCE = "Cloud (.zarr), design (.toml or built-in) or points (.csv .parquet .ply .npy)."
+Points = Annotated[str, Parameter(help=_SOURCE)]
 _ACTIVATION = "Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5"
 Activation = Annotated[str | None, Parameter(help=_ACTIVATION, allow_leading_hyphen=True)]
 AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "--json")]
@@ -330,6 +332,20 @@ def cloud_of(
     return sr.compute_cloud(arm, **sampling.arguments), arm
 
 
+def points_of(
+    source: str, sampling: Sampling, changes: Changes, unit: str | None
+) -> tuple[xr.Dataset, LengthUnit]:
+    """The points of a file, which have no design, and the unit to print them in."""
+    refuse("on points, which have no design", **changes.given, **vars(sampling))
+    points = sr.exchange.read_points(source, unit=unit)
+    return points, as_unit(unit or points.tip.attrs["unit_of_file"])
+
+
+def is_points(source: str) -> bool:
+    """True if a source is a file of points."""
+    return source.lower().endswith((".csv", ".txt", ".parquet", ".pq", ".ply", ".npy"))
+
+
 def written_unit(arm: sr.Manipulator) -> LengthUnit:
     """Unit of tables and meshes, which other programs take to be in m unless one was chosen."""
     return METER if arm.display_unit is None else arm.length_unit
@@ -364,11 +380,12 @@ def points_in(name: str, file: Path, arm: sr.Manipulator) -> list[list[float]]:
     return positions_in(read_text(name, file, _MOST_TARGETS), str(file), arm.length)
 
 
-def radius_of(text: str, length: float) -> float | str:
-    """An alpha radius in m from `0.05L`, `5cm`, `0.05` (m) or `critical`."""
+def radius_of(text: str, length: float | None) -> float | str:
+    """An alpha radius in m from `0.05L` where L is known, `5cm`, `0.05` (m) or `critical`."""
     if text == "critical":
         return text
-    allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
+    relative = "" if length is None else "0.05L, "
+    allowed = f"a radius > 0 like {relative}5cm ({TYPED}) or 0.05 (m), or critical"
     return read_as("alpha", text, lambda text: read_length(text, length), allowed, POSITIVE)
 
 
@@ -414,8 +431,7 @@ def save_picture(figure: Any, path: Path, overwrite: bool) -> None:
         console.note(f"{path}: {note}")
 
 
-def save_mesh(mesh: Any, arm: sr.Manipulator, path: Path, overwrite: bool) -> None:
+def save_mesh(mesh: Any, written: LengthUnit, path: Path, overwrite: bool) -> None:
     """Write a surface, and say the unit of its lengths."""
-    written = written_unit(arm)
     sr.export.export_mesh(mesh, path, unit=written, overwrite=overwrite)
     console.written(path, written)

@@ -100,7 +100,7 @@ def _write(
     elif _is_drawn(path):
         options.save_picture(sr.plot.plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
     else:
-        options.save_mesh(reached.surface(), arm, path, overwrite)
+        options.save_mesh(reached.surface(), options.written_unit(arm), path, overwrite)
 
 
 def _check_dimension(path: Path, dimension: int) -> None:
@@ -244,36 +244,45 @@ def cloud(
 
 
 def volume(
-    source: options.Source,
+    source: options.Points,
     /,
     *,
-    alpha: str = "0.05L",
+    alpha: str | None = None,
     sampling: options.Sampling = options.SAMPLING,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
     output: options.Output = options.DEFAULT,
 ) -> None:
-    """Estimate volumes and unreachability from a cloud.
+    """Estimate volumes and unreachability from a cloud, or from points of your own.
 
     The volume is that of an α-shape; the number of samples limits its accuracy.
+    Points are in m unless their columns (x_mm) or --unit say otherwise.
     softreach reach computes the exact volume, without samples and with its error.
 
     Example: softreach volume trunk.zarr --alpha 0.03L --out hull.ply
 
     Args:
-        alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical.
+        alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical. 0.05L if left out; critical, the
+            smallest that keeps the points together, for points without a design.
         out: Write the α-shape here: .ply .stl .obj .glb .3mf .vtu
     """
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.schema import is_stable
 
     options.check_output(out, SURFACE_FILES, output.overwrite)
-    options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
-    if not options.is_stored(source):
-        check_memory("n", n := sampling.arguments["n"], HULL_BYTES * n)
-    cloud, arm = options.cloud_of(source, sampling, changes, output.unit)
-    bias = cloud.attrs["sampler"] == "uniform"
-    concave = sr.concave_hull(cloud.tip, options.radius_of(alpha, arm.length), bias=bias)
+    if options.is_points(source):
+        cloud, unit = options.points_of(source, sampling, changes, output.unit)
+        arm, radius = None, options.radius_of(alpha or "critical", None)
+        bias = False
+    else:
+        alpha = alpha or "0.05L"
+        options.radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
+        if not options.is_stored(source):
+            check_memory("n", n := sampling.arguments["n"], HULL_BYTES * n)
+        cloud, arm = options.cloud_of(source, sampling, changes, output.unit)
+        unit, radius = options.written_unit(arm), options.radius_of(alpha, arm.length)
+        bias = cloud.attrs["sampler"] == "uniform"
+    concave = sr.concave_hull(cloud.tip, radius, bias=bias)
     rows = volume_rows(concave, sr.convex_hull(cloud.tip))
     areas = sr.volume.flat_areas(cloud.tip.values[is_stable(cloud.tip)], concave.alpha)
     if areas is not None:
@@ -281,9 +290,9 @@ def volume(
         rows = {name: rows[name] for name in ("points", "alpha")}
         rows |= {"area (in one plane)": (areas[0], "m²"), "convex area": (areas[1], "m²")}
         rows["unreachability"] = (share, "")
-    console.rows(f"volume of {source}", rows, output.json, arm)
+    console.rows(f"volume of {source}", rows, output.json, arm, unit)
     if out is not None:
-        options.save_mesh(concave, arm, out, output.overwrite)
+        options.save_mesh(concave, unit, out, output.overwrite)
 
 
 def volume_rows(concave: sr.volume.Hull, convex: sr.volume.Hull) -> Rows:
@@ -302,7 +311,7 @@ def volume_rows(concave: sr.volume.Hull, convex: sr.volume.Hull) -> Rows:
 
 
 def show(
-    source: options.Source,
+    source: options.Points,
     /,
     *,
     color: str | None = None,
@@ -328,13 +337,20 @@ def show(
     from softreach.plot.coloring import bundle_names
 
     options.check_picture(out, overwrite, page=True)
-    cloud, arm = options.cloud_of(source, sampling, changes, unit)
-    shape = None if activation is None else options.shape_of(activation, arm)
-    look: dict[str, Any] = {"color": color, "unit": arm.length_unit}
+    if options.is_points(source):
+        options.refuse("on points, which have no design", activation=activation, color=color)
+        cloud, written = options.points_of(source, sampling, changes, unit)
+        arm = shape = None
+    else:
+        cloud, arm = options.cloud_of(source, sampling, changes, unit)
+        shape = None if activation is None else options.shape_of(activation, arm)
+        written = arm.length_unit
+    look: dict[str, Any] = {"color": color, "unit": written}
     if color == "compliance" and color not in bundle_names(cloud):  # which figures do not compute
         look["color"] = sr.stiffness.cloud_compliance(cloud)["largest_compliance"]
     if options.is_page(out):
-        figure = sr.plot.plot_3d([cloud, arm if shape is None else shape], **look)
+        bent = arm if shape is None else shape
+        figure = sr.plot.plot_3d([cloud] if bent is None else [cloud, bent], **look)
     else:
         figure = sr.plot.plot_views(cloud, arm, shape, **look)
     options.save_picture(figure, out, overwrite)

@@ -1,5 +1,6 @@
-"""Definitions and clouds of other programs of the field, read and written."""
+"""Definitions, clouds and points of other programs, read and written."""
 
 from softreach.exchange import activefilaments
+from softreach.exchange.points import read_points
 
-__all__ = ["activefilaments"]
+__all__ = ["activefilaments", "read_points"]

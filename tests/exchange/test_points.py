@@ -1,0 +1,87 @@
+"""Points of other programs: the same places from every format, and their hulls in closed form."""
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.cli.app import run
+from softreach.exchange import read_points
+
+CUBE = np.array(np.meshgrid(*[np.linspace(0.0, 100.0, 6)] * 3)).reshape(3, -1).T  # [mm]
+
+
+def write_csv(path, points, header=""):
+    np.savetxt(path, points, delimiter=",", header=header, comments="", fmt="%.17g")
+
+
+@pytest.fixture
+def files(tmp_path):
+    pd, trimesh = pytest.importorskip("pandas"), pytest.importorskip("trimesh")
+    pytest.importorskip("pyarrow")
+    write_csv(tmp_path / "named.csv", CUBE, "x_mm,y_mm,z_mm")
+    write_csv(tmp_path / "tips.csv", CUBE[:, ::-1], "tip z [mm],tip y [mm],tip x [mm]")
+    write_csv(tmp_path / "plain.csv", CUBE)
+    np.savetxt(tmp_path / "spaces.txt", CUBE)
+    pd.DataFrame(CUBE, columns=list("xyz")).to_parquet(tmp_path / "table.parquet")
+    np.save(tmp_path / "array.npy", CUBE)
+    trimesh.PointCloud(CUBE).export(tmp_path / "cloud.ply")
+    return sorted(tmp_path.iterdir())
+
+
+def test_every_format_holds_the_same_places(files):
+    assert len(files) == 7
+    for file in files:
+        cloud = read_points(file, unit="mm")
+        assert np.allclose(cloud.tip, 1e-3 * CUBE, rtol=0, atol=1e-9), file.name
+        assert cloud.activation.shape == (216, 0)
+
+
+def test_a_cloud_that_was_exported_is_read_back(trunk, tmp_path):
+    cloud = sr.compute_cloud(trunk, 100)
+    for unit in ("m", "mm"):
+        sr.export.export_cloud(cloud, file := tmp_path / f"{unit}.csv", unit=unit)
+        assert np.allclose(read_points(file).tip, cloud.tip, rtol=0, atol=1e-12)
+
+
+def test_the_volume_of_a_cube_and_the_area_of_a_square_are_printed(tmp_path, capsys):
+    write_csv(tmp_path / "cube.csv", CUBE, "x_mm,y_mm,z_mm")
+    assert run(["volume", str(tmp_path / "cube.csv"), "--alpha", "60mm", "--json"]) == 0
+    assert '"volume_m3": 0.001' in capsys.readouterr().out
+    write_csv(tmp_path / "square.csv", CUBE[::6, :2])
+    assert run(["volume", str(tmp_path / "square.csv"), "--unit", "mm", "--alpha", "30mm"]) == 0
+    assert "area (in one plane)  10000 mm²" in capsys.readouterr().out
+
+
+def test_points_are_drawn(tmp_path):
+    pytest.importorskip("matplotlib")
+    np.save(tmp_path / "a.npy", CUBE)
+    for name in ("a.png", "a.html"):
+        assert run(["show", str(tmp_path / "a.npy"), "--out", str(tmp_path / name)]) == 0
+        assert (tmp_path / name).stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.csv", "x,y,z\n1,2,nan\n", "point 1"),
+        ("a.csv", "u,v,w\n1,2,3\n", "must be x, y and z"),
+        ("a.csv", "x_mm,y_cm,z_mm\n1,2,3\n", "must be of one unit"),
+        ("a.csv", "", "a table or points"),
+        ("a.csv", "1,2,3\n1,2,a\n", "a table or points"),
+        ("a.npy", "no array", "a table or points"),
+        ("a.xyz", "1 2 3\n", "a file name ending in .csv"),
+    ],
+)
+def test_what_holds_no_points_is_refused_in_one_line(tmp_path, name, text, message):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(sr.InvalidInput, match=message) as refused:
+        read_points(tmp_path / name)
+    assert "\n" not in str(refused.value)
+
+
+def test_options_of_a_design_are_refused_on_points(tmp_path, capsys):
+    write_csv(tmp_path / "cube.csv", CUBE)
+    assert run(["volume", str(tmp_path / "cube.csv"), "--n", "1000"]) == 2
+    assert "on points, which have no design" in capsys.readouterr().err
+    assert run(["volume", str(tmp_path / "cube.csv"), "--alpha", "0.1L"]) == 2
+    assert "like 5cm" in capsys.readouterr().err
