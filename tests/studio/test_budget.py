@@ -26,7 +26,7 @@ from softreach.studio.figures import (
     volume_slopes,
 )
 from softreach.studio.markup import bar
-from softreach.studio.reach import Quality, Reach, level_in_memory, stages
+from softreach.studio.reach import Quality, Reach, stages
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import MOST_POINTS, Slice, TipPath
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
@@ -53,17 +53,6 @@ def test_a_computation_ends_when_its_time_is_over_or_memory_runs_out_meanwhile(m
     time.sleep(0.25)
     with pytest.raises(OverBudget, match="memory"):
         running()
-
-
-def test_clouds_fit_into_memory_and_a_smaller_one_says_what_it_left_out(trunk, monkeypatch):
-    for bundles in (3, 1000):
-        level = level_in_memory(bundles, 1e9, 21)
-        assert level == 21 or (1 << level) * 8 * (bundles + 3) <= 1e9
-    assert level_in_memory(3, 0.0, 17) == 10
-    monkeypatch.setattr(budget, "free_memory", lambda: 1e6)
-    *_, fine = reaching.stages(trunk, 12, SMALL, nothing)
-    assert fine.samples < fine.wanted == 1 << 12
-    assert "1,024 of 4,096 samples" in fine.notes[0]
 
 
 def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk, monkeypatch):

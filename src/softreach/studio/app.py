@@ -62,11 +62,10 @@ class Studio(AbstractContextManager["Studio"]):
         self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
         self.server = serve.start_server(host, port, token)
-        arm, camera = start.state.design, start.state.camera
+        arm, camera, eye = start.state.design, start.state.camera, self.server.initial_camera
         look_at = arm.base.to_world(arm.length * _LOOK_AT) / arm.length
-        away = look_at + VIEWS["oblique"]
-        self.server.initial_camera.position = camera.position if camera else away
-        self.server.initial_camera.look_at = camera.look_at if camera else look_at
+        eye.look_at = camera.look_at if camera else look_at
+        eye.position = camera.position if camera else look_at + VIEWS["oblique"]
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
 

@@ -11,7 +11,6 @@ import gzip
 import hmac
 import io
 import re
-import secrets
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
@@ -88,11 +87,6 @@ def stop_server(server: ViserServer) -> None:
 
 
 # Requests that are answered, and headers of the answers.
-
-
-def new_token() -> str:
-    """A token that nobody guesses."""
-    return secrets.token_urlsafe(18)
 
 
 def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:

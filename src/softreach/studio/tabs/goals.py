@@ -265,7 +265,8 @@ def measured(panel: Fields) -> None:
             panel.html("found.bench", content=_summary)
             about = "Makes the calibrated arm the design; can be undone"
             fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
-            panel.button("Apply", lambda: _apply(session), about, fitted)
+            apply = lambda state: state.replace(design=fitted(state, session.found) or state.design)
+            panel.change("Apply", apply, about, fitted)
 
 
 def _is_free(name: str) -> Attribute:
@@ -295,14 +296,6 @@ def _pose(session: Session, bench: Bench) -> None:
         raise InvalidInput("design", "another one", allowed, "load the data again")
     session.update(bench.posed, goes_on=True)
     session.learn({"bench": bench})
-
-
-def _apply(session: Session) -> None:
-    bench = session.found.bench
-    arm = bench.fitted(session.state.design) if bench is not None else None
-    if arm is None:
-        raise InvalidInput("design", "changed since the fit", "the one that was fitted")
-    session.update(lambda state: state.replace(design=arm))
 
 
 def _bench_text(_: StudioState, found: Found) -> list[str]:
