@@ -7,12 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
-from softreach.inverse.path import PathStatus, end_text
 from softreach.studio import figures
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
@@ -255,13 +253,3 @@ def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
 def test_a_path_that_cannot_be_followed_is_refused(points):
     with pytest.raises(InvalidInput, match="path"):
         TipPath.through(points)
-
-
-@pytest.mark.parametrize("end", [status for status in PathStatus if status > 0])
-def test_every_end_of_a_path_is_said_in_words(trunk, end):
-    status = "point", [PathStatus.FOLLOWED, end]
-    known = {"status": status, "end_length": 0.2, "end_length_error": 1e-3}
-    about = {"end": end.name.lower(), "end_bundle": "left", "end_bound": "lower"}
-    text = end_text(xr.Dataset(known, attrs=about), trunk.length_unit)
-    assert text.endswith(".")
-    assert "{" not in text

@@ -4,8 +4,7 @@ import socket
 
 import pytest
 
-from softreach.studio import Studio
-from tests.studio.tab import CHEAP, Tab
+from tests.studio.tab import CHEAP
 from tests.studio.test_hostile_states import design_with, look_with, state_with
 
 STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
@@ -76,12 +75,3 @@ def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser
         with pytest.raises(BlockingIOError):
             elsewhere.accept()
         page.close()
-
-
-@pytest.mark.large
-def test_the_address_with_the_token_opens_the_page_and_its_socket(browser, studio):
-    with Studio(studio.start, token="secret") as guarded:
-        tab = Tab(browser, guarded)
-        assert tab.session.found.reach is not None
-        assert tab.errors == []
-        tab.close()

@@ -118,8 +118,8 @@ def test_a_slider_follows_others_but_is_not_set_back_while_it_is_in_the_hand(tab
 
 
 @pytest.mark.large
-def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path):
-    with Studio(studio.start, work=KeptWork(tmp_path)) as running:
+def test_a_page_with_a_token_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path):
+    with Studio(studio.start, token="secret", work=KeptWork(tmp_path)) as running:
         tab = Tab(browser, running)
         design = changed(tab.session.state.design, {"taper": 0.02})
         tab.session.update(lambda s: s.replace(design=design))
@@ -131,6 +131,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path)
         tab.session = running.sessions[max(running.sessions)]
         reach = tab.reach_of(design)
         tab.page.get_by_text(size_text(reach.size, design)).wait_for()
+        assert tab.errors == []
         tab.close()
 
 
