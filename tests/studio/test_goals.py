@@ -39,7 +39,7 @@ def added(session, kind, text="") -> None:
 
 
 def verdict(session) -> str:
-    return goals.verdict(session.found, session.state)
+    return goals.verdict(session.state, session.found)
 
 
 def drawn(session, name):

@@ -96,20 +96,20 @@ class Studio(AbstractContextManager["Studio"]):
 
     def _connected(self, client: ClientHandle) -> None:
         self._libraries.join()
-        watch, left = self._compilation, self.work and self.work.latest
-        session = Session(client, self.start, JOBS, work=self.work, left=left, compilation=watch)
+        session = Session(client, self.start, JOBS, work=self.work, compilation=self._compilation)
+        goes_on = session.is_touched
         with self._lock:
             self.sessions[client.client_id] = session
         furnish(session)
         client.camera.on_update(lambda _: session.follow("camera"))
         session.begin()
-        if (camera := (left or self.start.state).camera) is not None:
+        if (camera := session.state.camera) is not None:
             session.look_as(camera)
         elif session.camera.aspect < UPRIGHT:
             session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
-        elif left is not None:
+        elif goes_on:
             session.say(_GOES_ON)
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)

@@ -74,9 +74,7 @@ def needs(panel: Fields) -> None:
             field.value = ""
 
         panel.button("Add to the needs", add, about)
-        panel.html("design", "found.check", content=lambda state, found: verdict(found, state))
-        refused = lambda _, found: markup.alert(found.check_refusal) if found.check_refusal else ""
-        panel.html("found.check_refusal", content=refused)
+        panel.html("design", "found.check", "found.check_refusal", content=verdict)
         one = "One of the needs, or all of them"
         part: Any = gui.add_dropdown("remove", (_ALL,), hint=one, visible=False)
         parts = lambda: needs_parts(requirements_of(session.state.needs), unit())
@@ -97,10 +95,10 @@ def needs(panel: Fields) -> None:
         panel.button("Save needs (TOML)", save, about, "needs", **GRAY)
 
 
-def verdict(found: Found, state: StudioState) -> str:
-    """What is met and what is missed, as HTML."""
+def verdict(state: StudioState, found: Found) -> str:
+    """What is met and what is missed, or why that is not known, as HTML."""
     if (check := found.check) is None:
-        return ""
+        return markup.alert(found.check_refusal) if found.check_refusal else ""
     lines: list[tuple[Part, ...]] = []
     for finding in check.findings:
         sign, mark = _SIGNS[finding.verdict], Swatch(VERDICTS[finding.verdict])
