@@ -103,9 +103,9 @@ def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
     """Volume, area or length, whatever each has, in the unit of the present design, and UNR."""
     reaches, arm, rows = (kept[1], now[1]), now[0], list[Row]()
     sizes = [reach.size if reach else None for reach in reaches]
-    for name, power in dict.fromkeys((size.name, size.power) for size in sizes if size):
+    for name, latest in {size.name: size for size in sizes if size}.items():
         same = [size if size and size.name == name else None for size in sizes]
-        unit = size_unit(same[1] or same[0], arm)
+        unit, power = size_unit(latest, arm), latest.power
         scale, title = (unit.scale(power), unit.label(name, power)) if power else (1.0, name)
         before, after = (size and size.value / scale for size in same)
         first, second = (size and told_error(size, arm) / scale for size in same)

@@ -370,8 +370,12 @@ def _at_point(state: StudioState, activations: np.ndarray, point: int) -> Studio
     return state.replace(path=path, activation=tuple(activations[point].tolist()))
 
 
-_OF_TARGET = {"wanted": "target", "makes": "answer takes_nearest", "draws": "/ghosts /target /gap"}
-_OF_PATH = {"wanted": "path", "makes": "track", "doing": "following the path"}
+_OF_TARGET: dict[str, Any] = {
+    "wanted": "target",
+    "makes": "answer takes_nearest",
+    "draws": "/ghosts /target /gap",
+}
+_OF_PATH: dict[str, Any] = {"wanted": "path", "makes": "track", "doing": "following the path"}
 JOBS = (
     # The activations that reach the target, and their shapes
     Job("inverse", "design target", _solve, _draw_answer, **_OF_TARGET),
