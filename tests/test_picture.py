@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from softreach.geometry.hull import convex_hull
 from softreach.picture import Dots, Skin, html_card, thumbnail
+from softreach.picture.axes_box import axes_box, seen_from
 from softreach.picture.projection import VIEWS, is_mirrored, project, sight_axis, view_axes
 from softreach.picture.thumbnail import png_bytes
 from softreach.picture.zbuffer import Extent, ZBuffer, shade
@@ -241,3 +242,55 @@ def test_twelve_bundles_have_colors_that_are_told_apart_and_four_a_lightness_of_
     lab = color.rgb2lab(np.array([[bundle_color(k) for k in range(12)]]))[0]
     apart = color.deltaE_ciede2000(lab[:, None], lab[None])
     assert apart[~np.eye(12, dtype=bool)].min() > 18
+
+
+# A box with numbers around everything
+
+
+def test_the_box_holds_every_point_and_its_numbers_are_round(rng):
+    points = rng.uniform(-0.73, 1.19, (100, 3))
+    box = axes_box(points)
+    lines = box.lines[:12]
+    assert (lines.min(axis=(0, 1)) <= points).all()
+    assert (points <= lines.max(axis=(0, 1))).all()
+    texts = {text for text, _ in box.labels}
+    assert "\N{MINUS SIGN}0" not in texts
+    assert {"0", "0.5", "1", "x / L", "y / L", "z / L"} <= texts
+
+
+EYES = [(2.1, -3.85, 1.45), (-3, 3, 1), (3, 2, -2), (1.5, -5, 0.9)]
+
+
+@pytest.mark.parametrize("eye", EYES)
+def test_numbers_of_an_edge_keep_their_distance_in_a_small_picture(eye):
+    low, high = np.full(3, -0.6), np.array([0.6, 0.6, 1.0])
+    wide = seen_from(eye, low, high)
+    for focal in (300.0, 600.0, 1200.0):
+        small = seen_from(eye, low, high, focal)
+        assert small.edges == wide.edges
+        steps = np.array(small.steps)
+        assert (steps >= wide.steps).all()
+        digits = steps / 10 ** np.floor(np.log10(steps) + 1e-9)
+        assert np.isclose(digits[:, None], (1, 2, 5)).any(axis=1).all()
+    far = np.asarray(eye) * 20
+    assert min(seen_from(far, low, high, 300.0).steps) > max(wide.steps)
+
+
+@pytest.mark.parametrize("eye", EYES)
+@pytest.mark.parametrize("focal", [420.0, 600.0, 1200.0])
+def test_numbers_stand_outside_and_the_name_of_an_axis_keeps_its_distance_from_them(eye, focal):
+    low, high = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+    box = axes_box(low[None], high[None], camera=eye, focal=focal)
+    texts = np.array([at for _, at in box.labels])
+    assert ((texts < low) | (texts > high)).any(axis=1).all()
+    forward = (low + high) / 2 - eye
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    ways = np.stack([right, np.cross(right, forward)])
+    seen = focal * (texts - eye) @ ways.T / ((texts - eye) @ forward)[:, None]
+    is_name = np.array([text.endswith("/ L") for text, _ in box.labels])
+    for k in np.flatnonzero(is_name):
+        axis = "xyz".index(box.labels[k][0][0])
+        near = ~is_name & (np.abs(texts - texts[k])[:, axis] < 1e-9)
+        assert (np.abs(seen[near] - seen[k]) > (19, 11)).any(axis=1).all()

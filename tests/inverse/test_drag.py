@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import softreach as sr
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.inverse.path import Drag
+from softreach.inverse.path import Drag, PathStatus, end_text
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipStatus
 
@@ -96,3 +97,13 @@ def test_a_loaded_arm_is_led_through_stable_equilibria_alone():
     status = as_tip_map(arm, 1e-6).status([one.activation for one in found])
     assert (status == TipStatus.STABLE).all()
     assert found[0].gap == 0.0
+
+
+@pytest.mark.parametrize("end", [status for status in PathStatus if status > 0])
+def test_every_end_of_a_path_is_said_in_words(end):
+    status = "point", [PathStatus.FOLLOWED, end]
+    known = {"status": status, "end_length": 0.2, "end_length_error": 1e-3}
+    about = {"end": end.name.lower(), "end_bundle": "left", "end_bound": "lower"}
+    text = end_text(xr.Dataset(known, attrs=about), TRUNK.length_unit)
+    assert text.endswith(".")
+    assert "{" not in text

@@ -7,12 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import xarray as xr
 
 from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
-from softreach.inverse.path import PathStatus, end_text
 from softreach.studio import figures
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
@@ -26,7 +24,7 @@ from softreach.studio.figures import (
     volume_slopes,
 )
 from softreach.studio.markup import bar
-from softreach.studio.reach import Quality, Reach, level_in_memory, stages
+from softreach.studio.reach import Quality, Reach, stages
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import MOST_POINTS, Slice, TipPath
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
@@ -53,17 +51,6 @@ def test_a_computation_ends_when_its_time_is_over_or_memory_runs_out_meanwhile(m
     time.sleep(0.25)
     with pytest.raises(OverBudget, match="memory"):
         running()
-
-
-def test_clouds_fit_into_memory_and_a_smaller_one_says_what_it_left_out(trunk, monkeypatch):
-    for bundles in (3, 1000):
-        level = level_in_memory(bundles, 1e9, 21)
-        assert level == 21 or (1 << level) * 8 * (bundles + 3) <= 1e9
-    assert level_in_memory(3, 0.0, 17) == 10
-    monkeypatch.setattr(budget, "free_memory", lambda: 1e6)
-    *_, fine = reaching.stages(trunk, 12, SMALL, nothing)
-    assert fine.samples < fine.wanted == 1 << 12
-    assert "1,024 of 4,096 samples" in fine.notes[0]
 
 
 def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk, monkeypatch):
@@ -266,13 +253,3 @@ def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
 def test_a_path_that_cannot_be_followed_is_refused(points):
     with pytest.raises(InvalidInput, match="path"):
         TipPath.through(points)
-
-
-@pytest.mark.parametrize("end", [status for status in PathStatus if status > 0])
-def test_every_end_of_a_path_is_said_in_words(trunk, end):
-    status = "point", [PathStatus.FOLLOWED, end]
-    known = {"status": status, "end_length": 0.2, "end_length_error": 1e-3}
-    about = {"end": end.name.lower(), "end_bundle": "left", "end_bound": "lower"}
-    text = end_text(xr.Dataset(known, attrs=about), trunk.length_unit)
-    assert text.endswith(".")
-    assert "{" not in text

@@ -13,7 +13,7 @@ from softreach.studio.captions import size_text
 from softreach.support import palette
 from tests.calibration.arms import table
 from tests.studio.tab import like
-from tests.studio.test_calibrate import ARM, INPUTS, MARKERS, NAMES, PLACES
+from tests.studio.test_goals import INPUTS, MARKED, MARKERS, NAMES, PLACES
 
 ORANGE = (0.92, 0.35, 0.0)
 """Color of targets and of measured markers."""
@@ -180,7 +180,7 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     columns = table(PLACES, INPUTS, NAMES, MARKERS)
     rows = np.column_stack(list(columns.values()))
     bench = written(tmp_path / "bench.csv", rows, [key.removesuffix("_N") for key in columns])
-    ARM.save(tmp_path / "arm.toml")
+    MARKED.save(tmp_path / "arm.toml")
 
     tab.show_surface(False)
     tab.open("Export")
@@ -192,7 +192,7 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     page.get_by_text("bench.csv: 20 samples of half, tool").wait_for()
     assert like(tab.pixels(), ORANGE) > 20
     for sample in (0, 1):
-        predicted = marker_positions(ARM, INPUTS[sample])[0]
+        predicted = marker_positions(MARKED, INPUTS[sample])[0]
         half, tool = 1e3 * np.linalg.norm(PLACES[sample] - predicted, axis=1)
         page.get_by_text(f"half {half:.3g} mm, tool {tool:.3g} mm").wait_for()
         tab.slider("sample").press("ArrowRight")
@@ -204,4 +204,4 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     assert tab.session.state.design.profile.taper == pytest.approx(0.012, abs=3e-4)
     tab.press("Undo")
     tab.settle()
-    assert tab.session.state.design == ARM
+    assert tab.session.state.design == MARKED

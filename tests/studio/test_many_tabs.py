@@ -71,15 +71,21 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
 
 
 @pytest.mark.large
-def test_of_tabs_that_were_closed_nothing_stays(studio):
+def test_memory_is_returned_once_a_tab_rests_and_of_those_that_are_gone_nothing_stays(
+    studio, monkeypatch
+):
+    returned: list[int] = []
+    monkeypatch.setattr(work, "return_memory", lambda: returned.append(len(studio.sessions)))
     with page(studio):
         pass  # what is made once
     until(lambda: not studio.sessions)
-    before = own_threads()
-    gone = []
+    before, gone = own_threads(), []
     for _ in range(2):
         with page(studio) as session:
+            assert session.settle(PATIENCE)
+            until(lambda: 1 in returned)
             gone.append(weakref.ref(session.found.reach.cloud))
+            prepared = weakref.ref(prepared_map(session.state.design))
             del session
     until(lambda: not studio.sessions and own_threads() <= before)
 
@@ -88,23 +94,11 @@ def test_of_tabs_that_were_closed_nothing_stays(studio):
         return len({id(one()) for one in gone if one() is not None})
 
     until(lambda: clouds() <= 1)  # the one that all tabs begin with
+    until(lambda: {0, 1} <= {*returned} and prepared() is None)
 
 
 @pytest.mark.large
-def test_memory_is_returned_once_a_tab_rests_and_when_it_is_gone(studio, monkeypatch):
-    returned: list[int] = []
-    monkeypatch.setattr(work, "return_memory", lambda: returned.append(len(studio.sessions)))
-    with page(studio) as session:
-        assert session.settle(PATIENCE)
-        until(lambda: 1 in returned)
-        prepared = weakref.ref(prepared_map(session.state.design))
-        del session
-    until(lambda: 0 in returned)
-    until(lambda: prepared() is None)
-
-
-@pytest.mark.large
-def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_full(
+def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_lets_another_have_its_turn(
     studio, monkeypatch
 ):
     computed = []
@@ -112,7 +106,7 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
     monkeypatch.setattr(
         stages, "compute_cloud", lambda *a, **o: computed.append(a[0]) or plain(*a, **o)
     )
-    with page(studio) as session:
+    with page(studio) as session, page(studio) as calm:
         computed.clear()
         threads = own_threads()
         shake(session, 40, 0.01)
@@ -122,28 +116,22 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
         assert len(computed) < 60  # each in two or three stages, of which the later are dropped
         assert len(session.history.past) < 50
         until(lambda: own_threads() <= threads)
-
-
-@pytest.mark.large
-def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):
-    """The other settles while the first is still shaken."""
-    with page(studio) as shaken, page(studio) as calm:
         stop = threading.Event()
 
         def go_on() -> None:
             while not stop.is_set():
-                shake(shaken, 1, 0.02)
+                shake(session, 1, 0.02)
 
         shaking = threading.Thread(target=go_on)
         shaking.start()
         try:
             calm.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.021})))
-            assert calm.settle(PATIENCE)
+            assert calm.settle(PATIENCE)  # while the other is still shaken
             assert calm.found.reach.arm == calm.state.design
         finally:
             stop.set()
             shaking.join(PATIENCE)
-        assert shaken.settle(PATIENCE)
+        assert session.settle(PATIENCE)
 
 
 def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, monkeypatch):

@@ -14,6 +14,7 @@ from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.studio.fields import attribute
 from softreach.studio.shown_parameters import (
+    body_numbers,
     named_parameters,
     part_parameters,
     parts,
@@ -111,7 +112,7 @@ def test_refusals_use_the_words_of_the_panel(trunk):
             change(trunk, value)
         said = refusal(refused.value, shown, trunk)
         assert not re.search(r"R2|_|rings\[", said)
-    assert said.startswith("E [kPa] of ring 0: must be given")
+    assert said.startswith("modulus [kPa] of ring 0: must be given")
 
 
 def fiber(name, turn, extent=0.3):
@@ -128,8 +129,7 @@ def test_what_differs_between_fibers_is_on_sliders_and_in_fields_of_each():
     assert own <= found.keys()
     assert not shared & found.keys()
     assert found["a.revolution"] == pytest.approx(-0.5)
-    body, *_ = parts(differing).values()
-    assert not shared & {one.name for one in part_parameters(differing, body)}
+    assert not shared & {one.name for one in body_numbers(differing)}
 
 
 def test_sliders_of_fibers_bear_their_names_whatever_these_are():
@@ -159,6 +159,7 @@ def test_sliders_of_a_design_are_made_once_and_none_of_what_it_leaves_open(trunk
 
 def test_a_parameter_is_shown_in_one_part_and_is_its_value_in_the_unit_that_is_shown(named):
     typed = [one for part in parts(named).values() for one in part_parameters(named, part)]
+    typed += body_numbers(named)
     assert len({one.name for one in typed}) == len(typed)
     for one in [*typed, *named_parameters(named), *slider_parameters(named)]:
         value = find_parameter(named, one.name).value(named)

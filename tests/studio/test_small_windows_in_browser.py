@@ -48,15 +48,6 @@ def test_all_eight_tabs_stand_in_one_line_within_the_window(opened, kind):
     assert spacing == "normal"
 
 
-@pytest.mark.large
-def test_the_arm_is_in_sight_above_the_sheet_of_a_phone(opened):
-    tab = opened("phone")
-    sheet = tab.page.locator("[style*='max-height: 60%']").bounding_box()["y"]
-    places = np.array([tab.screen(point) for point in (np.zeros(3), np.array([0, 0, 1.0]))])
-    assert (places > 0).all()
-    assert (places < (390, sheet)).all()
-
-
 LACKING = """() => {
     const lacking = [];
     const seen = e => e.checkVisibility({visibilityProperty: true, opacityProperty: true});
@@ -101,6 +92,9 @@ FAINT = """() => {
 
 def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
     tab = opened("phone")
+    sheet = tab.page.locator("[style*='max-height: 60%']").bounding_box()["y"]
+    places = np.array([tab.screen(point) for point in (np.zeros(3), np.array([0, 0, 1.0]))])
+    assert ((places > 0) & (places < (390, sheet))).all()  # the arm is in sight above the sheet
     for name in [one.inner_text() for one in tab.page.get_by_role("tab").all()]:
         tab.open(name)
         tab.wait(lambda: not tab.page.evaluate(LACKING), f"controls of {name} are named")

@@ -1,5 +1,7 @@
 """End to end: what a person does in the page, and what the library says about it."""
 
+import socket
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,8 @@ from softreach.studio.start import KeptWork
 from softreach.studio.state import Slice
 from softreach.studio.work import all_cores
 from tests.studio.conftest import SMALL
-from tests.studio.tab import Tab
+from tests.studio.tab import CHEAP, Tab
+from tests.studio.test_hostile_states import design_with, look_with, state_with
 
 
 def test_nothing_leaves_the_machine_and_nothing_of_viser_is_seen(tab, studio):
@@ -118,8 +121,8 @@ def test_a_slider_follows_others_but_is_not_set_back_while_it_is_in_the_hand(tab
 
 
 @pytest.mark.large
-def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path):
-    with Studio(studio.start, work=KeptWork(tmp_path)) as running:
+def test_a_page_with_a_token_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path):
+    with Studio(studio.start, token="secret", work=KeptWork(tmp_path)) as running:
         tab = Tab(browser, running)
         design = changed(tab.session.state.design, {"taper": 0.02})
         tab.session.update(lambda s: s.replace(design=design))
@@ -131,6 +134,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was(browser, studio, tmp_path)
         tab.session = running.sessions[max(running.sessions)]
         reach = tab.reach_of(design)
         tab.page.get_by_text(size_text(reach.size, design)).wait_for()
+        assert tab.errors == []
         tab.close()
 
 
@@ -256,3 +260,66 @@ def test_a_hundred_bundles_show_a_cloud_and_say_what_is_left_out(tab):
     tab.page.get_by_text("60 more bundles have no slider here").wait_for()
     tab.session.cancel()
     tab.settle()
+
+
+# Nothing that came from elsewhere is rendered, and the page talks to its own server alone
+
+STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
+QUOTED = STRIKE.replace('"', '\\"')
+
+
+NAMED = design_with('name = "left"', f'name = "{QUOTED}"')
+RING = design_with(
+    "inner_ratio", f'name = "{QUOTED}"\nmaterial = {{ name = "{QUOTED}" }}\ninner_ratio'
+)
+FILES = {
+    "level.json": look_with(level=STRIKE),
+    "color.json": look_with(level=12, color=STRIKE),
+    "reference.json": state_with(design=RING, reference=NAMED),
+    "kind.toml": design_with('kind = "fiber"', f'kind = "{QUOTED}"'),
+    f"{STRIKE.replace('/', '')}.toml": "=",
+}
+"""One of each kind of place: a value, a choice, the names of parts, a key, the name of the file."""
+
+
+def assert_nothing_struck(page):
+    assert page.locator(".struck").count() == 0
+    assert page.locator("iframe").count() == 0
+    assert page.locator("img[src=x]").count() == 0
+    assert page.title() != "1"
+
+
+def test_no_text_of_a_file_or_its_name_is_markup(tab, tmp_path):
+    """What is taken is on many panels; what is refused, in one message, as the text that it is."""
+    tab.open("Export")
+    taken, session = set(), tab.session
+    for name, text in FILES.items():
+        before, revision, session.note = session.state, session.revision, ""
+        (tmp_path / name).write_text(text)
+        tab.upload("Load state or design", tmp_path / name)
+        tab.wait(lambda r=revision: session.note or session.revision != r, "it is read or refused")
+        tab.settle()
+        tab.page.wait_for_timeout(100)
+        assert_nothing_struck(tab.page)
+        if session.state != before:
+            taken.add(name)
+            for panel in ("Design", "Parts", "Move", "View", "Compare", "Export"):
+                tab.open(panel)
+                assert_nothing_struck(tab.page)
+        if name == "level.json":
+            tab.page.get_by_text(STRIKE).first.wait_for()
+    assert "color.json" in taken
+
+
+@pytest.mark.large
+def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser, studio):
+    with socket.create_server(("127.0.0.1", 0)) as elsewhere:
+        elsewhere.setblocking(False)
+        page = browser.new_page()
+        page.add_init_script(CHEAP)
+        page.goto(f"{studio.url}/?playbackPath=http://127.0.0.1:{elsewhere.getsockname()[1]}/x")
+        page.locator("canvas").first.wait_for()
+        page.wait_for_timeout(2000)  # it would have called by then
+        with pytest.raises(BlockingIOError):
+            elsewhere.accept()
+        page.close()

@@ -138,22 +138,6 @@ def test_a_click_on_a_ghost_takes_that_solution(tab):
     assert scene.pointing @ pointing > 1 - 1e-9
 
 
-def test_a_click_in_the_scene_sends_the_tip_to_the_place_under_it(tab):
-    tab.open("Move")
-    tab.choose("mouse", "sets the target")
-    tab.settle()
-    session, eye = tab.session, tab.session.client.camera.position
-    tips = session.found.reach.cloud.tip.values / session.state.design.length
-    places = ((tip, session.picked_place(eye, tip - eye)) for tip in tips)
-    tip, place = next((tip, place) for tip, place in places if place is not None)
-    tab.page.mouse.click(*tab.screen(tip))
-    tab.wait(lambda: session.state.target is not None, "the click is a target")
-    tab.settle()
-    length = session.state.design.length
-    assert np.linalg.norm(np.subtract(session.state.target, place)) < 0.03 * length
-    np.testing.assert_allclose(length * session.found.tip, session.state.target, atol=1e-4 * length)
-
-
 @pytest.mark.large
 def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(tab):
     tab.open("Move")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import warnings
 import webbrowser
 from pathlib import Path
@@ -64,13 +65,13 @@ def studio(
         return
     refuse("without --static", vary=vary, unit=unit, overwrite=overwrite)
     from softreach.studio import Studio
-    from softreach.studio.serve import is_local, new_token
+    from softreach.studio.serve import is_local
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
     with_token = not is_local(host) if token is None else token
     start, work = begun(source, fresh=fresh)
-    secret = new_token() if with_token else ""
+    secret = secrets.token_urlsafe(18) if with_token else ""
     with Studio(start, host, port, secret, work=work) as running:
         console.line(f"{running.url}  (Ctrl-C ends it)")
         for url in running.urls_for_others:

@@ -44,7 +44,7 @@ _MARKER = 1 / 60  # diameter of the dot of a marker, in L
 _UNSTABLE: Color = (0.45, 0.45, 0.45)
 _SIZES = "", "curve_length", "area", "volume"  # of a reachable set, by its dimension
 _SURFACES: tuple[Color, ...] = (STEEL, (0.88, 0.66, 0.42), (0.62, 0.76, 0.55))
-_HELP = (
+HELP = (
     "Drag to turn, wheel or pinch to zoom, Shift-drag or two fingers to move, "
     "double-click for the first view."
 )
@@ -85,7 +85,7 @@ def plot_3d(
     scene.add(things)
     box = bounding_box(*scene.points())
     said = ". ".join(scene.captions) if caption is None else as_text("caption", caption)
-    words = {"caption": said, "note": ". ".join([*scene.notes, _HELP])}
+    words = {"caption": said, "note": ". ".join([*scene.notes, HELP])}
     page = web_page(scene.parts, box, shown_in, keys=scene.keys, view=view, **words)
     return Figure3D(page, "; ".join(scene.notes))
 

@@ -62,11 +62,10 @@ class Studio(AbstractContextManager["Studio"]):
         self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
         self.server = serve.start_server(host, port, token)
-        arm, camera = start.state.design, start.state.camera
+        arm, camera, eye = start.state.design, start.state.camera, self.server.initial_camera
         look_at = arm.base.to_world(arm.length * _LOOK_AT) / arm.length
-        away = look_at + VIEWS["oblique"]
-        self.server.initial_camera.position = camera.position if camera else away
-        self.server.initial_camera.look_at = camera.look_at if camera else look_at
+        eye.look_at = camera.look_at if camera else look_at
+        eye.position = camera.position if camera else look_at + VIEWS["oblique"]
         self.server.on_client_connect(self._connected)
         self.server.on_client_disconnect(self._disconnected)
 
@@ -97,20 +96,20 @@ class Studio(AbstractContextManager["Studio"]):
 
     def _connected(self, client: ClientHandle) -> None:
         self._libraries.join()
-        watch, left = self._compilation, self.work and self.work.latest
-        session = Session(client, self.start, JOBS, work=self.work, left=left, compilation=watch)
+        session = Session(client, self.start, JOBS, work=self.work, compilation=self._compilation)
+        goes_on = session.is_touched
         with self._lock:
             self.sessions[client.client_id] = session
         furnish(session)
         client.camera.on_update(lambda _: session.follow("camera"))
         session.begin()
-        if (camera := (left or self.start.state).camera) is not None:
+        if (camera := session.state.camera) is not None:
             session.look_as(camera)
         elif session.camera.aspect < UPRIGHT:
             session.look_from("oblique")
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
-        elif left is not None:
+        elif goes_on:
             session.say(_GOES_ON)
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)

@@ -13,7 +13,7 @@ from operator import attrgetter, is_
 from typing import Any, NamedTuple
 
 from softreach.studio.found import Found, in_session
-from softreach.studio.markup import Part
+from softreach.studio.markup import Part, paragraph
 from softreach.studio.session import Session
 from softreach.studio.state import LARGEST, StudioState
 from softreach.studio.widgets import Ends, Line, Slider, TextKind, TypedField, number_kind, unit_in
@@ -103,14 +103,13 @@ class Fields:
 
     def text(self, *paths: str, content: Callable[[StudioState, Found], Sequence[Part]]) -> Line:
         """A line of text that follows; without parts it takes no room."""
-        line = self.kept(Line(self.gui))
-        self.follow(*paths, show=lambda state, found: line.say(*content(state, found)))
-        return line
+        return self.html(*paths, content=lambda *known: paragraph(*content(*known)))
 
-    def html(self, *paths: str, content: Callable[[StudioState, Found], str]) -> None:
+    def html(self, *paths: str, content: Callable[[StudioState, Found], str]) -> Line:
         """Something of `markup` that follows."""
         line = self.kept(Line(self.gui))
-        self.follow(*paths, show=lambda state, found: line.show(content(state, found)))
+        self.follow(*paths, show=lambda *known: line.show(content(*known)))
+        return line
 
     @contextmanager
     def folder(self, label: str, shown: Where = "", *, expanded: bool = True) -> Iterator[Any]:

@@ -57,18 +57,24 @@ def _axes(height: float) -> Axes:
     return Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained").subplots()
 
 
-def _pixels(ax: Axes) -> NDArray[np.uint8]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+def inked(figure: Figure, color: str) -> None:
+    """Write all words of a figure in a color, and those of legends without a frame."""
     from matplotlib.legend import Legend
     from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set_color(color)
+    for legend in figure.findobj(Legend):
+        legend.set_frame_on(False)
+
+
+def _pixels(ax: Axes) -> NDArray[np.uint8]:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure = cast("Figure", ax.figure)
     ax.tick_params(which="both", colors=_INK)
     ax.spines[:].set_edgecolor(_INK)
-    for text in figure.findobj(Text):
-        text.set_color(_INK)
-    for legend in figure.findobj(Legend):
-        legend.set_frame_on(False)
+    inked(figure, _INK)
     for paper in (figure.patch, ax.patch):
         paper.set_alpha(0.0)
     canvas = FigureCanvasAgg(figure)

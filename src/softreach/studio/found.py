@@ -60,9 +60,9 @@ class Found:
         """True while a drag of the tip is under way."""
         return self.pull is not None and not self.pull.rests
 
-    def complete_reach(self, design: Manipulator) -> Reach | None:
-        """Reach of a design, once it is fine."""
-        reach = self.reach
+    def complete_reach(self, design: Manipulator | None, name: str = "reach") -> Reach | None:
+        """One of the reaches, where it is the fine one of a design."""
+        reach = getattr(self, name)
         return reach if reach is not None and reach.fine and reach.arm == design else None
 
 

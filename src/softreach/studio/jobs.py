@@ -140,11 +140,9 @@ def _count(given: Given, reach: Reach) -> None:
 
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
     reach, look = given.found.reach, given.state.appearance
-    if reach is None:
-        given.scene.remove(*_CLOUD.split())
-        return None
     key = given.scene.draw_cloud(reach, look)
-    return {"key": key} if shows_cloud(reach, look) or not look.surface else None
+    has_key = reach is not None and (shows_cloud(reach, look) or not look.surface)
+    return {"key": key} if has_key else None
 
 
 def _color_surface(given: Given) -> Results:
@@ -227,9 +225,8 @@ def _look(given: Given) -> None:
 
 def _compute_beside(given: Given, name: str) -> Results:
     """The reach of the design that is kept, or of the present one without its loads."""
-    design, known = getattr(given.state, name), getattr(given.found, name)
-    is_known = known is not None and known.fine and known.arm == design
-    present = known if is_known else given.found.complete_reach(design)
+    design, found = getattr(given.state, name), given.found
+    present = found.complete_reach(design, name) or found.complete_reach(design)
     if design is None or present is not None:
         yield Learned({name: present})
         return
@@ -248,36 +245,26 @@ def _draw_axes(given: Given) -> None:
         given.scene.draw_axes(given.found.reach, given.found.free)
 
 
+def _draw_theme(given: Given) -> None:
+    theme(given.client.gui, dark=given.state.appearance.dark)
+
+
 def _beside(name: str) -> Job:
     compute, draw = partial(_compute_beside, name=name), partial(_draw_beside, name=name)
     return Job(name, f"{name} appearance.slice", compute, draw, wanted=name)
 
 
-_CLOUD = "/cloud /unstable"
+_CLOUD: Any = {"draw": _draw_cloud, "draws": "/cloud /unstable", "at_once": False}
 _LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color"
+_PLANE = "appearance.slice.axis appearance.slice.center"
+_EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
-    Job(
-        "reach",
-        f"{DESIGN} appearance.level",
-        _compute_reach,
-        _draw_cloud,
-        makes="key slopes",
-        draws=_CLOUD,
-        at_once=False,
-    ),
+    Job("reach", f"{DESIGN} appearance.level", _compute_reach, makes="key slopes", **_CLOUD),
     # Ends of the sliders, and slopes of the volume by them, once nobody drags
     Job("slopes", "design found.reach", _differentiate),
-    Job(
-        "cloud",
-        f"appearance.level {_LOOKS}",
-        _color_cloud,
-        _draw_cloud,
-        draws=_CLOUD,
-        at_once=False,
-        doing="coloring the points",
-    ),
+    Job("cloud", f"appearance.level {_LOOKS}", _color_cloud, doing="coloring points", **_CLOUD),
     # The exact boundary
     Job(
         "surface",
@@ -287,26 +274,14 @@ SCENE_JOBS = (
         wanted="appearance.surface",
         at_once=False,
     ),
-    Job(
-        "section",
-        "found.reach appearance.slice.axis appearance.slice.center",
-        _cut,
-        wanted="appearance.section",
-    ),
+    Job("section", f"found.reach {_PLANE}", _cut, wanted="appearance.section"),
     Job("sweep", f"{DESIGN} appearance.swept", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
     # The box with numbers, in a job of its own: of two that drew it, one might know an old unit
     Job("axes", "found.reach found.free", draw=_draw_axes),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera
-    Job(
-        "camera",
-        "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged",
-        _wait,
-        _look,
-    ),
-    Job(
-        "theme", "appearance.dark", draw=lambda g: theme(g.client.gui, dark=g.state.appearance.dark)
-    ),
+    Job("camera", _EYE, _wait, _look),
+    Job("theme", "appearance.dark", draw=_draw_theme),
     _beside("free"),
     _beside("reference"),
 )

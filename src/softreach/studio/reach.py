@@ -34,7 +34,6 @@ _INSIDE = 2e-3  # depth behind a boundary at which activations are counted [L]
 _LEVEL, _NEIGHBORS = 15, 8  # of 2^15 samples the nearest tell what is not known of a surface
 _PILOT = 512  # samples, by which the cost of one is measured
 _LOWEST = 10  # level below which a cloud shows no shape
-_COPIES = 4  # of a cloud that exist at a time: while it is drawn, colored or written
 _BLOCK = 1 << 13  # targets solved at a time: a tenth of a second, after which others have a turn
 
 
@@ -208,19 +207,15 @@ class _Work:
     report: Report
 
     def sampled(self, known: Reach | None, at: int) -> Reach:
-        """A cloud of 2^at points, or of as many as memory holds, with what is known besides."""
-        budget = self._budget(f"computing the cloud of {1 << at:,} points", 1 << at)
-        count = 1 << level_in_memory(self.arm.inputs, budget.memory, at)
-        notes = ()
-        if count < 1 << at:
-            notes = (f"{count:,} of {1 << at:,} samples: more do not fit into the free memory",)
-        elif at < self.level and known is not None:
-            notes = (f"fewer samples than asked: {1 << self.level:,} would take too long",)
+        """A cloud of 2^at points, with what is known besides."""
+        count, wanted, fine = 1 << at, 1 << self.level, known is not None
+        budget = self._budget(f"computing the cloud of {count:,} points", count)
         tol = self.quality.tol
         cloud = compute_cloud(self.arm, count, sampler="sobol", tol=tol, progress=budget)
         reach = known or Reach(arm=self.arm, cloud=cloud, exact=None, fine=False)
-        fine = known is not None
-        return replace(reach, cloud=cloud, fine=fine, notes=notes, wanted=1 << self.level)
+        few = (f"fewer samples than asked: {wanted:,} would take too long",)
+        notes = few if fine and count < wanted else ()
+        return replace(reach, cloud=cloud, fine=fine, notes=notes, wanted=wanted)
 
     def measured(self, reach: Reach, accuracy: float) -> Reach:
         """With its exact set, or the reason why there is none, or none as accurate as wanted."""
@@ -266,15 +261,7 @@ def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> 
 
 def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
     """The level of the largest cloud, at most wanted, that one core computes in time [s]."""
-    return _level(max(seconds, 1e-9) / _seconds_each(rod), wanted)
-
-
-def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
-    """The level of the largest cloud, at most wanted, that memory [bytes] holds with its copies."""
-    return _level(max(memory, 1.0) / (8.0 * (bundles + 3) * _COPIES), wanted)
-
-
-def _level(samples: float, wanted: int) -> int:
+    samples = max(seconds, 1e-9) / _seconds_each(rod)
     return min(wanted, max(_LOWEST, math.floor(math.log2(samples))))
 
 

@@ -11,7 +11,6 @@ import gzip
 import hmac
 import io
 import re
-import secrets
 import socket
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
@@ -35,6 +34,7 @@ _COOKIE = "softreach_token"
 _NO_TOKEN = "The address lacks the token that softreach printed with it.\n"
 _FOREIGN = "This page is for its own server alone.\n"
 _ELSEWHERE = "This address names another server, to which the page may not connect.\n"
+_SOCKET = re.compile(r"wss?://([^/?#]*)")
 _PLAIN_HOST = re.compile(r"[A-Za-z0-9.\-]+(:\d+)?|\[[0-9A-Fa-f:.]+\](:\d+)?")
 _CLOSED = "media-src", "frame-src", "object-src", "base-uri", "form-action", "frame-ancestors"
 _POLICY = {
@@ -90,11 +90,6 @@ def stop_server(server: ViserServer) -> None:
 # Requests that are answered, and headers of the answers.
 
 
-def new_token() -> str:
-    """A token that nobody guesses."""
-    return secrets.token_urlsafe(18)
-
-
 def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:
     """Reason why a server that listens on a host refuses a request; "" for one that is welcome.
 
@@ -112,15 +107,8 @@ def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str
     is_rebound = host in LOCAL and page.hostname not in LOCAL
     if is_rebound or (origin is not None and urlsplit(origin).netloc != page.netloc):
         return _FOREIGN
-    return "" if all(_place(each) == own for each in query.get("websocket", [])) else _ELSEWHERE
-
-
-def _place(address: str) -> str:
-    """Name and port in an address; "" if it is none."""
-    try:
-        return urlsplit(address).netloc
-    except ValueError:
-        return ""
+    sockets = [_SOCKET.match(each) for each in query.get("websocket", [])]
+    return "" if all(each and each[1] == own for each in sockets) else _ELSEWHERE
 
 
 def page_headers(host: str) -> dict[str, str]:

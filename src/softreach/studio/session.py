@@ -45,15 +45,15 @@ class Session:
         jobs: Iterable[Job] = (),
         *,
         work: KeptWork | None = None,
-        left: StudioState | None = None,
         compilation: CompilationWatch | None = None,
     ) -> None:
-        """Begin where a tab left off, or at the start; the state is kept in `work`."""
+        """Begin where `work` ended, in which the state is kept, or at the start."""
         self.client, self.quality = client, start.quality
         self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
         self.lock = threading.RLock()  # held while the state changes, and while that is shown
         self.history = History()
+        left = work and work.latest
         self.is_touched = left is not None  # true once there is anything to keep
         self.state = left or start.state
         same = self.state.design == start.state.design

@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
-from softreach.studio.widgets import Ends, unit_in
+from softreach.studio.widgets import Ends
 from softreach.studio.work import StaleCheck
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.units import METER, LengthUnit
@@ -50,15 +50,16 @@ _MORE = {
     "lower": "; the most that a bundle contracts",
     "upper": "; the most that a bundle extends",
 }
-_NAMES = {"E": "modulus", "max τ": "largest tension", "max P": "largest pressure"}
-"""Words of symbols on sliders."""
+_WORDS = {"L": "length", "R0/R2": "bore / outer radius", "E": "modulus", "ρ": "density"}
+_WORDS |= {"ν": "Poisson's ratio", "min τ": "least tension", "max τ": "largest tension"}
+_WORDS |= {"min P": "least pressure", "max P": "largest pressure"}
 _HALVINGS = 14
 
 
 class ShownParameter(NamedTuple):
     """A parameter of a design in the unit that a person reads."""
 
-    name: str  # of the parameter
+    name: str
     label: str  # with the unit
     hint: str  # symbol, unit and meaning
     scale: float  # units of the parameter per shown unit
@@ -161,10 +162,15 @@ def _around_value(arm: Manipulator, parameter: Parameter) -> _Slider | None:
         return None
     step = max(1.0, size // 200) if parameter.whole else size / 200
     low, high = low + step * allowed.open_low, high - step * allowed.open_high
-    name, label = _NAMES.get(parameter.symbol, parameter.symbol), owner_label(parameter.owner)
+    name, label = _word(parameter), owner_label(parameter.owner)
     rings = {f"ring {k}": ring.name for k, ring in enumerate(arm.section.rings)}
-    title = _titled(f"{name} of {rings.get(label) or label}" if label else name, unit)
-    return title, max(ends[0], low), min(ends[1], high), step
+    title = f"{name} of {rings.get(label) or label}" if label else name
+    return _titled(title, unit), max(ends[0], low), min(ends[1], high), step
+
+
+def _word(parameter: Parameter) -> str:
+    symbol, bracket, element = parameter.symbol.partition("[")
+    return f"{_WORDS.get(symbol, symbol)}{bracket}{element}"
 
 
 def owner_label(path: str) -> str:
@@ -269,29 +275,21 @@ class Part(NamedTuple):
 
 
 _BODY = Part("body", ("", "profile"), "")
-_BODY_LABELS = {
-    "length": "length",
-    "radius_ratio": "inner / outer radius",
-    "bore_ratio": "bore / outer radius",
-    "poisson_ratio": "Poisson's ratio \N{GREEK SMALL LETTER NU}",
-}
 
 
 def body_numbers(arm: Manipulator) -> list[ShownParameter]:
-    """The parameters of the body that have no slider, in the words of those that have one."""
+    """The parameters of the body that have no slider."""
     slid = {slider.name for slider in slider_parameters(arm)}
-    rest = [number for number in part_parameters(arm, _BODY) if number.name not in slid]
-    titled = lambda one: one._replace(label=_titled(_BODY_LABELS[one.name], unit_in(one.label)))
-    return [titled(each) if each.name in _BODY_LABELS else each for each in rest]
+    return [each for each in part_parameters(arm, _BODY) if each.name not in slid]
 
 
 def parts(arm: Manipulator) -> dict[str, Part]:
-    """Body, core, rings and actuators of an arm by their labels."""
-    listed = [_BODY, *([Part("core", ("core",), "")] if arm.section.core is not None else [])]
+    """Core, rings and actuators of an arm by their labels."""
+    listed = [Part("core", ("core",), "")] if arm.section.core is not None else []
     for k, ring in enumerate(arm.section.rings):
         owners = (f"rings[{k}]", f"rings[{k}].material")
         listed.append(Part(edits.ring_label(arm, k), owners, ring.name, ring=k))
-    labels = {part.label for part in listed}
+    labels = {"body", *(part.label for part in listed)}
     for each in arm.actuators:
         home = each.ring if isinstance(each, SectorActuator) else None
         label = f"{each.name} (actuator)" if each.name in labels else each.name
@@ -303,7 +301,7 @@ def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
     """The parameters of a part in the units in which they are typed."""
     unit = typed_unit(arm)
     return tuple(
-        _shown(arm, each, each.symbol, f"{each.meaning}: {each.name}", unit)
+        _shown(arm, each, _word(each), f"{each.meaning}: {each.name}", unit)
         for each in known_parameters(arm).values()
         if each.owner in part.owners and (each.owner or not math.isnan(each.value(arm)))
     )
@@ -344,7 +342,7 @@ def refusal(error: SoftreachError, shown: Iterable[ShownParameter], arm: Manipul
         return str(error)
     known = {
         parameter.name: parameter._replace(label=f"{parameter.label} of {part.label}")
-        for part in parts(arm).values()
+        for part in (_BODY, *parts(arm).values())
         for parameter in part_parameters(arm, part)
     }
     known |= {parameter.name: parameter for parameter in shown}

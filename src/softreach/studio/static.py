@@ -22,7 +22,7 @@ from softreach.atlas.space import DesignSpace
 from softreach.picture.page import packed, script_text, web_page
 from softreach.plot.axes import bounding_box
 from softreach.plot.coloring import ScalarKey
-from softreach.plot.figure_3d import Detail, Scene, page_keys
+from softreach.plot.figure_3d import HELP, Detail, Scene, page_keys
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.errors import (
@@ -44,6 +44,7 @@ Entry = dict[str, Any]
 _MOST = 1000  # designs, which are some 150 MB
 _DETAIL = Detail(triangles=13_000, sides=24, stations=41)
 _FOLDER = "designs"
+_HELP = f"{HELP} The address of this page names the design."
 _NUMBERS = {
     3: {"volume": 3, "unreachability": 0, "convex_volume": 3},
     2: {"area": 2, "convex_volume": 3},
@@ -132,7 +133,7 @@ def _content(arm: Manipulator, unit: LengthUnit) -> Entry:
         "numbers": numbers,
         "box": box.tolist(),
         "keys": [key._asdict() for key in scene.keys],
-        "note": ". ".join(notes),
+        "note": ". ".join([*notes, _HELP]),
         "parts": [packed(part, box) for part in scene.parts],
     }
 
@@ -161,6 +162,7 @@ def _page(
         "first": first,
         "keys": content["keys"],
         "note": content["note"],
+        "help": _HELP,
         "colors": scale._asdict()["colors"],
         "name": title,
     }

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice, repeat
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
@@ -122,8 +123,8 @@ def gradient_of(
         if solid.route == "flux" or tip_map.supports_unstable:
             tip_map = refined(tip_map, flux_tol(tip_map))
         tips = TipDerivatives(tip_map, wanted, _TOL, progress)
-        volume = _searched(solid, tips) if searched else _flowing(solid, tips, accuracy)
-        convex = _dragged(solid, tips)
+        of_volume = _searched(solid) if searched else _flowing(solid, accuracy)
+        volume, convex = _told(tips, of_volume, _dragged(solid))
         progress(len(names))
     return VolumeGradient(
         solid=solid,
@@ -198,18 +199,24 @@ _Swept = tuple[Array, Array]
 """Derivatives by all parameters, and their errors, shape (parameters,) each."""
 
 
-def _searched(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
+def _searched(solid: ReachableSet) -> _Part:
+    """Derivatives of the volume of more than three bundles: of all that the boundary sweeps."""
     assert isinstance(solid.image, ReachedCells)
-    if not solid.image.is_thick:
-        wrap, coarse = _sums((solid.image.wrap, solid.image.coarse), tips)
+
+    def of_wraps(wrap: _Sum, coarse: _Sum) -> _Swept:
         return wrap.value, wrap.error + _CHANGES * np.abs(wrap.value - coarse.value)
-    (swept,) = _sums((boundary_samples(solid.image),), tips)
-    # What no search meets is at rims of either sign.
-    missing = _MISSING * solid.volume_error / solid.volume * swept.size
-    return swept.value, swept.error + missing
+
+    def of_lines(swept: _Sum) -> _Swept:
+        # What no search meets is at rims of either sign.
+        missing = _MISSING * solid.volume_error / solid.volume * swept.size
+        return swept.value, swept.error + missing
+
+    if solid.image.is_thick:
+        return [boundary_samples(solid.image)], of_lines
+    return [solid.image.wrap, solid.image.coarse], of_wraps
 
 
-def _flowing(solid: ReachableSet, tips: TipDerivatives, accuracy: float) -> _Swept:
+def _flowing(solid: ReachableSet, accuracy: float) -> _Part:
     """Derivatives of the volume of three: of the flux, and of what lines of sight add to it."""
     enough = 0.0 if solid.route == "flux" else FLUX_PART * accuracy
     flux = signed_volume(solid.tip_map, enough=enough)
@@ -218,32 +225,40 @@ def _flowing(solid: ReachableSet, tips: TipDerivatives, accuracy: float) -> _Swe
         assert isinstance(solid.image, Image)
         images = solid.image.with_more_lines(_LINES), solid.image.coarse
         nodes += [boundary_samples(image, sense) for image in images]
-    whole, *seen = _sums(nodes, tips)
-    value, error = sense * whole.value, whole.error + flux.error / abs(flux.value) * whole.size
-    if not seen:
-        return value, error
-    fine, coarse = seen
-    removed = (fine.value - coarse.value) / 3.0
-    return value + fine.value + removed, error + fine.error + np.abs(removed)
+
+    def told(whole: _Sum, *seen: _Sum) -> _Swept:
+        value, error = sense * whole.value, whole.error + flux.error / abs(flux.value) * whole.size
+        if not seen:
+            return value, error
+        fine, coarse = seen
+        removed = (fine.value - coarse.value) / 3.0
+        return value + fine.value + removed, error + fine.error + np.abs(removed)
+
+    return nodes, told
 
 
-def _dragged(solid: ReachableSet, tips: TipDerivatives) -> _Swept:
+def _dragged(solid: ReachableSet) -> _Part:
     """Derivatives of the convex volume, by what the corners drag along, for infinitely fine grids.
 
     Corners jump from vertex to vertex: the largest part removed of the derivative by any parameter
     may be wrong of each, and so may the part that hulls of corners lack of the convex volume.
     """
     corners = _hull_corners(solid)
-    fine, coarse = _sums(corners, tips)
-    removed = (fine.value - coarse.value) / 3.0
     hull, rough = (each.volume for each in corners)
     missing = abs(hull + (hull - rough) / 3.0 - solid.convex_volume) / hull
-    share = np.max(np.abs(removed) / np.maximum(fine.size, np.finfo(float).tiny))
-    error = fine.error + np.abs(removed) + (share + missing) * fine.size
-    return fine.value + removed, error
+
+    def told(fine: _Sum, coarse: _Sum) -> _Swept:
+        removed = (fine.value - coarse.value) / 3.0
+        share = np.max(np.abs(removed) / np.maximum(fine.size, np.finfo(float).tiny))
+        error = fine.error + np.abs(removed) + (share + missing) * fine.size
+        return fine.value + removed, error
+
+    return corners, told
 
 
 _Nodes: TypeAlias = "BoundarySamples | HullCorners | Flux | Wrap"
+_Part: TypeAlias = "tuple[Sequence[_Nodes], Callable[..., _Swept]]"
+"""Sets of nodes, and what the sums over each come to."""
 
 
 class _Sum(NamedTuple):
@@ -254,11 +269,13 @@ class _Sum(NamedTuple):
     error: Array  # by ∂r/∂p, and by where lines of sight lie
 
 
-def _sums(several: Sequence[_Nodes], tips: TipDerivatives) -> list[_Sum]:
-    """Sums over each of several sets of nodes, whose tips are found together."""
+def _told(tips: TipDerivatives, *parts: _Part) -> list[_Swept]:
+    """What the sums of each part come to; the tips of all their nodes are found together."""
+    several = [nodes for own, _ in parts for nodes in own]
     ends = np.cumsum([len(nodes.cube) for nodes in several])[:-1]
     slopes = np.split(tips.at(np.concatenate([nodes.cube for nodes in several])), ends)
-    return [_sum(nodes, own, tips.error) for nodes, own in zip(several, slopes, strict=True)]
+    sums = map(_sum, several, slopes, repeat(tips.error))
+    return [told(*islice(sums, len(own))) for own, told in parts]
 
 
 def _sum(nodes: _Nodes, slopes: Array, each: Array) -> _Sum:

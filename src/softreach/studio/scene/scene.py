@@ -107,10 +107,6 @@ class Scene:
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
 
-    def ball(self, path: str, radius: float, color: Color, place: Array) -> None:
-        """A ball at a place, with a radius [L]."""
-        self.api.add_icosphere(path, radius, color, position=place)
-
     def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
@@ -140,9 +136,9 @@ class Scene:
             self.dots(path, points[kept], colors[kept] if colors.ndim == 2 else colors, *look)
             self._clouds[path] = kept, (points, colors, *look)
 
-    def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
+    def draw_cloud(self, reach: Reach | None, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
-        if not shows_cloud(reach, look):
+        if reach is None or not shows_cloud(reach, look):
             self.remove("/cloud", "/unstable")
             return None
         points = cloud_points(reach, look.level)

@@ -39,12 +39,11 @@ def compare(panel: Fields) -> None:
 
 
 def _compared(state: StudioState, found: Found) -> str:
-    design, reference, before = state.design, state.reference, found.reference
-    if reference is None:
+    now, kept = state.design, state.reference
+    if kept is None:
         return markup.paragraph(_HINT)
-    is_known = before is not None and before.fine and before.arm == reference
-    kept = reference, before if is_known else None
-    return comparison_html(kept, (design, found.complete_reach(design)))
+    reaches = found.complete_reach(kept, "reference"), found.complete_reach(now)
+    return comparison_html((kept, reaches[0]), (now, reaches[1]))
 
 
 class Row(NamedTuple):
@@ -104,11 +103,9 @@ def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
     """Volume, area or length, whatever each has, in the unit of the present design, and UNR."""
     reaches, arm, rows = (kept[1], now[1]), now[0], list[Row]()
     sizes = [reach.size if reach else None for reach in reaches]
-    for name in dict.fromkeys(size.name for size in sizes if size) or ("volume",):
+    for name, latest in {size.name: size for size in sizes if size}.items():
         same = [size if size and size.name == name else None for size in sizes]
-        latest = same[1] or same[0]
-        power = latest.power if latest else 3
-        unit = size_unit(latest, arm) if latest else arm.length_unit
+        unit, power = size_unit(latest, arm), latest.power
         scale, title = (unit.scale(power), unit.label(name, power)) if power else (1.0, name)
         before, after = (size and size.value / scale for size in same)
         first, second = (size and told_error(size, arm) / scale for size in same)

@@ -40,17 +40,14 @@ _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
 _AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
 _NEW_RING = "ring"
-_ABOUT_MADE_OF = (
-    "Material of all rings: tendons and chambers need its Young's modulus E, "
-    "which some arms leave open"
-)
+_ABOUT_MADE_OF = "Material of all rings: tendons and chambers need its modulus, often left open"
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
-_ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
+_ABOUT_MATERIAL = "Sets modulus, Poisson's ratio and density to those of a known material"
 _WAYS = {name: name for name in POINTS} | {"up": "up (upright)", "down": "down (hanging)"}
 _WAYS[""] = "as the file says"
 _NONE = Loads(gravity=GRAVITIES["none"])
 _MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
-_SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
+_NEEDED = {"young_modulus": "the modulus", "density": "the density"}
 _LEVER = "From the tip to the center of the payload's mass, as x, y, z in the tip's directors"
 _LOADS = {
     "gravity": ("g", "m/s²", 1.0, "g: acceleration of gravity as x, y, z in the world, z up"),
@@ -151,7 +148,7 @@ def arm_parts(panel: Fields) -> None:
             grown = edits.with_ring if is_ring else lambda arm: edits.with_actuator(arm, kind.value)
             panel.apply(lambda state: state.replace(design=grown(made(state.design))))
             if session.state.design != before:
-                known = _listed(session.state.design).values()
+                known = parts(session.state.design).values()
                 like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
                 session.learn({"part": like[-1]})
                 made_of.value = _AS_IT_IS
@@ -171,13 +168,9 @@ def arm_parts(panel: Fields) -> None:
     panel.message, panel.words = message, words
 
 
-def _listed(arm: Manipulator) -> dict[str, Part]:
-    return {label: part for label, part in parts(arm).items() if label != "body"}
-
-
 def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, object]:
     """The parts by their labels, the label of the chosen one, and names of its numbers."""
-    known = _listed(state.design)
+    known = parts(state.design)
     label = [*known][min(found.part, len(known) - 1)]
     return known, label, [each.name for each in part_parameters(state.design, known[label])]
 
@@ -331,9 +324,9 @@ def _in_words(error: InvalidDesign) -> InvalidDesign:
     lacking: dict[str, list[str]] = {}
     for fault in error.faults:
         owner, _, field = fault.path.rpartition(".")
-        if field not in _SYMBOLS:
+        if field not in _NEEDED:
             return in_file_terms(error, "")
-        lacking.setdefault(owner_label(owner), []).append(_SYMBOLS[field])
+        lacking.setdefault(owner_label(owner), []).append(_NEEDED[field])
     needed = "; ".join(f"{' and '.join(what)} of {owner}" for owner, what in lacking.items())
     line = f"need {needed}: choose a material or type the numbers on the tab Parts"
     return InvalidDesign([Fault("loads", None, line)])

@@ -17,6 +17,7 @@ from softreach.plot.coloring import draw_figure_key
 from softreach.rod.kinematics import configuration
 from softreach.studio.captions import legend_text, picture_text, reach_text
 from softreach.studio.fields import GRAY, Fields, file_text
+from softreach.studio.figures import inked
 from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
@@ -92,10 +93,6 @@ def _reach(session: Session) -> Reach:
     return reach
 
 
-def _write_design(session: Session, path: Path) -> None:
-    path.write_text(session.state.design.file_text, encoding="utf-8")
-
-
 def _write_cloud(session: Session, path: Path) -> None:
     export_cloud(_reach(session).cloud, path, unit=session.state.design.length_unit)
 
@@ -110,14 +107,11 @@ def _write_surface(session: Session, path: Path) -> None:
 
 
 def _write_arm(session: Session, path: Path) -> None:
-    arm, shape = session.state.design, _shape(session.state)
+    arm = session.state.design
+    shape = configuration(arm, session.state.activation)
     if not np.isfinite(shape.position.values).all():
         raise InvalidInput("activation", session.state.activation, "one with an equilibrium")
     export_arm(arm, shape, path, unit=arm.length_unit)
-
-
-def _shape(state: StudioState) -> xr.Dataset:
-    return configuration(state.design, state.activation)
 
 
 def _write_views(session: Session, path: Path) -> None:
@@ -125,8 +119,9 @@ def _write_views(session: Session, path: Path) -> None:
     from softreach import plot
     from softreach.plot.style import pyplot
 
-    cloud, color = _shown(session)
-    figure = plot.plot_views(cloud, session.state.design, _shape(session.state), color=color)
+    arm, (cloud, color) = session.state.design, _shown(session)
+    shape = configuration(arm, session.state.activation)
+    figure = plot.plot_views(cloud, arm, shape, color=color)
     plot.save_figure(figure, path)
     pyplot().close(figure)
 
@@ -137,7 +132,7 @@ def _write_page(session: Session, path: Path) -> None:
 
     reach, state, (cloud, color) = _reach(session), session.state, _shown(session)
     is_surface = reach.has_surface and state.appearance.surface and not state.appearance.cloud
-    shown = [reach.exact if is_surface else cloud, _shape(state)]
+    shown = [reach.exact if is_surface else cloud, configuration(state.design, state.activation)]
     unit, caption = state.design.length_unit.name, ". ".join(_caption(state, reach))
     page = plot.plot_3d(shown, color=color, unit=unit, caption=caption)
     path.write_text(page.html, encoding="utf-8")
@@ -156,7 +151,6 @@ def _shown(session: Session) -> tuple[xr.Dataset, str | int | xr.DataArray]:
 def _write_picture(session: Session, path: Path) -> None:
     """The scene as it is seen, with its key above, numbers and design below."""
     from matplotlib.figure import Figure
-    from matplotlib.text import Text
 
     state, reach, key = session.state, _reach(session), session.found.key
     scene = session.camera.picture()
@@ -175,10 +169,7 @@ def _write_picture(session: Session, path: Path) -> None:
     draw_figure_key(figure, key, above / _DPI)
     spacing, corner = _LINE / 8.5 * 72 / _DPI / 1.2, (_EDGE / width, _EDGE / total)
     figure.text(*corner, "\n".join(lines), fontsize=8.5, va="bottom", linespacing=spacing)
-    for text in figure.findobj(Text):
-        text.set_color(ink)
-    for legend in figure.legends:
-        legend.set_frame_on(False)
+    inked(figure, ink)
     figure.savefig(path, facecolor=paper)
 
 
@@ -196,7 +187,7 @@ def _caption(state: StudioState, reach: Reach) -> list[str]:
 
 
 _WRITERS: Mapping[str, tuple[Mapping[str, object], Write]] = {
-    "design": ({".toml": None}, _write_design),
+    "design": ({".toml": None}, lambda session, path: session.state.design.save(path)),
     "cloud": (CLOUD_FILES, _write_cloud),
     "exact surface": (SURFACE_FILES, _write_surface),
     "arm": (SURFACE_FILES, _write_arm),

@@ -74,9 +74,7 @@ def needs(panel: Fields) -> None:
             field.value = ""
 
         panel.button("Add to the needs", add, about)
-        panel.html("design", "found.check", content=lambda state, found: verdict(found, state))
-        refused = lambda _, found: markup.alert(found.check_refusal) if found.check_refusal else ""
-        panel.html("found.check_refusal", content=refused)
+        panel.html("design", "found.check", "found.check_refusal", content=verdict)
         one = "One of the needs, or all of them"
         part: Any = gui.add_dropdown("remove", (_ALL,), hint=one, visible=False)
         parts = lambda: needs_parts(requirements_of(session.state.needs), unit())
@@ -97,10 +95,10 @@ def needs(panel: Fields) -> None:
         panel.button("Save needs (TOML)", save, about, "needs", **GRAY)
 
 
-def verdict(found: Found, state: StudioState) -> str:
-    """What is met and what is missed, as HTML."""
+def verdict(state: StudioState, found: Found) -> str:
+    """What is met and what is missed, or why that is not known, as HTML."""
     if (check := found.check) is None:
-        return ""
+        return markup.alert(found.check_refusal) if found.check_refusal else ""
     lines: list[tuple[Part, ...]] = []
     for finding in check.findings:
         sign, mark = _SIGNS[finding.verdict], Swatch(VERDICTS[finding.verdict])
@@ -265,7 +263,8 @@ def measured(panel: Fields) -> None:
             panel.html("found.bench", content=_summary)
             about = "Makes the calibrated arm the design; can be undone"
             fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
-            panel.button("Apply", lambda: _apply(session), about, fitted)
+            apply = lambda state: state.replace(design=fitted(state, session.found) or state.design)
+            panel.change("Apply", apply, about, fitted)
 
 
 def _is_free(name: str) -> Attribute:
@@ -295,14 +294,6 @@ def _pose(session: Session, bench: Bench) -> None:
         raise InvalidInput("design", "another one", allowed, "load the data again")
     session.update(bench.posed, goes_on=True)
     session.learn({"bench": bench})
-
-
-def _apply(session: Session) -> None:
-    bench = session.found.bench
-    arm = bench.fitted(session.state.design) if bench is not None else None
-    if arm is None:
-        raise InvalidInput("design", "changed since the fit", "the one that was fitted")
-    session.update(lambda state: state.replace(design=arm))
 
 
 def _bench_text(_: StudioState, found: Found) -> list[str]:

@@ -288,10 +288,10 @@ def _draw_answer(given: Given) -> None:
     if answer is None:
         return
     target, nearest = answer.target / design.length, answer.nearest / design.length
-    scene.ball("/target", _TARGET, MARK, target)
+    scene.api.add_icosphere("/target", _TARGET, MARK, position=target)
     if not len(answer):
         scene.lines("/gap", pieces(np.stack([target, nearest])), MARK, 0.004)
-        scene.ball("/gap/nearest", _NEAREST, DARK, nearest)
+        scene.api.add_icosphere("/gap/nearest", _NEAREST, DARK, position=nearest)
     shapes = answer.activations if len(answer) else answer.nearest_activation[None]
     for k, activation in enumerate(shapes):
         scene.draw_arm(design, activation.tolist(), f"/ghosts/{k}")
@@ -348,7 +348,7 @@ def _draw_path(given: Given) -> None:
     if track is not None and 0 < len(done) < len(points):
         end = track.end_position.values
         done = np.concatenate([done, end[None]])
-        scene.ball("/path/end", _END, DARK, end / length)
+        scene.api.add_icosphere("/path/end", _END, DARK, position=end / length)
     for name, line, color in (("all", points, _PALE), ("followed", done, MARK)):
         scene.lines(f"/path/{name}", pieces(line / length), color, 0.006)
 
@@ -370,27 +370,17 @@ def _at_point(state: StudioState, activations: np.ndarray, point: int) -> Studio
     return state.replace(path=path, activation=tuple(activations[point].tolist()))
 
 
+_OF_TARGET: dict[str, Any] = {
+    "wanted": "target",
+    "makes": "answer takes_nearest",
+    "draws": "/ghosts /target /gap",
+}
+_OF_PATH: dict[str, Any] = {"wanted": "path", "makes": "track", "doing": "following the path"}
 JOBS = (
     # The activations that reach the target, and their shapes
-    Job(
-        "inverse",
-        "design target",
-        _solve,
-        _draw_answer,
-        wanted="target",
-        makes="answer takes_nearest",
-        draws="/ghosts /target /gap",
-    ),
+    Job("inverse", "design target", _solve, _draw_answer, **_OF_TARGET),
     # The arm follows its dragged tip on its branch; where that rests, every branch is looked for
     Job("drag", "found.pull", _follow_tip, makes="pull lag"),
-    Job(
-        "path",
-        "design path.points path.start",
-        _follow,
-        _draw_path,
-        wanted="path",
-        makes="track",
-        doing="following the path",
-    ),
+    Job("path", "design path.points path.start", _follow, _draw_path, **_OF_PATH),
     Job("play", "", _play),
 )

@@ -1,4 +1,4 @@
-"""Needs in a tab without a browser: typed, loaded, judged live and drawn."""
+"""What an arm is for and what was measured on it, in a tab without a browser."""
 
 import dataclasses
 
@@ -6,14 +6,17 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import designs
+from softreach.arm import Marker, designs
 from softreach.arm.parameters import changed
+from softreach.calibration.measurements import read_measurements
 from softreach.requirements import Requirements, Target
-from softreach.rod.kinematics import tip_positions
+from softreach.rod.kinematics import marker_positions, tip_positions
+from softreach.studio.found import Bench
 from softreach.studio.session import Session
 from softreach.studio.state import requirements_of
 from softreach.studio.tabs import click, goals
 from softreach.support.errors import SoftreachError
+from tests.calibration.arms import table
 
 ARM = designs.minimal_trunk(length=0.4)
 POSE = (-0.7, -0.4, -0.9)
@@ -23,6 +26,7 @@ FAR = (0.3, 0.1, 0.42)
 
 @pytest.fixture
 def session(opened) -> Session:
+    opened.learn({"bench": None})
     opened.update(lambda state: state.replace(design=ARM, activation=POSE, needs="", target=None))
     opened.settle()
     opened.end_step()
@@ -35,11 +39,11 @@ def added(session, kind, text="") -> None:
 
 
 def verdict(session) -> str:
-    return goals.verdict(session.found, session.state)
+    return goals.verdict(session.state, session.found)
 
 
 def drawn(session, name):
-    return session.client.scene.get_handle_by_name(f"/needs{name}")
+    return session.client.scene.get_handle_by_name(name)
 
 
 def test_a_place_is_a_ball_where_it_is_reached_and_a_cross_with_its_gap_where_it_is_not(session):
@@ -50,28 +54,16 @@ def test_a_place_is_a_ball_where_it_is_reached_and_a_cross_with_its_gap_where_it
     gap = exact.gaps.max()
     assert "place 1</b>: reached" in verdict(session)
     assert f"place 2</b>: missed by {1e3 * gap:.3g} mm" in verdict(session)
-    np.testing.assert_allclose(drawn(session, "/reached").points, [REACHED / 0.4], atol=1e-5)
-    cross = drawn(session, "/missed").points
+    np.testing.assert_allclose(drawn(session, "/needs/reached").points, [REACHED / 0.4], atol=1e-5)
+    cross = drawn(session, "/needs/missed").points
     np.testing.assert_allclose(cross.mean(axis=(0, 1)), np.array(FAR) / 0.4, atol=1e-6)
-    ((place, nearest),) = drawn(session, "/gaps").points
+    ((place, nearest),) = drawn(session, "/needs/gaps").points
     np.testing.assert_allclose(np.linalg.norm(place - nearest), gap / 0.4, rtol=1e-3)
-    assert drawn(session, "/label 1").text == f"{1e3 * gap:.3g} mm"
+    assert drawn(session, "/needs/label 1").text == f"{1e3 * gap:.3g} mm"
     session.step(back=True)
     session.settle()
     assert "place 2" not in verdict(session)
-    assert drawn(session, "/missed") is None
-
-
-def test_the_gap_follows_the_design(session):
-    added(session, "place to reach", "150, 60, 330")
-    gaps = []
-    for taper in (0.0, 0.05):
-        session.update(lambda s, taper=taper: s.replace(design=changed(ARM, {"taper": taper})))
-        session.settle()
-        assert session.found.check.arm == session.state.design
-        gaps.append(float(session.found.check.gaps.max()))
-    assert gaps[0] < 1e-6 < 1e-3 < gaps[1]
-    assert "missed by" in verdict(session)
+    assert drawn(session, "/needs/missed") is None
 
 
 def test_a_place_can_be_the_target(session):
@@ -86,7 +78,7 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
     added(session, "place to reach")
     added(session, "box to stay inside")
     added(session, "box to avoid", "-20, -20, 90, 20, 20, 140")
-    inside, avoid = drawn(session, "/region 0"), drawn(session, "/region 1")
+    inside, avoid = drawn(session, "/needs/region 0"), drawn(session, "/needs/region 1")
     corners = inside.points.min(axis=(0, 1)), inside.points.max(axis=(0, 1))
     np.testing.assert_allclose(corners, session.scene.axes.corners, atol=1e-5)
     colors = [tuple(np.asarray(node.colors).ravel()[:3]) for node in (inside, avoid)]
@@ -157,5 +149,82 @@ def test_needs_of_many_places_are_drawn_with_few_labels(session):
     session.update(lambda state: state.replace(needs=needs.to_toml()))
     session.settle()
     assert "row</b>: 0 of 60 places reached, missed by" in verdict(session)
-    assert drawn(session, "/label 19") is not None
-    assert drawn(session, "/label 20") is None
+    assert drawn(session, "/needs/label 19") is not None
+    assert drawn(session, "/needs/label 20") is None
+
+
+# Measured poses: their markers over the arm, and a fit to them
+
+MARKED = designs.minimal_trunk().replace(
+    markers=(Marker(name="half", station=0.5, offset=(0.07, 0.0, 0.0)), Marker(name="tool"))
+)
+REAL = changed(MARKED, {"taper": 0.012}).replace(base=sr.Base(position=(0.05, -0.02, 0.1)))
+INPUTS = MARKED.bounds[:, 0] * np.random.default_rng(3).random((20, 3))
+NAMES, MARKERS = ("a", "b", "c"), ("half", "tool")
+NOISE = 2e-4 * np.random.default_rng(4).standard_normal((20, 2, 3))
+PLACES = marker_positions(REAL, INPUTS) + NOISE
+
+
+@pytest.fixture
+def bench(session) -> Session:
+    session.update(lambda state: state.replace(design=MARKED, activation=()))
+    session.end_step()
+    return session
+
+
+def shown(session, number=0, inputs=INPUTS) -> None:
+    """Load measured poses, and bring the arm to one of them."""
+    columns = table(PLACES, inputs, NAMES, MARKERS).items()
+    data = read_measurements(MARKED, {name.removesuffix("_N"): [*row] for name, row in columns})
+    bench = Bench(data=data, arm=MARKED, number=number, free=("pose", "taper"))
+    session.update(bench.posed)
+    session.learn({"bench": bench})
+    session.settle()
+
+
+def test_dots_stand_where_the_markers_of_a_pose_are_and_were_measured(bench):
+    for number in (0, 7):
+        shown(bench, number)
+        predicted = marker_positions(MARKED, INPUTS[number])[0]
+        for name, places in (("measured", PLACES[number]), ("predicted", predicted)):
+            dots = drawn(bench, f"/sample/{name}").points
+            np.testing.assert_allclose(dots, places / MARKED.length, atol=1e-5)
+        lines = drawn(bench, "/sample/residuals").points
+        np.testing.assert_allclose(lines[:, 0], PLACES[number] / MARKED.length, atol=1e-5)
+        distances = np.linalg.norm(PLACES[number] - predicted, axis=1)
+        np.testing.assert_allclose(bench.found.sample.distances, distances, atol=1e-9)
+    markers = drawn(bench, "/arm/markers").points
+    np.testing.assert_allclose(markers, predicted / MARKED.length, atol=1e-3)
+
+
+def test_a_pose_is_shown_only_while_the_arm_has_its_inputs_and_its_markers(bench):
+    shown(bench)
+    bench.update(lambda state: state.replace(activation=()))
+    bench.settle()
+    assert drawn(bench, "/sample/measured") is None
+    bench.step(back=True)
+    bench.settle()
+    assert drawn(bench, "/sample/measured") is not None
+    bench.update(lambda state: state.replace(design=MARKED.replace(markers=())))
+    bench.settle()
+    assert drawn(bench, "/sample/measured") is None
+
+
+def test_inputs_beyond_the_bounds_have_their_markers_predicted_as_they_are(bench):
+    far = INPUTS.copy()
+    far[0] = (0.5, 0.0, 0.0)
+    shown(bench, inputs=far)
+    assert bench.state.activation == (0.0, 0.0, 0.0)
+    straight = marker_positions(MARKED, (0.0, 0.0, 0.0))[0] / MARKED.length
+    assert np.abs(drawn(bench, "/sample/predicted").points - straight).max() > 0.01
+
+
+def test_a_calibrated_arm_belongs_to_the_design_that_the_fit_began_with(bench):
+    shown(bench)
+    bench.follow("fit")
+    bench.settle()
+    fit = bench.found.bench
+    assert fit.fitted(MARKED) == fit.result.arm
+    assert fit.fitted(changed(MARKED, {"taper": 0.02})) is None
+    assert np.nanmax(bench.found.sample.distances) < 2e-3
+    assert drawn(bench, "/sample/arm/0") is not None
