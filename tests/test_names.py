@@ -20,8 +20,9 @@ from softreach.support.lazy import lazy
 NAMED = """
     arm arm.designs arm.parameters atlas calibration cloud cloud.cells cloud.curvature
     cloud.dexterity
-    support.errors exchange.activefilaments export forces inverse inverse.path workspace.payload
-    plot optimization requirements cloud.redundancy rod rod.rest stiffness cloud.volume workspace
+    support.errors exchange.activefilaments export forces inverse inverse.path models
+    workspace.payload plot optimization requirements cloud.redundancy rod rod.rest stiffness
+    cloud.volume workspace
 """
 MODULES = [importlib.import_module(f"softreach.{name}") for name in NAMED.split()]
 TOP = [name for name in dir(sr) if not isinstance(getattr(sr, name), ModuleType)]

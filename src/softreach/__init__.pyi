@@ -1,7 +1,8 @@
 # ruff: noqa: I001  (several names a line)
 from . import arm as arm, atlas as atlas, calibration as calibration, cloud as cloud
 from . import exchange as exchange, export as export, forces as forces, inverse as inverse
-from . import optimization as optimization, plot as plot, requirements as requirements
+from . import models as models, optimization as optimization, plot as plot
+from . import requirements as requirements
 from . import rod as rod, stiffness as stiffness, workspace as workspace
 from .arm import Base as Base, Chamber as Chamber, FiberArchitecture as FiberArchitecture
 from .arm import LinearTaper as LinearTaper, Loads as Loads, Manipulator as Manipulator

@@ -36,7 +36,8 @@ def export(
 
     A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
-    .glb .3mf .vtu), or the source of a filament of ActiveFilaments.jl (.jl).
+    .glb .3mf .vtu), the source of a filament of ActiveFilaments.jl (.jl), or a
+    model for MuJoCo (.xml).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
 
@@ -45,6 +46,7 @@ def export(
     """
     from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
     from softreach.export.surfaces import SURFACE_FILES
+    from softreach.models.mjcf import MODEL, write_mujoco
 
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
@@ -61,6 +63,13 @@ def export(
         options.refuse(_OTHER, unit=unit)
         options.check_output(out, FILAMENT_SCRIPT, overwrite)
         write_design(arm, out, overwrite=overwrite)
+        console.line(out)
+    elif out.suffix == ".xml":
+        options.refuse("on a model, whose controls they are", activation=activation)
+        arm = design_from(source, changes)
+        options.refuse("for MuJoCo, whose lengths are in m", unit=unit)
+        options.check_output(out, MODEL, overwrite)
+        write_mujoco(arm, out, overwrite=overwrite)
         console.line(out)
     else:
         arm = design_from(source, changes, unit)
