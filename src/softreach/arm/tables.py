@@ -121,7 +121,7 @@ def check_extension(arm: Body) -> None:
         smallest, _ = range_of_extension(arm, rates)
         if smallest <= 0:
             kept = "must keep ζ > 0: narrow the bounds"
-            allowed = f"reaches extension ζ = {smallest:.4g}{of}; {kept}"
+            allowed = f"shortens the arm to nothing, with extension ζ = {smallest:.4g}{of}; {kept}"
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
 
 
