@@ -370,7 +370,8 @@ def main(*names: str) -> None:
     )
     print("that of the hose 300. Within 2σ are coordinates within two standard deviations of")
     print("`predict`, numbers and residuals together.")
-    print("No rod knows the hose's friction: its verdict is memory. Seconds are those of the fit.")
+    print("The hose has friction and the rod has none: its verdict is memory.")
+    print("Seconds are those of the fit.")
     for robot in robots():
         if names and not any(name in robot.name for name in names):
             continue

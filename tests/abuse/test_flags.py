@@ -12,7 +12,7 @@ from tests.abuse.refusals import refusal_of
 TRUNK = "minimal_trunk"
 VARY = "atlas build a.zarr --vary taper_deg=0,1"
 POSITION = "three comma-separated numbers x,y,z in m"
-SHAPE = "must be such that the arm has a shape, such as from -1.6"
+SHAPE = "must be such that the arm has a shape, as between -1.6"
 STORED = "has no effect on a stored cloud: give the design instead"
 NOT_WRITTEN = "error: --overwrite has no effect without --out"
 
@@ -65,10 +65,13 @@ REFUSED = {
     f"cloud {TRUNK} --n 1000 --sampler grid --seed 1": "--seed has no effect on the sampler grid",
     f"design {TRUNK} --schema --unit mm": "--unit has no effect with --schema",
     f"design {TRUNK} --overwrite": NOT_WRITTEN,
-    f"solve {TRUNK} --target 0,0,1 --family 2": "--family has no effect on up to three",
+    f"solve {TRUNK} --target 0,0,1 --family 2": "--family has no effect with up to three",
     "export a.zarr a.csv --activation=0,0,0": "--activation has no effect on a cloud",
     f"studio {TRUNK} --vary taper_deg=0:3:4": "--vary has no effect without --static",
     "atlas build a.zarr --space a.toml --design lce_arm": "--design has no effect with --space",
+    f"calibrate {TRUNK} a.csv": "error: calibrate needs --free",
+    f"solve {TRUNK} --target 0,0,1 --within -1mm": "if it begins with a dash: --within=VALUE",
+    f"design {TRUNK} b": "error: design takes no b",
     f"{VARY} --metrics exact --alpha 0.1L": "--alpha has no effect without the metrics",
     f"design {TRUNK} -q -v": "choose --quiet or --verbose",
 }

@@ -355,7 +355,7 @@ TWO = BODY.replace("0.5 }", "0.5, material = 'a' }, { inner_ratio = 0.6 }")
         (BODY.replace("0.5 }", "0.5, outer_ratio = 0.9 }") + FIBER, "rings[0].outer_ratio = 0.9"),
         (BODY.replace("version = 2", "version = 3") + FIBER, "version = 3: must be 2"),
         (BODY.replace("version = 2", "") + FIBER, "version: required key is missing"),
-        (f"{BODY}[[tendons]]\n{FIBER}", "tendons = [{}]: unknown key; write [[actuators]] with"),
+        (f"{BODY}[[tendons]]\n{FIBER}", "tendons: unknown key; write [[actuators]] with"),
         (f"{BODY}actuators = 3", "actuators = 3: must be a list"),
     ],
 )

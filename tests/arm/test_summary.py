@@ -265,7 +265,7 @@ def test_the_range_of_extension_holds_every_sample(arm):
 
 
 def test_an_arm_that_an_activation_would_shorten_to_nothing_is_refused(trunk):
-    with pytest.raises(InvalidDesign, match=r"reaches extension ζ = -0.5\d+; must keep ζ > 0"):
+    with pytest.raises(InvalidDesign, match=r"with extension ζ = -0.5\d+; must keep ζ > 0"):
         check_extension(trunk.with_bounds((-9.0, 0.0)))
     with pytest.raises(InvalidDesign, match="extension"):
         check_extension(trunk.split("longitudinal", 98))

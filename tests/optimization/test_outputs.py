@@ -153,7 +153,7 @@ FAULTS = {
     'maximize = "mass"': ('maximize = "mas"', "search.maximize = 'mas': must be one of"),
     "accuracy = 0.1": ("accuracy = 9", "search.accuracy = 9: must be a finite number"),
     "taper_deg = [0, 3]": ("taper_deg = [3, 0]", "search.free.taper_deg = [3, 0]: must be a range"),
-    "left.revolution =": ("left.revolutoin =", "search.free.left.revolutoin: is no parameter"),
+    "left.revolution =": ("left.revolutoin =", "search.free.left.revolutoin: is not a parameter"),
     '"-left.revolution + 5deg"': ('"left"', "search.free.right.revolution = 'left': must be"),
     "= [50, 60]": ("= [50, 50]", "search.choices.left.offset_deg = [50, 50]: must be a list of d"),
     '"8kg"': ("8", "limits.mass = 8: must have its unit"),

@@ -123,7 +123,9 @@ def test_a_point_is_part_of_the_design_and_of_its_file():
 def test_unknown_points_are_refused_in_one_line():
     with pytest.raises(InvalidInput, match=r"^point = 'tol': must be a marker of the arm: be"):
         sr.reachable_set(arm(), point="tol")
-    with pytest.raises(InvalidInput, match="point = 'tool': must be left out: no markers"):
+    with pytest.raises(
+        InvalidInput, match="point = 'tool': must be left out: the arm has no markers"
+    ):
         sr.compute_cloud(arm(markers=()), 10, point="tool")
     with pytest.raises(InvalidDesign, match="point = 'x': must be a marker of the arm"):
         arm(point="x")

@@ -159,7 +159,7 @@ def test_asked_for_one_by_one_they_are_refused_in_one_line(make, gone):
         lambda: stream_statistics(rod, [np.array([gone])], [0.5]),
     ]
     for ask in asked:
-        with pytest.raises(InvalidInput, match=r"a shape, such as from -1|1000 times as large"):
+        with pytest.raises(InvalidInput, match=r"a shape, as between -1|1000 times as large"):
             ask()
 
 

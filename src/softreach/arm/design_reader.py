@@ -77,7 +77,8 @@ def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     document = document_of(text, source)
     version = document.get("version", 2)
     if isinstance(version, bool) or version != 2:
-        raise InvalidDesign([Fault("version", version, "must be 2")], source)
+        beside = "" if "profile" in document else ", and a design has a table [profile]"
+        raise InvalidDesign([Fault("version", version, f"must be 2{beside}")], source)
     reader = _Reader(document)
     fields, faults, arm = reader.fields(), reader.faults, None
     if fields.keys() >= {"profile", "section", "stations"}:

@@ -202,7 +202,8 @@ def _inner_arm(arm: Manipulator) -> Manipulator:
     rates = tables(body, strain_stations(body)).extension
     least = float(1.0 + (gamma @ rates.T).min())
     if not least > 0.0:
-        allowed = f"reaches extension ζ = {least:.4g}; must keep ζ > 0: narrow the bounds"
+        allowed = f"shortens the arm to nothing, with extension ζ = {least:.4g}; "
+        allowed += "must keep ζ > 0: narrow the bounds"
         given = bounds[driving.law.columns].tolist()
         raise InvalidDesign([Fault("displacement_bounds", given, allowed)])
     most = _SAFETY * gamma.max(axis=0) + _against_loads(arm)

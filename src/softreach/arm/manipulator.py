@@ -92,7 +92,11 @@ class Manipulator(Body):
     @property
     def _points(self) -> str:
         names = ", ".join(each.name for each in self.markers)
-        return f"must be a marker of the arm: {names}" if names else "must be left out: no markers"
+        return (
+            f"must be a marker of the arm: {names}"
+            if names
+            else "must be left out: the arm has no markers"
+        )
 
     def at_point(self, point: str | None) -> Self:
         """The arm with a marker in place of its tip; itself for None.

@@ -125,7 +125,7 @@ def check_extension(arm: Body) -> float:
         ends.append(smallest)
         if smallest <= 0:
             kept = "must keep ζ > 0: narrow the bounds"
-            allowed = f"reaches extension ζ = {smallest:.4g}{of}; {kept}"
+            allowed = f"shortens the arm to nothing, with extension ζ = {smallest:.4g}{of}; {kept}"
             raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
     return min(ends)
 

@@ -468,8 +468,8 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
         return parameter.name, _read(value, partial(names.number, key))
     except (InvalidInput, ValueError):
         kind = "numbers" if key in names.written else names.allowed(key)
-        ends = f"start:stop:count with both ends and a count up to {_MOST_VALUES}"
-        allowed = f"{kind}: a list, or {ends}"
+        ends = f"start:stop:count (both ends count, up to {_MOST_VALUES} values)"
+        allowed = f"{kind}; for several write a list or {ends}"
         raise InvalidInput(key, value, allowed) from None
 
 

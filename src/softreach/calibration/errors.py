@@ -124,7 +124,7 @@ def judged(
     elif len(data) < _FEW:
         limit, said = "data", "too few samples to say what limits the fit"
     elif law < _LAW and not known and not finding:
-        said = "limited by missing physics or by noise: no inputs are repeated to tell which"
+        said = "limited by missing physics or by noise: repeated inputs would tell which"
         limit = "data"
     else:
         limit, said = "physics", "repeated poses differ by less than the error"

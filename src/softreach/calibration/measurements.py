@@ -373,7 +373,9 @@ def _chosen_markers(
         return dict(zip(names, triples, strict=True))
     listed = ", ".join(start or "x, y, z" for start in triples)
     own = f"the arm has {counted(len(names), 'marker')} ({', '.join(names)})"
-    raise NotPossible(f"{own}, the data has {len(triples)} ({listed}): name them by `markers`")
+    raise NotPossible(
+        f"{own}, the data has {len(triples)} ({listed}): name them by `markers` (--marker)"
+    )
 
 
 def _matched(
@@ -405,7 +407,9 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
         if len(free) != len(wanting):
             wanted = f"{counted(len(wanting), 'column')} in {_unit_text(unit)}"
             wanted += f" for {', '.join(wanting)}, and has {', '.join(free) or 'none'}"
-            raise NotPossible(f"the data must have {wanted}: name the columns by `inputs`")
+            raise NotPossible(
+                f"the data must have {wanted}: name the columns by `inputs` (--input)"
+            )
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]
 

@@ -444,7 +444,7 @@ def _remarks(result: Calibration, unit: LengthUnit) -> Iterator[str]:
         more = "errors at held-out rows say little about other motions; hold out whole runs"
         yield f"rows of one motion are neighbors: {more}"
     for first, second, share in result.correlated[:3]:
-        yield f"hardly told apart: {first} and {second} (correlation {share:+.3f})"
+        yield f"hard to tell apart: {first} and {second} (correlation {share:+.3f})"
     if len(far := result.outliers):
         rows = ", ".join(map(str, far[:_MOST_ROWS])) + ", ..." * (len(far) > _MOST_ROWS)
         yield f"{counted(len(far), 'sample')} far off, in rows (counted from 0): {rows}"

@@ -10,7 +10,14 @@ import traceback
 from contextlib import suppress
 from typing import Annotated, Any, cast
 
-from cyclopts import App, CycloptsError, Group, Parameter
+from cyclopts import (
+    App,
+    CycloptsError,
+    Group,
+    MissingArgumentError,
+    Parameter,
+    UnusedCliTokensError,
+)
 
 import softreach as sr
 from softreach.cli.console import HelpConsole, console
@@ -131,9 +138,22 @@ def run(arguments: list[str]) -> int:
     return code or 0
 
 
+def _unfit(error: MissingArgumentError | UnusedCliTokensError) -> str:
+    """Words that a command needs, or cannot use."""
+    command = " ".join(error.command_chain or ["softreach"])
+    if isinstance(error, UnusedCliTokensError):
+        return f"{command} takes no {', '.join(error.unused_tokens or ())}"
+    if error.keyword is None:
+        return f"{command} needs {error.argument.name if error.argument else 'more words'}"
+    dash = f"if it begins with a dash: {error.keyword}=VALUE"
+    return f"{command} {error.keyword} needs a value; {dash}"
+
+
 def _message(error: Exception) -> str:
     if isinstance(error, CycloptsError) and isinstance(error.__cause__, SoftreachError):
         error = error.__cause__
+    if isinstance(error, MissingArgumentError | UnusedCliTokensError):
+        return _unfit(error)
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; ask for fewer samples or less accuracy"
     return str(error) or type(error).__name__

@@ -27,7 +27,8 @@ Example: softreach atlas build a.zarr --vary taper_deg=0:3:4
 
 Store = Annotated[str, Parameter(help="The atlas: a folder (.zarr) or a URL.")]
 Shard = Annotated[
-    str, Parameter(help="Compute part i of k, written i/k, i from 0; all k may share the store.")
+    str,
+    Parameter(help="Compute one of k parts of the designs: 0/k to k-1/k; all may share the store."),
 ]
 
 
@@ -69,7 +70,7 @@ def build(
         keep_clouds: Store the tips.
         scheduler: Dask scheduler: tcp://host:port
         scheduler_file: Dask scheduler file.
-        device: What computes tips: cpu, or cuda for a GPU, of arms without loads.
+        device: What computes the tips: cpu, or cuda (a GPU), which takes arms without loads.
     """
     first, _, count = shard.partition("/")
     if not (shard.isascii() and first.isdigit() and count.isdigit() and len(shard) < 20):

@@ -31,7 +31,7 @@ Free = Annotated[
     Parameter(
         help="Numbers that may change, comma-separated: names of softreach list parameters DESIGN, "
         "with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for "
-        "the base; scale for data of a camera without one. May be repeated.",
+        "the base; scale for places without a unit of length. May be repeated.",
     ),
 ]
 
@@ -77,7 +77,7 @@ def calibrate(
         noise: Standard deviation of a measured coordinate, which decides how much priors count:
             0.2mm. Estimated from the residuals if left out.
         robust: Down-weight outliers.
-        rivals: Fit constant curvature and a quadratic law beside it.
+        rivals: Fit two simpler laws too: constant curvature, and a quadratic law of the inputs.
         seed: Seed of the held-out samples.
         inputs: Column of an input: "tendon 1=tension1_N". May be repeated.
         markers: Start of the columns of a marker: tip=disk3. May be repeated.
@@ -218,7 +218,7 @@ def plan_poses(
         console.json({"noise_m": width, **poses, "numbers": _numbers(found)})
     else:
         seen, noise = ", ".join(plan.markers), arm.length_unit.rounded(width, digits=".5g")
-        lines = columns([("number", "to be known", "share"), *_rows(found, arm.length_unit)])
+        lines = columns([("number", "expected", "share"), *_rows(found, arm.length_unit)])
         title = f"{n} poses of {design} with {seen}, noise {noise}"
         console.line("\n  ".join([title, *lines]))
     if out is not None:

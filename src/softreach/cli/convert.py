@@ -117,10 +117,10 @@ def import_file(
     Example: softreach import filament.json filament.toml
 
     Args:
-        source: Filament (.json), or cloud: NAME.csv of two files.
+        source: Filament (.json), or cloud: NAME.csv, with NAME_gamma.csv beside it.
         out: Design (.toml) or cloud (.zarr) to write.
         design: Design that a cloud belongs to: .toml, .json or built-in.
-        tol: Largest error of the tips that a cloud is compared with, in L (1e-6).
+        tol: Largest error of softreach's tips in that comparison, in L: 1e-6 if left out.
     """
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.cloud.clouds import CLOUD_STORE

@@ -131,7 +131,7 @@ def _folder(name: str) -> Path:
 
 def listing(
     kind: Kind,
-    design: Annotated[str | None, Parameter(help="Design, for its parameters alone.")] = None,
+    design: Annotated[str | None, Parameter(help="Design whose parameters are listed.")] = None,
     /,
     *,
     changes: Changes = UNCHANGED,
@@ -139,9 +139,9 @@ def listing(
 ) -> None:
     """List designs, examples, materials, actuators, metrics, objectives, or parameters.
 
-    Parameters are those of a design, with their values, as --set and --vary name
-    them. A dash means that the design gives no single number, or that parts which
-    share the parameter differ; it can still be set. Actuators and metrics of your
+    The parameters of a design have the names that --set and --vary take. A dash means
+    that a parameter has no single value: it is left out, or varies along the arm or
+    between parts. It can be set all the same. Actuators and metrics of your
     own are listed with --import, or if a package declares them. Metrics of an
     atlas that are single numbers can be objectives of a search too.
 
@@ -262,7 +262,7 @@ def warmup(*, only: str | None = None) -> int:
     Example: softreach warmup --only free
 
     Args:
-        only: free (kernels of arms without loads) or loaded (the others): both if left out.
+        only: Kernels of arms without loads (free) or with loads (loaded): both if left out.
     """
     from softreach.kernels.compiler import not_kept
 
@@ -355,7 +355,7 @@ _JOBS = {"free": _free, "loaded": _loaded}
 
 
 def doctor(*, json: options.AsJson = False) -> None:
-    """Print versions, cores, memory and caches, for the report of a fault.
+    """Print versions, cores, memory and caches, for a bug report.
 
     Example: softreach doctor --json
     """

@@ -22,7 +22,7 @@ def design(
 ) -> None:
     """Describe a design: angles, radii, stiffness, weight, warnings.
 
-    --verbose adds the limits of the linear laws of the actuators. With --out,
+    --verbose adds where the linear law of each kind of actuator ends. With --out,
     --unit is written into the design file.
 
     Example: softreach design minimal_trunk --taper-deg 3

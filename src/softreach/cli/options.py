@@ -264,7 +264,7 @@ def _unchanged(text: str) -> sr.Manipulator:
     suffix = path.suffix.lower()
     if suffix in _POINTS:
         hint = "in Python, softreach.concave_hull(points, alpha=0.05) computes the volume of points"
-        raise NotPossible(f"{text} is no design: give a .toml file; {hint} [m] of shape (n, 3)")
+        raise NotPossible(f"{text} is not a design: give a .toml file; {hint} [m] of shape (n, 3)")
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
         return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
@@ -368,7 +368,7 @@ def shape_of(text: str | None, arm: sr.Manipulator) -> xr.Dataset:
     shape = sr.configuration(arm, activation_of(text, arm))
     if not np.isfinite(shape.position.values).all():
         lower, upper = (",".join(f"{bound:g}" for bound in ends) for ends in arm.input_bounds.T)
-        allowed = f"such that the arm has a shape, such as from {lower} to {upper}"
+        allowed = f"such that the arm has a shape, as between {lower} and {upper}"
         raise InvalidInput("activation", text, allowed)
     return shape
 

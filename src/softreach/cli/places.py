@@ -30,8 +30,9 @@ def solve(
 ) -> None:
     """Find every activation that puts the tip at a target.
 
-    If there is none, prints the nearest point that the tip reaches and a bound on
-    its distance. Places are in the world, in which --base hanging turns the arm.
+    If there is none, prints the nearest point that the tip reaches, and the distance
+    that every tip has at least. Targets are places in the world: --base down turns
+    the arm there, and leaves the targets where they are.
 
     Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
 
@@ -39,9 +40,9 @@ def solve(
         target: Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.
         targets: CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.
         within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
-        direction: Direction x,y,z of the tip that each target needs, of any length.
-        cone: Angle from it that is allowed: 5deg, 0.1rad (0deg).
-        family: Number of solutions for each target, with more than three free bundles (1).
+        direction: Direction x,y,z in which the tip must point; its length does not matter.
+        cone: Largest angle from --direction: 5deg, 0.1rad; 0deg if left out.
+        family: Number of solutions for each target, with four or more free bundles: 1 if left out.
     """
     from softreach.inverse.request import angle_in, direction_in, length_in, position_in
 
@@ -49,7 +50,7 @@ def solve(
         raise NotPossible("give either --target or --targets")
     arm = design_from(design, changes, unit)
     if int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum()) <= 3:
-        options.refuse("on up to three free bundles, where all solutions are found", family=family)
+        options.refuse("with up to three free bundles, as all solutions are found", family=family)
     if direction is None:
         options.refuse("without --direction", cone=cone)
     if targets is None:
@@ -92,7 +93,7 @@ def track(
     Example: softreach track minimal_trunk path.csv --out activations.csv
 
     Args:
-        path: CSV file with columns x, y, z, in order; m or as it says.
+        path: CSV file with columns x, y, z, a point a row; in m, or as x_mm, y_mm, z_mm.
         start: Activations to start from: -1,0,-0.5
         out: CSV file for the activations.
     """
@@ -119,7 +120,8 @@ def equilibria(
 ) -> None:
     """Find every equilibrium of a loaded arm at given activations.
 
-    Stable ones come first. The posture of the arm that hangs first is marked.
+    Stable equilibria come first. The posture that the arm takes is marked: it is loaded
+    first, and then activated.
 
     Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
 

@@ -34,8 +34,8 @@ def reach(
 ) -> None:
     """Compute the exact reachable set: volume, multiplicity, folds.
 
-    Without samples: the volume with its error, the share of the convex hull that
-    is not reached, and the number of activations that reach each place.
+    Prints the volume with its error, the share of the convex hull that is not
+    reached, and how many activations reach each place. It draws no samples.
 
     Example: softreach reach minimal_trunk --out reach.stl --out reach.png
 
@@ -167,7 +167,8 @@ def gradient(
 ) -> None:
     """Differentiate the reachable volume by design parameters.
 
-    Also prints those of the convex hull and the unreachability, all in SI units.
+    Prints the derivatives of the volume, of the volume of the convex hull and of the
+    unreachability, all in SI units.
 
     Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
 
@@ -190,7 +191,7 @@ def gradient(
             label = f"{name.removesuffix(ERROR)} by {parameter}{ERROR * name.endswith(ERROR)}"
             kind = as_read((), symbol.removesuffix(" per unit"))[1]
             rows[label] = (values[k], kind if unit == "1" else f"{kind or '1'}/{unit}")
-    console.rows(f"derivatives of what {design} reaches", rows, json)
+    console.rows(f"derivatives of the reachable set of {design}", rows, json)
 
 
 def cloud(
@@ -210,7 +211,7 @@ def cloud(
 
     Args:
         tol: Largest tip error, in L.
-        device: What computes tips: cpu, or cuda for a GPU, of arms without loads.
+        device: What computes the tips: cpu, or cuda (a GPU), which takes arms without loads.
         out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
     from softreach.cloud.clouds import CLOUD_STORE

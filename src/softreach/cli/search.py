@@ -36,8 +36,9 @@ def check(
 
     Judges places to reach, regions to stay in or to avoid, payloads, limits and
     measures; prints how far each is missed, which bounds hold the arm back and
-    what would help. A margin below its own error is undecided. The exit code is 0
-    if all is met, 1 if something is missed, and 3 if something is undecided.
+    what would help. A requirement is undecided if its margin is smaller than the
+    error of that. The exit code is 0 if all is met, 1 if something is missed, and
+    3 if something is undecided.
 
     Example: softreach check arm.toml needs.toml --out check.png
 
@@ -91,10 +92,10 @@ def search(
     out: Annotated[Path, options.OUT] = Path("best"),
     output: options.Output = options.DEFAULT,
 ) -> int:
-    """Search the designs that meet requirements and are best.
+    """Search for the best designs that meet requirements.
 
-    Writes them as design files, with tables and a report. The same command goes on
-    after an interruption. The exit code is 0 if the best meets all requirements,
+    Writes the designs as files, with tables and a report. After an interruption the
+    same command continues. The exit code is 0 if the best meets all requirements,
     1 if it misses one, and 3 if one is undecided.
 
     Example: softreach search needs.toml --free taper_deg=0:3 --maximize exact_volume -o best

@@ -54,7 +54,7 @@ def studio(
         port: A free port by default.
         fresh: Ignore saved work.
         open_page: Open the page in the browser.
-        token: Ask pages for a secret; by default where other machines can connect.
+        token: Open the page only with a secret; the default if other machines can connect.
         static: Write a page with sliders into this folder, and exit.
         vary: A slider of that page: taper_deg=0:3:8. May be repeated.
     """

@@ -133,10 +133,11 @@ class Solution:
             lines.append(f"{activation_text(arm, gamma, names)}  ({quality})")
         if not len(self):
             least = shown.rounded(self.gap_bound)
-            bound = f", proved to be at least {least}" if self.gap_bound else ""
+            bound = f"; every tip is proved to be {least} away or farther" if self.gap_bound else ""
             nearest, gap = shown.place(self.nearest), shown.rounded(self.gap)
             lines.append(f"nearest {nearest}, {gap} away{_off(self.direction_gap)}{bound}")
-            lines.append(f"reached by {activation_text(arm, self.nearest_activation, names)}")
+            gamma = activation_text(arm, self.nearest_activation, names)
+            lines.append(f"the tip is there at {gamma}")
         return "\n  ".join(lines)
 
 

@@ -176,7 +176,7 @@ class _Reader(FaultReader):
         if key not in names.by_key:
             hint = did_you_mean(key, names.by_key, 0.5)
             allowed = unknown_parameter(key, names.written).allowed
-            text = f"is no parameter; {hint}" if hint else f"is no parameter: must be {allowed}"
+            text = f"is not a parameter; {hint or f'must be {allowed}'}"
             return self._refuse(path, None, text)
         values = given.split(mark) if isinstance(given, str) else given
         if not isinstance(values, list | tuple):

@@ -391,12 +391,12 @@ def _keep_findings(made: Check, posed: Posed, rules: Sequence[PoseRules]) -> Ite
 def _kept(
     keep: Keep, value: float, error: float, excess: float, where: str, unit: LengthUnit
 ) -> Finding:
-    close = f" ± {unit.rounded(error, digits='.2g')}" if keep.of == "arm" else ""
+    close = error if keep.of == "arm" else np.nan
     verdict = "missed" if excess > 0.0 else verdict_of(max(-value, 0.0), error)
-    text = f"the {keep.of} keeps {unit.rounded(0.0 - value)}{close} to spare {where}"
+    text = f"the {keep.of} has a margin of {unit.text(0.0 - value, error=close)} {where}"
     if excess > 0.0:
         beyond = "outside" if keep.inside else "inside or too near"
-        text = f"the {keep.of} is {unit.rounded(value)}{close} {beyond} {where}"
+        text = f"the {keep.of} is {unit.text(value, error=close)} {beyond} {where}"
     elif not np.isfinite(value):
         text = "no pose to judge"
     return Finding(keep.name, keep.kind, verdict, excess, text)

@@ -1,6 +1,7 @@
 """Requirements of an arm: what it is for, as a frozen value and as TOML with units."""
 
 import dataclasses
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -145,7 +146,11 @@ class Requirements:
         place = None if folder is None else Path(as_path("folder", folder))
         size = None if length is None else as_number("length", length, POSITIVE)
         reader = _Reader(place, size)
-        parts = reader.parts(toml.document_of(text, LONGEST, as_text("source", source)))
+        document = toml.document_of(text, LONGEST, as_text("source", source))
+        if "actuators" in document:
+            wrong = "this is a design; give a file of requirements"
+            raise InvalidDesign([Fault("actuators", None, wrong)], source)
+        parts = reader.parts(document)
         if reader.faults:
             raise InvalidDesign(reader.faults, source)
         try:
@@ -373,7 +378,7 @@ class _Reader(toml.FaultReader):
             made = kind(**right)
             return toml.WRONG if wrong else made
         except InvalidInput as error:
-            field = error.name.partition(" ")[0].partition("[")[0]
+            field = re.split(r"[ .\[]", error.name)[0]
             key = next((key for key in raw if key.startswith(field)), "")
             value = raw[key] if key else error.value
             said = "" if key or error.name == field else f"{error.name} "

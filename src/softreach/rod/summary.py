@@ -244,7 +244,7 @@ def _beyond_theory(arm: Manipulator) -> Iterator[str]:
     if largest > 1:
         yield (
             f"activations reach |γ| = {largest:.3g}: above 1 a fiber would shorten by more than "
-            "its length, so γ is a load on the matrix there, not a strain of the fiber"
+            "its length, so that γ is a load on the matrix there, not a strain of the fiber"
         )
     if not load_number_faults(arm) and is_overloaded(arm):
         yield (

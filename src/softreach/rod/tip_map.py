@@ -209,12 +209,12 @@ class TipMap(ABC):
             return gamma
         first = gamma[wrong[:1]]
         (extension,), (turn,) = self.extension_and_turn(first)
-        why = f"here is ζ = {extension:.4g}, not above 0"
+        why = f"here the arm is shortened to nothing: ζ = {extension:.4g}"
         if extension > 0:
             why = f"here the arm turns by {turn:.3g} rad in a step, too far to be followed"
         lower, upper = map(_listed, (self.box.low, self.box.high))
         count = f"; so are {len(wrong):,} rows in all" if len(wrong) > 1 else ""
-        allowed = f"such that the arm has a shape, such as from {lower} to {upper}"
+        allowed = f"such that the arm has a shape, as between {lower} and {upper}"
         name = name if len(gamma) == 1 else f"{name}[{wrong[0]}]"
         raise InvalidInput(name, _listed(first[0]), allowed, why + count)
 

@@ -117,10 +117,14 @@ class Fault(NamedTuple):
     allowed: Range | str  # Values that are allowed, and what to do
 
     def __str__(self) -> str:
-        if self.value is None:
-            return f"{self.path}: {self.allowed}"
+        if self.value is None or isinstance(self.value, dict) or _is_tables(self.value):
+            return f"{self.path}: {self.allowed}"  # a table takes more lines than its fault
         shown = f"{self.value:.6g}" if isinstance(self.value, float) else in_short(repr(self.value))
         return f"{self.path} = {shown}: {self.allowed}"
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list) and any(isinstance(each, dict) for each in value)
 
 
 class InvalidDesign(SoftreachError, ValueError):

@@ -177,8 +177,8 @@ class FiberArchitecture(SectorActuator):
 
     default_name: ClassVar[str] = "fiber"
     validity: ClassVar[str] = (
-        "Exact to first order in the radius over the length along which shape changes; contraction "
-        "below γ = -1 is a load on the matrix, not a strain of the fiber."
+        "The law is exact to first order in the radius over the length on which the shape changes. "
+        "Below γ = -1, γ is a load on the matrix, not a strain of the fiber."
     )
 
     revolution: float | None = number(
@@ -282,8 +282,8 @@ class ObliqueMuscle(SectorActuator):
 
     default_name: ClassVar[str] = "oblique muscle"
     validity: ClassVar[str] = (
-        "As for fibers; the ends of those fibers that leave the sector between base and tip are "
-        "taken to hang on to the matrix."
+        "The limits of fibers hold here too. A fiber that leaves the sector before the tip is "
+        "taken to be anchored in the matrix there."
     )
 
     helical_angle: float = number(
@@ -315,7 +315,9 @@ class RadialMuscle(SectorActuator):
     """
 
     default_name: ClassVar[str] = "radial muscle"
-    validity: ClassVar[str] = "As for fibers; the change of radius itself is left out."
+    validity: ClassVar[str] = (
+        "The limits of fibers hold here too. The change of radius is left out."
+    )
 
     @property
     def fiber_direction(self) -> str:

@@ -42,9 +42,9 @@ class Tendon(PolarActuator):
     least: ClassVar[float] = 0.0
     """Least activation that a bound may be."""
     validity: ClassVar[str] = (
-        "Linear material: real silicone (neo-Hookean) bends less than this, by about 2.3 τ/K0. "
-        "Tendons that are not parallel to the axis pull along their direction before activation, "
-        "with a relative error of the order of curvature times distance from the axis."
+        "The material is linear: real silicone (neo-Hookean) bends less, by about 2.3 τ/K0. A "
+        "tendon that is not parallel to the axis is taken to pull as it lies before activation. "
+        "The relative error is about its curvature times its distance from the axis."
     )
 
     revolution: float = number(
@@ -262,7 +262,8 @@ class Chamber(PolarActuator):
     is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "chamber"
     validity: ClassVar[str] = (
-        "Linear material, and thin-walled channels that do not widen; else calibrate `area_factor`."
+        "The material is linear, and thin-walled channels do not widen: where they do, calibrate "
+        "`area_factor`."
     )
 
     distance: float | None = number(

@@ -125,7 +125,7 @@ class AllEquilibria:
         small = np.abs(self.tips[k]) <= _SMALL * self.rod.length
         tip = self.rod.arm.length_unit.place(np.where(small, 0.0, self.tips[k]))
         kind = TipStatus(self.status[k]).name.lower() + (" ring" if self.is_ring[k] else "")
-        which = ", the posture" if k == self.followed else ""
+        which = ", the posture that the arm takes" if k == self.followed else ""
         return f"tip {tip}: {kind}, margin {self.margin[k]:.3g}{which}"
 
 
