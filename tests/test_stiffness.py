@@ -162,7 +162,7 @@ def test_the_ellipse_drawn_is_the_outline_of_where_forces_move_the_tip():
         moved = (sr.tip_positions(arm, GAMMA[:1]) + forces @ found[0].T)[:, columns]
         np.testing.assert_allclose(outline.min(axis=0), moved.min(axis=0), atol=2e-4)
         np.testing.assert_allclose(outline.max(axis=0), moved.max(axis=0), atol=2e-4)
-    with pytest.raises(InvalidInput, match="must be 1, one for each configuration"):
+    with pytest.raises(InvalidInput, match="a matrix for each configuration"):
         plot.plot_compliance(arm, shapes, np.repeat(found, 2, axis=0))
 
 

@@ -19,7 +19,6 @@ from softreach.arm.section import Section
 from softreach.arm.stations import Span
 from softreach.support.arrays import Array, Mask, read_only
 from softreach.support.errors import Fault, InvalidDesign, Range
-from softreach.support.lazy import lazy
 
 Bounds = tuple[float, float] | tuple[tuple[float, float], ...]
 
@@ -248,7 +247,7 @@ class PolarActuator(Actuator):
     """θ0, polar angle of the first bundle where it begins [rad]; the others stand evenly, counted
     toward larger angles. Or the angle of each bundle, in any order."""
 
-    @lazy
+    @property
     def start_angles(self) -> Array:
         """θ0 + 2πj/n, polar angle of each bundle where it begins [rad], (bundle,), read-only."""
         return read_only(np.array(self.of_bundles("offset")))
