@@ -64,6 +64,7 @@ def check(
 def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
     fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
+    fields["direction_errors"] = result.direction_errors, "rad"
     return {
         **for_machines(fields, result.arm.length),
         "findings": [{**vars(each), "met": each.met} for each in result.findings],

@@ -120,6 +120,7 @@ def solve_inverse(
         direction=unit,
         cone=as_number("cone", cone, Range(0.0, np.pi, unit="rad")),
         direction_weight=as_number("direction_weight", direction_weight, _WEIGHTS),
+        within=within,
         family=as_integer("family", family, 1, 10_000),
         seed=as_integer("seed", seed, 0, 2**63),
         from_rest=as_flag("from_rest", from_rest),
@@ -174,6 +175,8 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     left, start = request.targets[missing], best.gamma[missing]
     if request.direction is None:
         start = nearest_tips(tip_map, start, left, request.residual, CLOSELY).gamma
+    elif request.within:
+        start = compromises(tip_map, request.of(missing), start).gamma
     closest = roots_at(tip_map, request.targets, missing, start)
     return _solutions(prepared, request, roots, closest)
 
