@@ -280,7 +280,7 @@ def checked(
         rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
         if quick:  # with shapes in no more steps than tips
-            rod = as_tip_map(loaded, _ROUGH_TOL)
+            rod = as_tip_map(loaded, TOL if needs.goals.directed.any() else _ROUGH_TOL)
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
         posed.append(solved(rules, needs.goals, step, quick=quick))
         for target, region in needs.regions:

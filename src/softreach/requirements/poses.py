@@ -31,7 +31,8 @@ _PLACES = 32_768  # places at once: bounds the memory
 _FAMILY = 32  # activations tried for a place of an arm with more than three free bundles
 _MOST_TRIED = 4_096  # places for which they are
 _SAME = 1e-4  # of the ranges, by which poses are told apart
-_PLACE_FIRST = 1e-4  # weight of directions with which the tip misses a place by some 1e-8 L
+_WEIGHT = 0.1  # of an angle [rad] against a distance in L, where not both can be met
+_PLACE_FIRST = 1e-5  # weight with which the tip is at the place but for some 1e-10 L
 _SEEDS, _NEIGHBORS = 256, 5
 """Samples that quick descents start from, and how many of them for each place."""
 _CELLS = 16  # along each axis of three bundles: as many solutions as with 32, in half the time
@@ -267,12 +268,21 @@ def _chosen(rules: PoseRules, goals: Goals) -> Posed:
     enough = np.where(goals.directed, np.maximum(goals.within, enough), enough)
     best.gaps[reached] = np.minimum(best.gaps, enough)[reached]
     missed = np.flatnonzero(goals.directed & ~reached)
-    if len(missed):  # what is said of these is how far off the direction is at the place
-        weight = {"direction_weight": _PLACE_FIRST, "within": 0.0}
-        with no_warnings():
-            nearest = _solutions(prepared, rows(goals, missed), from_rest=True, **weight)
-        _put(best, missed, _best(rules, nearest))
+    if len(missed):
+        _put(best, missed, _pointed(rules, prepared, rows(goals, missed)))
     return best
+
+
+def _pointed(rules: PoseRules, prepared: PreparedMap, goals: Goals) -> Posed:
+    """Poses from more searches, and where these do not do, those at the place that turn least."""
+    posed = _descended(rules, goals)
+    reached = goals.reached(posed.gaps, posed.direction_errors, rules.arm.length)
+    if len(left := np.flatnonzero(~reached)):
+        with no_warnings():
+            known = _owned(solve_inverse(prepared, goals.places[left], from_rest=True))
+        owner, start = map(np.append, known, (np.arange(len(left)), posed.poses[left]), (0, 0))
+        _put(posed, left, _at_ends(rules, rows(goals, left), owner, start, _PLACE_FIRST))
+    return posed
 
 
 def _solutions(prepared: PreparedMap, goals: Goals, **options: Any) -> Solutions:
@@ -301,25 +311,35 @@ def _descended(rules: PoseRules, goals: Goals) -> Posed:
         return _without_equilibrium(rules, places)
     neighbors = range(1, 1 + min(_NEIGHBORS, int(known.sum())))
     near = KDTree(tips[known]).query(places, neighbors)[1]  # pyright: ignore[reportArgumentType]
-    owner, enough = np.repeat(np.arange(len(places)), len(neighbors)), TOL * rod.length
-    ends, turn = _ends(rod, rows(goals, owner), gamma[known][near.ravel()], enough)
+    owner = np.repeat(np.arange(len(places)), len(neighbors))
+    return _at_ends(rules, goals, owner, gamma[known][near.ravel()])
+
+
+def _at_ends(
+    rules: PoseRules, goals: Goals, owner: Index, start: Array, weight: float = _WEIGHT
+) -> Posed:
+    """Of each place the best pose at the ends of descents from the starts (n, inputs) it owns."""
+    rod, enough = rules.rod, TOL * rules.rod.length
+    ends, turn = _ends(rod, rows(goals, owner), start, enough, weight)
     # Local minima that are farther away than another are no poses at the place.
     near = np.maximum(goals.within, enough)[owner]
     off = ends.distance
     if goals.directed.any():
-        beyond = rod.length * (turn - goals.cones[owner]).clip(0.0)
-        off, near = (off - near).clip(0.0) + beyond, np.full(len(owner), enough)
-    least = np.full(len(places), np.inf)
+        beyond = weight * rod.length * (turn - goals.cones[owner]).clip(0.0)
+        off, near = (off - near).clip(0.0) + beyond, weight * enough
+    least = np.full(len(goals.places), np.inf)
     np.minimum.at(least, owner, off)
     kept = np.flatnonzero(off <= np.maximum(near, least[owner] * (1.0 + 1e-9)))
     # Most descents to a place end in one pose.
     same = np.column_stack([owner[kept], np.rint(rod.box.to_cube(ends.gamma[kept]) / _SAME)])
     kept = kept[np.unique(same, axis=0, return_index=True)[1]]
     parts = (ends.gamma, ends.distance, ends.tips, turn)
-    return _ranked(rules, places, owner[kept], *(part[kept] for part in parts))
+    return _ranked(rules, goals.places, owner[kept], *(part[kept] for part in parts))
 
 
-def _ends(rod: TipMap, goals: Goals, start: Array, enough: float) -> tuple[Nearest, Array]:
+def _ends(
+    rod: TipMap, goals: Goals, start: Array, enough: float, weight: float
+) -> tuple[Nearest, Array]:
     """Ends of descents to places, and angles from the directions wanted there [rad]; 0 if none."""
     if not goals.directed.any():
         return nearest_tips(rod, start, goals.places, enough), np.zeros(len(start))
@@ -330,6 +350,7 @@ def _ends(rod: TipMap, goals: Goals, start: Array, enough: float) -> tuple[Neare
         near=np.zeros_like(start),
         direction=goals.directions,
         cone=float(goals.cones[0]),
+        direction_weight=weight,
         within=float(goals.within[0]),
     )
     gamma = compromises(rod, request, start).gamma
@@ -342,13 +363,19 @@ def _ends(rod: TipMap, goals: Goals, start: Array, enough: float) -> tuple[Neare
 def _best(rules: PoseRules, solutions: Solutions) -> Posed:
     """Of each target the solution that breaks the rules least, then that of least effort."""
     missing = np.flatnonzero(solutions.counts == 0)
-    owner = np.concatenate([np.repeat(np.arange(len(solutions)), solutions.counts), missing])
-    gamma = np.concatenate([solutions.activations, solutions.nearest_activations[missing]])
+    owner, gamma = _owned(solutions)
     gaps = np.concatenate([solutions.residuals, solutions.gaps[missing]])
     reached = np.repeat(solutions.targets, solutions.counts, axis=0)
     nearest = np.concatenate([reached, solutions.nearest[missing]])
     turn = np.concatenate([solutions.direction_errors, solutions.direction_gaps[missing]])
     return _ranked(rules, solutions.targets, owner, gamma, gaps, nearest, turn)
+
+
+def _owned(solutions: Solutions) -> tuple[Index, Array]:
+    """Numbers of targets with the inputs that reach them, then of others with the nearest ones."""
+    missing = np.flatnonzero(solutions.counts == 0)
+    owner = np.concatenate([np.repeat(np.arange(len(solutions)), solutions.counts), missing])
+    return owner, np.concatenate([solutions.activations, solutions.nearest_activations[missing]])
 
 
 def _ranked(
