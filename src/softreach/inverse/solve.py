@@ -75,7 +75,8 @@ def solve_inverse(
             comes no nearer than to within `tol`, its nearest activations are the solutions: whether
             it reaches such a target is more than its tips can say.
         within: |tip - target| at which a target counts as reached [m], if no activation does
-            better; the residual says how near the tip comes.
+            better; the residual says how near the tip comes. It holds for poses with a direction
+            too, of which one within that distance is then searched for.
         near: With more than three free bundles: the activation to stay near to [unit of each],
             shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
             each activation counts in its own range.

@@ -217,10 +217,12 @@ def check(
 ) -> Check:
     """A design against requirements, every one of them judged.
 
-    Places are met by `solve_inverse`. Of all activations that put the tip at a place, the one
-    counts that keeps best to the regions and limits of poses, and then the one of least effort;
-    with more than three free bundles, other activations are tried where that of least effort
-    breaks a rule, so that some may be missed. At a place out of reach it is the nearest pose found.
+    Places and directions are met by `solve_inverse`. Of all activations that put the tip at a
+    place, in the direction that is wanted there, the one counts that keeps best to the regions and
+    limits of poses, and then the one of least effort; with more than three free bundles, other
+    activations are tried where that of least effort breaks a rule, so that some may be missed. At
+    a place out of reach it is the nearest pose found, and where the direction cannot be met that
+    which is least off at the place.
 
     Args:
         arm: The design.

@@ -12,6 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.direction import compromises, direction_errors
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.request import Request
+from softreach.inverse.roots import placed
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.parts import LIMIT_UNITS, TOL, Goals, Keep
@@ -281,6 +282,7 @@ def _pointed(rules: PoseRules, prepared: PreparedMap, goals: Goals) -> Posed:
         with no_warnings():
             known = _owned(solve_inverse(prepared, goals.places[left], from_rest=True))
         owner, start = map(np.append, known, (np.arange(len(left)), posed.poses[left]), (0, 0))
+        start = np.where(np.isfinite(start), start, rules.rod.box.low)
         _put(posed, left, _at_ends(rules, rows(goals, left), owner, start, _PLACE_FIRST))
     return posed
 
@@ -354,7 +356,7 @@ def _ends(
         within=float(goals.within[0]),
     )
     gamma = compromises(rod, request, start).gamma
-    tips = rod.tips(gamma)
+    tips = placed(rod, gamma)
     distance = np.nan_to_num(np.linalg.norm(tips - goals.places, axis=1), nan=np.inf)
     turn = direction_errors(rod, request, np.arange(len(gamma)), gamma)
     return Nearest(gamma, tips, distance), np.nan_to_num(turn, nan=np.pi)
