@@ -280,8 +280,9 @@ def _pointed(rules: PoseRules, prepared: PreparedMap, goals: Goals) -> Posed:
     reached = goals.reached(posed.gaps, posed.direction_errors, rules.arm.length)
     if len(left := np.flatnonzero(~reached)):
         with no_warnings():
-            known = _owned(solve_inverse(prepared, goals.places[left], from_rest=True))
-        owner, start = map(np.append, known, (np.arange(len(left)), posed.poses[left]), (0, 0))
+            owner, known = _owned(solve_inverse(prepared, goals.places[left], from_rest=True))
+        owner = np.concatenate([owner, np.arange(len(left))])
+        start = np.concatenate([known, posed.poses[left]])
         start = np.where(np.isfinite(start), start, rules.rod.box.low)
         _put(posed, left, _at_ends(rules, rows(goals, left), owner, start, _PLACE_FIRST))
     return posed
