@@ -67,8 +67,8 @@ def test_no_bundle_brings_the_nearest_tip_nearer_to_a_target_out_of_reach(design
 
 @pytest.mark.parametrize("weight", [0.7, 3.0])
 @pytest.mark.parametrize("cone", [0.0, 0.4])
-@pytest.mark.parametrize("pull", [0.0, 1e-2])
-def test_the_gradient_of_a_pose_is_its_derivative(weight, cone, pull):
+@pytest.mark.parametrize(("pull", "within"), [(0.0, 0.0), (1e-2, 0.0), (0.0, 1.6)])
+def test_the_gradient_of_a_pose_is_its_derivative(weight, cone, pull, within):
     # Directions and Jacobians have steps of their own; the finer they are, the nearer they agree.
     rod, rng = as_tip_map(designs.redundant_trunk(), tol=1e-10), np.random.default_rng(2)
     gamma = in_box(rod.arm, 9)
@@ -77,6 +77,7 @@ def test_the_gradient_of_a_pose_is_its_derivative(weight, cone, pull):
     request = Request(
         targets=rng.normal(size=(9, 3)), residual=1e-10, reach_tol=1e-6, direction_weight=weight,
         near=in_box(rod.arm, 9, seed=5), direction=direction, cone=cone,
+        within=within,
     )  # fmt: skip
     which = np.array([3, 3, 0, 8, 1, 2, 7, 5, 4])
     expected = differences(lambda x: pose_model(rod, request, pull, which, x)[0], gamma)

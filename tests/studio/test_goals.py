@@ -66,6 +66,15 @@ def test_a_place_is_a_ball_where_it_is_reached_and_a_cross_with_its_gap_where_it
     assert drawn(session, "/needs/missed") is None
 
 
+def test_a_place_that_is_reached_the_wrong_way_shows_the_angle(session):
+    needs = Requirements(targets=(Target(REACHED, direction=(0, 0, -1), name="drill"),))
+    goals.read_needs(session, "needs.toml", needs.to_toml().encode())
+    session.settle()
+    angle = np.degrees(session.found.check.direction_errors[0, 0])
+    assert f"drill</b>: {angle:.4g}° off the direction" in verdict(session)
+    assert drawn(session, "/label 0").text == f"{angle:.3g}°"
+
+
 def test_a_place_can_be_the_target(session):
     with pytest.raises(sr.InvalidInput, match="tab Move"):
         added(session, "place at the target")

@@ -16,6 +16,7 @@ from softreach.cli.console import as_read, console, fields_of, for_machines
 from softreach.cli.options import UNCHANGED, Changes, Number, Whole, design_from, pairs_in, shown_in
 from softreach.support import progress
 from softreach.support.files.text import read_text
+from softreach.support.rows import to_degrees
 
 _ASKED = Group("Override the file", sort_key=1)
 _EXIT = {"met": 0, "missed": 1, "undecided": 3}  # verdict -> exit code; 2 is that of wrong input
@@ -65,6 +66,7 @@ def check(
 def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
     fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
+    fields["direction_errors"] = to_degrees(result.direction_errors), "deg"
     return {
         **for_machines(fields, result.arm.length),
         "findings": [{**vars(each), "met": each.met} for each in result.findings],

@@ -8,6 +8,7 @@ that meets its goals, next to which steps gain twice as many digits each.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -25,6 +26,7 @@ Model = Callable[[Index, Array], tuple[Array, Array, Array]]
 _MOST_STEPS = 120
 _STEP_TOL = 1e-12  # step at which a search has converged, in ranges
 _VALUE_TOL = 1e-14  # relative increase of a value that is rounding
+_INSIDE = 0.999  # of a distance that is allowed: a search for it comes no nearer than that
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-12, 1e8  # parts of the largest curvature
 _PULLS = (1e-2, 1e-4, 1e-7, 0.0)
 """Falling weights of ½|γ - near|² beside the goals, so that of all poses that of least change is
@@ -40,13 +42,17 @@ class Poses(NamedTuple):
 
 
 def compromises(tip_map: TipMap, request: Request, start: Array) -> Poses:
-    """Local minima of |tip - target|²/L² + w² |q|² from starts (n, m), one for each target."""
-    return _descended(tip_map, request, start, (0.0,))
+    """Local minima of |tip - target|²/L² + w² |q|² from starts (n, m), one for each target.
+
+    From there those with what |tip - target| exceeds `within`, where that is asked for.
+    """
+    ends = _descended(tip_map, replace(request, within=0.0), start, (0.0,))
+    return _descended(tip_map, request, ends.gamma, (0.0,)) if request.within else ends
 
 
 def nearest_poses(tip_map: TipMap, request: Request, start: Array) -> Poses:
     """Poses that meet their goals with little change from `near`, from starts (n, m)."""
-    return _descended(tip_map, request, start, _PULLS)
+    return _descended(tip_map, replace(request, within=0.0), start, _PULLS)
 
 
 def direction_errors(tip_map: TipMap, request: Request, target: Index, gamma: Array) -> Array:
@@ -65,6 +71,9 @@ def goal_rows(
     assert request.direction is not None
     motions, wanted = tip_map.tip_motions(gamma), request.direction[which]
     away = (motions.tips - request.targets[which]) / tip_map.length
+    moves = motions.slopes / tip_map.length
+    if request.within:
+        away, moves = _beyond(away, moves, _INSIDE * request.within / tip_map.length)
     angle, axis = _angles(motions.directions, wanted)
     excess = (angle - request.cone).clip(0.0)
     turn = (
@@ -77,9 +86,19 @@ def goal_rows(
     turn *= (excess > 0.0)[:, None, None] if request.cone else 1.0
     weight = request.direction_weight
     rows = np.concatenate([away, weight * excess[:, None] * axis], axis=1)
-    slopes = np.concatenate([motions.slopes / tip_map.length, weight * turn], axis=1)
+    slopes = np.concatenate([moves, weight * turn], axis=1)
     miss = tip_map.length * np.maximum(np.linalg.norm(away, axis=1), excess)
     return rows, slopes, miss
+
+
+def _beyond(away: Array, moves: Array, room: float) -> tuple[Array, Array]:
+    """The parts of vectors (n, 3) that are beyond a ball, and their derivatives, (n, 3, m)."""
+    gap = np.linalg.norm(away, axis=1)
+    axis = away / np.where(gap > 0.0, gap, 1.0)[:, None]
+    share = np.minimum(1.0, room / np.where(gap > 0.0, gap, room))[:, None]
+    along = axis[:, :, None] * np.einsum("ni,nij->nj", axis, moves)[:, None]
+    moved = (1.0 - share)[:, None] * moves + share[:, None] * along
+    return (1.0 - share) * away, moved * (share < 1.0)[:, None]
 
 
 def _angles(directions: Array, wanted: Array) -> tuple[Array, Array]:

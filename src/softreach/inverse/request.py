@@ -37,6 +37,7 @@ class Request:
     direction: Array | None = None  # wanted tip tangents, unit vectors, (t, 3)
     cone: float = 0.0  # angle from `direction` that is allowed [rad]
     direction_weight: float = 0.1  # of an angle [rad] against a distance in L
+    within: float = 0.0  # |tip - target| that does where no pose meets both to `residual` [m]
     family: int = 1  # activations wanted for each target where there are infinitely many
     seed: int = 0  # seed of the random activations that the others stay near to
     from_rest: bool = False  # True for postures that activations lead to from rest, and no others

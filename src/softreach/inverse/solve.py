@@ -75,7 +75,8 @@ def solve_inverse(
             comes no nearer than to within `tol`, its nearest activations are the solutions: whether
             it reaches such a target is more than its tips can say.
         within: |tip - target| at which a target counts as reached [m], if no activation does
-            better; the residual says how near the tip comes.
+            better; the residual says how near the tip comes. It holds for poses with a direction
+            too, of which one within that distance is then searched for.
         near: With more than three free bundles: the activation to stay near to [unit of each],
             shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
             each activation counts in its own range.
@@ -120,6 +121,7 @@ def solve_inverse(
         direction=unit,
         cone=as_number("cone", cone, Range(0.0, np.pi, unit="rad")),
         direction_weight=as_number("direction_weight", direction_weight, _WEIGHTS),
+        within=within,
         family=as_integer("family", family, 1, 10_000),
         seed=as_integer("seed", seed, 0, 2**63),
         from_rest=as_flag("from_rest", from_rest),
@@ -174,6 +176,8 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     left, start = request.targets[missing], best.gamma[missing]
     if request.direction is None:
         start = nearest_tips(tip_map, start, left, request.residual, CLOSELY).gamma
+    elif request.within:
+        start = compromises(tip_map, request.of(missing), start).gamma
     closest = roots_at(tip_map, request.targets, missing, start)
     return _solutions(prepared, request, roots, closest)
 

@@ -37,6 +37,7 @@ def can_polish(problem: Problem) -> bool:
     of_poses = needs.keeps or needs.limits.of_poses
     return (
         not (needs.regions and of_poses)  # what is covered depends on poses at countless places
+        and not needs.goals.directed.any()
         and len(problem.parameters.real) > 0
         and len(needs.places) * max(1, len(needs.payloads)) <= _MOST_POSES
         and all(goal.objective.smooth for goal in problem.goals)

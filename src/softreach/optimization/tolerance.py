@@ -308,8 +308,8 @@ def tolerance(
     Args:
         arm: The design, of three free bundles or more.
         sigmas: Parameter -> standard deviation [SI unit]; normal and independent.
-        requirements: Targets whose places and regions are to be kept, under each payload; limits
-            and regions to keep to are not looked at.
+        requirements: Targets whose places and regions are to be kept, under each payload; limits,
+            directions and regions to keep to are not looked at.
         samples: Samples of the deviations.
         checked: Arms that are made; 0 for none.
         accuracy: Relative error of the volumes.

@@ -40,6 +40,7 @@ _CHECKED = 0.35  # and those of arms at their targets
 _LEAST, _LEAST_OBLIQUE = 1.5, 2.2  # widths of a panel, and of a figure seen obliquely [inch]
 _LETTERS = 14  # of titles an inch
 _POSES = 5  # of places that are apart
+_WAY = 0.08  # L: lines along the directions that are wanted
 _REGIONS = {
     "stay_inside": {"color": (0.25, 0.35, 0.60), "linestyle": "-", "label": "stay inside"},
     "avoid": {"color": (0.75, 0.42, 0.05), "linestyle": "--", "label": "avoid"},
@@ -271,6 +272,10 @@ def _draw_places(panel: Panel, check: Any) -> None:
     load = (~check.reached).sum(axis=1).argmax()  # under which most are missed
     for gap in np.stack([check.places[~met], check.nearest[load, ~met]], axis=1):
         panel.plot(panel.unit.of(gap), color=MISSED, linewidth=1.0, label="gap")
+    goals, reach = check.requirements.goals, _WAY * check.arm.length
+    for place, way in zip(goals.places, goals.directions, strict=True):
+        if np.isfinite(way).all():
+            panel.plot(panel.unit.of([place, place + reach * way]), color="0.2", linewidth=0.8)
     styles = ((met, "o", MET, "reached", 4.5), (~met, "X", MISSED, "missed", 6.0))
     for rows, marks, color, label, size in styles:
         if rows.any():

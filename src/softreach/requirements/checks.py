@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.inverse.request import ANGLE_TOL
 from softreach.requirements.findings import (
     Finding,
     Verdict,
@@ -20,8 +21,8 @@ from softreach.requirements.findings import (
     share_error,
     verdict_of,
 )
-from softreach.requirements.parts import Keep, Target
-from softreach.requirements.poses import TOL, Posed, PoseRules, solved
+from softreach.requirements.parts import TOL, Goals, Keep, Target
+from softreach.requirements.poses import Posed, PoseRules, solved
 from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.kinematics import configuration
@@ -85,6 +86,9 @@ class Check(Reported):
     place)."""
     nearest: Array
     """Tips of these poses [m], shape (payload, place, 3)."""
+    direction_errors: Array
+    """Angles between their directions and those wanted [rad], NaN where any will do, shape
+    (payload, place)."""
 
     @property
     def verdict(self) -> Verdict:
@@ -116,7 +120,8 @@ class Check(Reported):
     @property
     def reached(self) -> Mask:
         """Mask of the places that are met, shape (payload, place)."""
-        return self.gaps <= np.maximum(self.requirements.within, TOL * self.arm.length)
+        goals = self.requirements.goals
+        return goals.reached(self.gaps, self.direction_errors, self.arm.length)
 
     @property
     def regions(self) -> tuple[tuple[str, Region], ...]:
@@ -177,6 +182,7 @@ class Check(Reported):
                 "position": (("place", "axis"), self.places, {"units": "m"}),
                 "target": ("place", np.array(names, dtype=str)),
                 "gap": (at, self.gaps, {"units": "m"}),
+                "direction_error": (at, self.direction_errors, {"units": "rad"}),
                 "reached": (at, self.reached),
                 "pose": ((*at, "input"), self.poses),
                 "nearest": ((*at, "axis"), self.nearest, {"units": "m"}),
@@ -211,10 +217,12 @@ def check(
 ) -> Check:
     """A design against requirements, every one of them judged.
 
-    Places are met by `solve_inverse`. Of all activations that put the tip at a place, the one
-    counts that keeps best to the regions and limits of poses, and then the one of least effort;
-    with more than three free bundles, other activations are tried where that of least effort
-    breaks a rule, so that some may be missed. At a place out of reach it is the nearest pose found.
+    Places and directions are met by `solve_inverse`. Of all activations that put the tip at a
+    place, in the direction that is wanted there, the one counts that keeps best to the regions and
+    limits of poses, and then the one of least effort; with more than three free bundles, other
+    activations are tried where that of least effort breaks a rule, so that some may be missed. At
+    a place out of reach it is the nearest pose found, and where the direction cannot be met that
+    which is least off at the place.
 
     Args:
         arm: The design.
@@ -274,15 +282,15 @@ def checked(
         rules = PoseRules(loaded, keeps, needs.limits.of_poses, 0.1 * accuracy * arm.length)
         every.append(rules)
         if quick:  # with shapes in no more steps than tips
-            rod = as_tip_map(loaded, _ROUGH_TOL)
+            rod = as_tip_map(loaded, TOL if needs.goals.directed.any() else _ROUGH_TOL)
             rules = replace(rules, known_rod=in_steps(loaded, rod.steps, rod))
-        posed.append(solved(rules, needs.places, needs.within, step, quick=quick))
+        posed.append(solved(rules, needs.goals, step, quick=quick))
         for target, region in needs.regions:
             share = float(_covered(rules, target, region.places(count), sets, step).mean())
             error = float(share_error(share, count))
             coverages.append(Coverage(target.name, payload, share, error, count))
     whole = Posed(*(np.stack(each) for each in zip(*posed, strict=True)))
-    made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *whole[:4])
+    made = Check(arm, needs, payloads, (), tuple(coverages), accuracy, *whole[:5])
     findings = (
         *_reach_findings(made, every),
         *_cover_findings(made),
@@ -296,7 +304,7 @@ def checked(
 
 def _covered(rules: PoseRules, target: Target, places: Array, sets: Sets, step: Progress) -> Mask:
     if len(rules):
-        posed = solved(rules, places, np.full(len(places), target.within), step)
+        posed = solved(rules, Goals.of(places, target.within), step)
         near = max(target.within, TOL * rules.arm.length)
         return (posed.gaps <= near) & (posed.excess.sum(axis=1) == 0.0)
     step(len(places))
@@ -320,35 +328,49 @@ def _under(payload: float | None) -> str:
 
 
 def _reach_findings(made: Check, rules: Sequence[PoseRules]) -> Iterator[Finding]:
-    length, unit = made.arm.length, made.arm.length_unit
     for index, target in enumerate(made.requirements.targets):
         if target.places is None:
             continue
         own = made.target_of == index
-        gaps, reached = made.gaps[:, own], made.reached[:, own]
-        load, place = _largest(gaps)
-        met, of = int(reached.all(axis=0).sum()), counted(len(target.points), "place")
-        if reached.all():
-            near = f" to {unit.text(target.within)}" if target.within else ""
-            text = f"{of} reached{near}, effort up to {made.effort[:, own].max():.3g}"
-            yield Finding(target.name, "reach", "met", 0.0, text)
+        if not made.reached[:, own].all():
+            yield _missed(made, rules, target, own)
             continue
-        gap = float(gaps[load, place])
+        near = f" to {made.arm.length_unit.text(target.within)}" if target.within else ""
+        if target.goals.directed[0]:
+            near += f", up to {np.degrees(target.cone):.4g}° off the direction"
+        effort = f"effort up to {made.effort[:, own].max():.3g}"
+        text = f"{counted(len(target.points), 'place')} reached{near}, {effort}"
+        yield Finding(target.name, "reach", "met", 0.0, text)
+
+
+def _missed(made: Check, rules: Sequence[PoseRules], target: Target, own: Mask) -> Finding:
+    """What is missed of a target, by the place at which that is most."""
+    length, unit = made.arm.length, made.arm.length_unit
+    gaps, turns, reached = (x[:, own] for x in (made.gaps, made.direction_errors, made.reached))
+    beyond = np.nan_to_num(turns - target.cone).clip(0.0)
+    load, place = _largest(np.where(reached, -1.0, gaps + length * beyond))
+    gap, point, laden = float(gaps[load, place]), target.points[place], _under(made.payloads[load])
+    far, excess, missed, more = gap > max(target.within, TOL * length), 0.0, [], ""
+    if far:
         excess = max(gap - target.within, TOL * length) / length
-        where = ", ".join(f"{x / unit.size:.4g}" for x in target.points[place])
-        text = f"{met:,} of {of} reached; place {place + 1} at ({where}) {unit.name}"
-        more, laden = "", _under(made.payloads[load])
-        away = float(np.linalg.norm(target.points[place] - made.arm.base.position))
-        if gap > length + away - 1e-9:
-            text += f" is not held{laden}: no stable equilibrium"
-        else:
-            text += f" is missed by {unit.rounded(gap - target.within)}{laden}"
-            pose = made.poses[load, own][place]
-            more = advice(rules[load].arm, target.points[place], pose, unit)
-        pairs = zip(made.payloads, reached, strict=True)
-        if held := [payload for payload, row in pairs if payload is not None and row.all()]:
-            more += f"; all reached with {max(held):.4g} kg"
-        yield Finding(target.name, "reach", "missed", excess, text + more)
+        missed = [f"missed by {unit.rounded(gap - target.within)}"]
+    if beyond[load, place] > ANGLE_TOL:
+        excess += float(beyond[load, place])
+        allowed = f" ({np.degrees(target.cone):.4g}° allowed)" if target.cone else ""
+        missed.append(f"{np.degrees(turns[load, place]):.4g}° off the direction{allowed}")
+    where = ", ".join(f"{x / unit.size:.4g}" for x in point)
+    count = f"{int(reached.all(axis=0).sum()):,} of {counted(len(target.points), 'place')} reached"
+    text = f"{count}; place {place + 1} at ({where}) {unit.name} is "
+    if gap > length + float(np.linalg.norm(point - made.arm.base.position)) - 1e-9:
+        text += f"not held{laden}: no stable equilibrium"
+    else:
+        text += f"{' and '.join(missed)}{laden}"
+        if far:
+            more = advice(rules[load].arm, point, made.poses[load, own][place], unit)
+    pairs = zip(made.payloads, reached, strict=True)
+    if held := [payload for payload, row in pairs if payload is not None and row.all()]:
+        more += f"; all reached with {max(held):.4g} kg"
+    return Finding(target.name, "reach", "missed", excess, text + more)
 
 
 def _cover_findings(made: Check) -> Iterator[Finding]:

@@ -49,8 +49,8 @@ class Finding:
     """"reach", "cover", "stay_inside", "avoid", "limit" or "measure"."""
     verdict: Verdict
     excess: float
-    """0 where it is met; else gaps and distances over L, and limits by their share [-]. Where it is
-    undecided, what is missed if there were no error."""
+    """0 where it is met; else gaps and distances over L, angles beyond cones [rad], and limits by
+    their share [-]. Where it is undecided, what is missed if there were no error."""
     text: str
     """In words, with units."""
 

@@ -2,23 +2,51 @@
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.inverse.request import ANGLE_TOL
 from softreach.requirements.regions import Region
 from softreach.support import arguments
-from softreach.support.arrays import Array, as_points, read_only
+from softreach.support.arrays import Array, Mask, as_directions, as_points, read_only
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.files.text import MEGABYTE
 
 MOST_PLACES = 1_000_000  # Places that all targets may have together
 LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
+TOL = 1e-6  # over L: a place that is reached to the error of the tips is reached
 
 _LENGTH = Range(0.0, unit="m")
 _SHARE = Range(0.0, 1.0, open_low=True)
+_CONE = Range(0.0, np.pi, unit="rad")
 _REGION = "a region: Box, Sphere, HalfSpace or Mesh"
+
+
+class Goals(NamedTuple):
+    """Places to reach, each with the direction that the tip must have there."""
+
+    places: Array  # [m], shape (n, 3)
+    within: Array  # Distance to which each must be reached [m], shape (n,)
+    directions: Array  # Unit vectors, NaN where any direction will do, shape (n, 3)
+    cones: Array  # Angles around these that are allowed [rad], shape (n,)
+
+    @classmethod
+    def of(cls, places: Array, within: float) -> Self:
+        """Places that any direction of the tip will do for."""
+        n = len(places)
+        return cls(places, np.full(n, within), np.full((n, 3), np.nan), np.full(n, np.pi))
+
+    @property
+    def directed(self) -> Mask:
+        """Mask of those with a direction, shape (n,)."""
+        return self.cones < np.pi
+
+    def reached(self, gaps: Array, direction_errors: Array, length: float) -> Mask:
+        """Mask of distances [m] and angles [rad] that do for an arm of a length L [m]; (..., n)."""
+        near = gaps <= np.maximum(self.within, TOL * length)
+        return near & ~(direction_errors > self.cones + ANGLE_TOL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +66,11 @@ class Target:
     """Share of the region that must be reached [-]."""
     within: float = 0.0
     """Distance to which the tip must come to a place [m]; 0 for the error of the tips."""
+    direction: ArrayLike | None = None
+    """Direction of the tip's tangent d3 at the places, in the world and of any length, shape (3,)
+    for all of them or (n, 3); None if any will do."""
+    cone: float = 0.0
+    """Angle from it that is allowed [rad]; with π any direction will do."""
     name: str = ""
     """Name in results."""
 
@@ -58,11 +91,30 @@ class Target:
             raise InvalidInput("share", self.share, "left out where there is no region")
         object.__setattr__(self, "within", arguments.as_number("within", self.within, _LENGTH))
         arguments.as_text("name", self.name)
+        object.__setattr__(self, "cone", arguments.as_number("cone", self.cone, _CONE))
+        if self.direction is None and self.cone:
+            raise InvalidInput("cone", self.cone, "left out where there is no direction")
+        if self.direction is not None:
+            if self.region is not None:
+                allowed = "left out where there is a region"
+                raise InvalidInput("direction", arguments.as_given(self.direction), allowed)
+            as_directions("direction", self.direction, len(self.points))
+            object.__setattr__(self, "direction", read_only(np.array(self.direction, float)))
 
     @property
     def points(self) -> Array:
         """The places [m], shape (n, 3); none where there is a region."""
         return np.empty((0, 3)) if self.places is None else np.asarray(self.places)
+
+    @property
+    def goals(self) -> Goals:
+        """The places with what is asked for there."""
+        goals = Goals.of(self.points, self.within)
+        if self.direction is None or self.cone == np.pi:
+            return goals
+        count = len(self.points)
+        ways = as_directions("direction", self.direction, count)
+        return goals._replace(directions=ways, cones=np.full(count, self.cone))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,18 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.prepared import prepared_map
+from softreach.inverse.direction import compromises, direction_errors
+from softreach.inverse.prepared import PreparedMap, prepared_map
+from softreach.inverse.request import Request
+from softreach.inverse.roots import placed
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
-from softreach.requirements.parts import LIMIT_UNITS, Keep
+from softreach.requirements.parts import LIMIT_UNITS, TOL, Goals, Keep
 from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import bending_over_bounds, bending_stations, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
@@ -24,13 +26,14 @@ from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows
 from softreach.support.errors import no_warnings
 from softreach.support.progress import Progress
-from softreach.workspace.search import nearest_tips
+from softreach.workspace.search import Nearest, nearest_tips
 
-TOL = 1e-6  # over L: a place that is reached to the error of the tips is reached
 _PLACES = 32_768  # places at once: bounds the memory
 _FAMILY = 32  # activations tried for a place of an arm with more than three free bundles
 _MOST_TRIED = 4_096  # places for which they are
 _SAME = 1e-4  # of the ranges, by which poses are told apart
+_WEIGHT = 0.1  # of an angle [rad] against a distance in L, where not both can be met
+_PLACE_FIRST = 1e-5  # weight with which the tip is at the place but for some 1e-10 L
 _SEEDS, _NEIGHBORS = 256, 5
 """Samples that quick descents start from, and how many of them for each place."""
 _CELLS = 16  # along each axis of three bundles: as many solutions as with 32, in half the time
@@ -224,50 +227,85 @@ class Posed(NamedTuple):
     poses: Array
     effort: Array
     nearest: Array
+    direction_errors: Array
     value: Array
     excess: Array
     error: Array
 
 
-def solved(
-    rules: PoseRules, places: Array, within: Array, step: Progress, *, quick: bool = False
-) -> Posed:
-    """The poses at places, each with the distance to which it must be reached; in blocks.
+def solved(rules: PoseRules, goals: Goals, step: Progress, *, quick: bool = False) -> Posed:
+    """The poses at places, in blocks of those that are asked for in the same way.
 
     From all solutions of the inverse, or `quick` ones from a few descents.
     """
-    posed: list[Posed] = []
-    for block in parallel.blocks(len(places), _PLACES):
-        choose = partial(_descended, within=within[block]) if quick else _chosen
-        posed.append(choose(rules, places[block]))
-        step(len(places[block]))
-    return joined(posed or [_without_equilibrium(rules, places)])
+    choose, posed = _descended if quick else _chosen, list[Posed]()
+    for block in parallel.blocks(len(goals.places), _PLACES):
+        own = rows(goals, block)
+        asked = np.column_stack([own.cones, np.where(own.directed, own.within, 0.0)])
+        kind = np.unique(asked, axis=0, return_inverse=True)[1].ravel()
+        groups = [np.flatnonzero(kind == k) for k in range(kind.max() + 1)]
+        each = joined([choose(rules, rows(own, group)) for group in groups])
+        posed.append(rows(each, np.argsort(np.concatenate(groups))))
+        posed[-1].direction_errors[~own.directed] = np.nan
+        step(len(own.places))
+    return joined(posed or [_without_equilibrium(rules, goals.places)])
 
 
-def _chosen(rules: PoseRules, places: Array) -> Posed:
+def _chosen(rules: PoseRules, goals: Goals) -> Posed:
     try:
         with no_warnings():
             prepared = prepared_map(rules.arm, TOL, cells=_CELLS)
-            solutions = solve_inverse(prepared, places, from_rest=True)
+            solutions = _solutions(prepared, goals, from_rest=True)
     except InvalidLoads:
-        return _without_equilibrium(rules, places)
+        return _without_equilibrium(rules, goals.places)
     best, reached = _best(rules, solutions), solutions.statuses == Status.REACHED
     breaks = np.flatnonzero((best.excess.sum(axis=1) > 0.0) & reached)
     if rules.rod.box.dimension > 3 and 0 < len(breaks) <= _MOST_TRIED:
         with no_warnings():
-            family = solve_inverse(prepared, places[breaks], family=_FAMILY)
-        for every, own in zip(best, _best(rules, family), strict=True):
-            every[breaks] = own
+            family = _solutions(prepared, rows(goals, breaks), family=_FAMILY)
+        _put(best, breaks, _best(rules, family))
     # A place that is reached to the error of the tips is reached.
-    best.gaps[reached] = np.minimum(best.gaps[reached], TOL * rules.arm.length)
+    enough = TOL * rules.arm.length
+    enough = np.where(goals.directed, np.maximum(goals.within, enough), enough)
+    best.gaps[reached] = np.minimum(best.gaps, enough)[reached]
+    missed = np.flatnonzero(goals.directed & ~reached)
+    if len(missed):
+        _put(best, missed, _pointed(rules, prepared, rows(goals, missed)))
     return best
 
 
-def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
+def _pointed(rules: PoseRules, prepared: PreparedMap, goals: Goals) -> Posed:
+    """Poses from more searches, and where these do not do, those at the place that turn least."""
+    posed = _descended(rules, goals)
+    reached = goals.reached(posed.gaps, posed.direction_errors, rules.arm.length)
+    if len(left := np.flatnonzero(~reached)):
+        with no_warnings():
+            owner, known = _owned(solve_inverse(prepared, goals.places[left], from_rest=True))
+        owner = np.concatenate([owner, np.arange(len(left))])
+        start = np.concatenate([known, posed.poses[left]])
+        start = np.where(np.isfinite(start), start, rules.rod.box.low)
+        _put(posed, left, _at_ends(rules, rows(goals, left), owner, start, _PLACE_FIRST))
+    return posed
+
+
+def _solutions(prepared: PreparedMap, goals: Goals, **options: Any) -> Solutions:
+    """Solutions at places with the same cone and the same distance to which they are reached."""
+    if goals.directed.any():
+        options = {"cone": goals.cones[0], "within": goals.within[0], **options}
+        options["direction"] = goals.directions
+    return solve_inverse(prepared, goals.places, **options)
+
+
+def _put(posed: Posed, chosen: Index, others: Posed) -> None:
+    for every, own in zip(posed, others, strict=True):
+        every[chosen] = own
+
+
+def _descended(rules: PoseRules, goals: Goals) -> Posed:
     """Poses at the ends of descents from the samples whose tips are nearest to each place."""
     from scipy.spatial import KDTree
 
-    rod = rules.rod
+    rod, places = rules.rod, goals.places
     gamma = rod.box.from_cube(sample_cube("sobol", _SEEDS, rod.box.bundles))
     gamma = np.concatenate([gamma, some_corners(rod)])
     tips = rod.tips(gamma)
@@ -276,33 +314,81 @@ def _descended(rules: PoseRules, places: Array, within: Array) -> Posed:
         return _without_equilibrium(rules, places)
     neighbors = range(1, 1 + min(_NEIGHBORS, int(known.sum())))
     near = KDTree(tips[known]).query(places, neighbors)[1]  # pyright: ignore[reportArgumentType]
-    owner, enough = np.repeat(np.arange(len(places)), len(neighbors)), TOL * rod.length
-    ends = nearest_tips(rod, gamma[known][near.ravel()], places[owner], enough)
-    least = np.full(len(places), np.inf)
-    np.minimum.at(least, owner, ends.distance)
+    owner = np.repeat(np.arange(len(places)), len(neighbors))
+    return _at_ends(rules, goals, owner, gamma[known][near.ravel()])
+
+
+def _at_ends(
+    rules: PoseRules, goals: Goals, owner: Index, start: Array, weight: float = _WEIGHT
+) -> Posed:
+    """Of each place the best pose at the ends of descents from the starts (n, inputs) it owns."""
+    rod, enough = rules.rod, TOL * rules.rod.length
+    ends, turn = _ends(rod, rows(goals, owner), start, enough, weight)
     # Local minima that are farther away than another are no poses at the place.
-    wanted = np.maximum(np.maximum(within, enough)[owner], least[owner] * (1.0 + 1e-9))
-    kept = np.flatnonzero(ends.distance <= wanted)
+    near = np.maximum(goals.within, enough)[owner]
+    off = ends.distance
+    if goals.directed.any():
+        beyond = weight * rod.length * (turn - goals.cones[owner]).clip(0.0)
+        off, near = (off - near).clip(0.0) + beyond, weight * enough
+    least = np.full(len(goals.places), np.inf)
+    np.minimum.at(least, owner, off)
+    kept = np.flatnonzero(off <= np.maximum(near, least[owner] * (1.0 + 1e-9)))
     # Most descents to a place end in one pose.
     same = np.column_stack([owner[kept], np.rint(rod.box.to_cube(ends.gamma[kept]) / _SAME)])
     kept = kept[np.unique(same, axis=0, return_index=True)[1]]
-    parts = (ends.gamma, ends.distance, ends.tips)
-    return _ranked(rules, places, owner[kept], *(part[kept] for part in parts))
+    parts = (ends.gamma, ends.distance, ends.tips, turn)
+    return _ranked(rules, goals.places, owner[kept], *(part[kept] for part in parts))
+
+
+def _ends(
+    rod: TipMap, goals: Goals, start: Array, enough: float, weight: float
+) -> tuple[Nearest, Array]:
+    """Ends of descents to places, and angles from the directions wanted there [rad]; 0 if none."""
+    if not goals.directed.any():
+        return nearest_tips(rod, start, goals.places, enough), np.zeros(len(start))
+    request = Request(
+        targets=goals.places,
+        residual=enough,
+        reach_tol=enough,
+        near=np.zeros_like(start),
+        direction=goals.directions,
+        cone=float(goals.cones[0]),
+        direction_weight=weight,
+        within=float(goals.within[0]),
+    )
+    gamma = compromises(rod, request, start).gamma
+    tips = placed(rod, gamma)
+    distance = np.nan_to_num(np.linalg.norm(tips - goals.places, axis=1), nan=np.inf)
+    turn = direction_errors(rod, request, np.arange(len(gamma)), gamma)
+    return Nearest(gamma, tips, distance), np.nan_to_num(turn, nan=np.pi)
 
 
 def _best(rules: PoseRules, solutions: Solutions) -> Posed:
     """Of each target the solution that breaks the rules least, then that of least effort."""
     missing = np.flatnonzero(solutions.counts == 0)
-    owner = np.concatenate([np.repeat(np.arange(len(solutions)), solutions.counts), missing])
-    gamma = np.concatenate([solutions.activations, solutions.nearest_activations[missing]])
+    owner, gamma = _owned(solutions)
     gaps = np.concatenate([solutions.residuals, solutions.gaps[missing]])
     reached = np.repeat(solutions.targets, solutions.counts, axis=0)
     nearest = np.concatenate([reached, solutions.nearest[missing]])
-    return _ranked(rules, solutions.targets, owner, gamma, gaps, nearest)
+    turn = np.concatenate([solutions.direction_errors, solutions.direction_gaps[missing]])
+    return _ranked(rules, solutions.targets, owner, gamma, gaps, nearest, turn)
+
+
+def _owned(solutions: Solutions) -> tuple[Index, Array]:
+    """Numbers of targets with the inputs that reach them, then of others with the nearest ones."""
+    missing = np.flatnonzero(solutions.counts == 0)
+    owner = np.concatenate([np.repeat(np.arange(len(solutions)), solutions.counts), missing])
+    return owner, np.concatenate([solutions.activations, solutions.nearest_activations[missing]])
 
 
 def _ranked(
-    rules: PoseRules, places: Array, owner: Index, gamma: Array, gaps: Array, nearest: Array
+    rules: PoseRules,
+    places: Array,
+    owner: Index,
+    gamma: Array,
+    gaps: Array,
+    nearest: Array,
+    turn: Array,
 ) -> Posed:
     """Of each place the best of the poses that it owns, one at least."""
     lost = ~np.isfinite(gamma).all(axis=1)
@@ -311,9 +397,10 @@ def _ranked(
     effort = np.linalg.norm(gamma / effort_scales(rules.arm), axis=1)
     order = np.lexsort((effort, judged.excess.sum(axis=1), owner))
     best = order[np.searchsorted(owner[order], np.arange(len(places)))]
-    gaps = np.where(np.isfinite(gaps[best]), gaps[best], _farthest(rules, places))
-    nearest = np.nan_to_num(nearest[best])
-    return Posed(gaps, gamma[best], effort[best], nearest, *rows(judged, best))
+    held = np.isfinite(gaps[best])
+    gaps = np.where(held, gaps[best], _farthest(rules, places))
+    nearest, turn = np.nan_to_num(nearest[best]), np.where(held, turn[best], np.pi)
+    return Posed(gaps, gamma[best], effort[best], nearest, turn, *rows(judged, best))
 
 
 def effort_scales(arm: Manipulator) -> Array:
@@ -326,7 +413,8 @@ def _without_equilibrium(rules: PoseRules, places: Array) -> Posed:
     """Poses of an arm that no activation holds under its loads: its tip is near no place."""
     none = np.zeros((count := len(places), len(rules)))
     gamma, base = (np.tile(x, (count, 1)) for x in (rules.rod.box.low, rules.arm.base.position))
-    return Posed(_farthest(rules, places), gamma, np.zeros(count), base, none, none, none)
+    turn = np.full(count, np.pi)
+    return Posed(_farthest(rules, places), gamma, np.zeros(count), base, turn, none, none, none)
 
 
 def _farthest(rules: PoseRules, places: Array) -> Array:

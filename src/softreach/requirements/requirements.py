@@ -15,10 +15,18 @@ from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
 from softreach.inverse.request import positions_in
-from softreach.requirements.parts import LIMIT_UNITS, LONGEST, MOST_PLACES, Keep, Limits, Target
+from softreach.requirements.parts import (
+    LIMIT_UNITS,
+    LONGEST,
+    MOST_PLACES,
+    Goals,
+    Keep,
+    Limits,
+    Target,
+)
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
-from softreach.support.arrays import Array, as_floats
+from softreach.support.arrays import Array, as_floats, joined
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.files import toml
 from softreach.support.files.text import read_text, write_text
@@ -27,7 +35,7 @@ from softreach.support.units import read_length
 
 _KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
 """At the top, beside payloads; `search` is read by the search of designs."""
-_EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa"}
+_EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa", "rad": "5deg"}
 """SI unit of numbers that have one -> how such a number may be written."""
 _SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
     "box": (Box, {"low": "m", "high": "m"}),
@@ -36,7 +44,9 @@ _SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
     "mesh": (Mesh, {"vertices": "m", "faces": ""}),
 }
 """Regions, with their numbers and the units of these."""
-_LISTS = {"payloads", "places", *(n for _, own in _SHAPES.values() for n in own)} - {"radius"}
+_LISTS = {"payloads", "places", "direction", *(n for _, own in _SHAPES.values() for n in own)} - {
+    "radius"
+}
 _BALL = {"region": Sphere((0.0, 0.0, 0.0), 1.0)}
 _INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}
 """In place of faulty parts, so that the others can be judged."""
@@ -85,13 +95,17 @@ class Requirements:
     @property
     def places(self) -> Array:
         """Places of all targets that have some, one after the other [m], shape (n, 3)."""
-        return np.concatenate([np.empty((0, 3)), *(target.points for target in self.targets)])
+        return self.goals.places
 
     @property
     def within(self) -> Array:
         """Distance to which each of these must be reached [m], shape (n,)."""
-        each = (np.full(len(target.points), target.within) for target in self.targets)
-        return np.concatenate([np.empty(0), *each])
+        return self.goals.within
+
+    @property
+    def goals(self) -> Goals:
+        """These places with what is asked for there."""
+        return joined([Goals.of(np.empty((0, 3)), 0.0), *(each.goals for each in self.targets)])
 
     @property
     def regions(self) -> tuple[tuple[Target, Region], ...]:
@@ -172,7 +186,9 @@ class Requirements:
                 lines += ["places_m = [", *rows, "]"]
             elif target.region is not None:
                 lines += [_region_line(target.region), *_lines({"share": target.share})]
-            blocks.append(lines + _lines({"within_m": target.within or None}))
+            way = None if target.direction is None else np.asarray(target.direction).tolist()
+            words = {"within_m": target.within, "direction": way, "cone_rad": target.cone}
+            blocks.append(lines + _lines({key: word or None for key, word in words.items()}))
         for keep in sorted(self.keeps, key=lambda keep: not keep.inside):
             words = {"of": keep.of, "when": keep.when, "clearance_m": keep.clearance or None}
             start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
@@ -285,7 +301,7 @@ class _Reader(toml.FaultReader):
         }
 
     def _target(self, raw: dict[str, Any], path: str) -> Any:
-        numbers = {"within": "m", "share": "", "places": "m"}
+        numbers = {"within": "m", "share": "", "places": "m", "direction": "", "cone": "rad"}
         values = self._part(raw, path, numbers, ("name", "file"))
         file = values.pop("file", None)
         count = sum(x is not None for x in (values.get("places"), file, values.get("region")))
@@ -368,8 +384,12 @@ class _Reader(toml.FaultReader):
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `WRONG` and a fault where it refuses them."""
-        right = {name: value for name, value in values.items() if value is not toml.WRONG}
-        wrong = values.keys() - right.keys()
+        wrong = {name for name, value in values.items() if value is toml.WRONG}
+        # Of directions nothing can be said without their places.
+        lost = wrong | (
+            {"direction", "cone"} if wrong & {"region", "places", "direction"} else set()
+        )
+        right = {name: value for name, value in values.items() if name not in lost}
         if wrong and kind not in _INSTEAD:
             return toml.WRONG
         if wrong & {"region", "places"}:

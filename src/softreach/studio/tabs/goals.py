@@ -16,6 +16,7 @@ from softreach.calibration.measurements import read_measurements, read_table
 from softreach.calibration.model import MarkerModel
 from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target, check
 from softreach.requirements.checks import checked
+from softreach.requirements.parts import TOL
 from softreach.studio import markup
 from softreach.studio.fields import GRAY, Attribute, Fields, file_text
 from softreach.studio.found import Bench, Found, Sample
@@ -116,6 +117,8 @@ def _reach_text(check: Check, finding: Finding) -> str:
         return "reached"
     gap = check.arm.length_unit.rounded(finding.excess * check.arm.length, digits=".3g")
     why = "not held: no stable equilibrium" if "not held" in worst else f"missed by {gap}"
+    if "off the direction" in worst:
+        why = worst.partition(" is ")[2].partition(";")[0]
     return why if count.startswith("0 of 1 ") else f"{count}, {why}"
 
 
@@ -373,7 +376,8 @@ def _draw_needs(given: Given) -> None:
 def _draw_places(check: Check, scene: Scene) -> None:
     length, rows = check.arm.length, np.arange(len(check.places))
     places, met = check.places / length, check.reached.all(axis=0)
-    worst = check.gaps.argmax(axis=0)  # of the payloads
+    turned = np.nan_to_num(check.direction_errors)
+    worst = (check.gaps + length * turned).argmax(axis=0)  # of the payloads
     gaps, nearest = check.gaps[worst, rows], check.nearest[worst, rows] / length
     scene.dots("/needs/reached", places[met], VERDICTS["met"], _BALL)
     missed = np.flatnonzero(~met)
@@ -384,6 +388,8 @@ def _draw_places(check: Check, scene: Scene) -> None:
     scene.lines("/needs/gaps", ways, VERDICTS["missed"], _FINE)
     for k in missed[:_MOST_LABELS]:
         text = check.arm.length_unit.rounded(float(gaps[k]), digits=".3g")
+        if gaps[k] <= max(check.requirements.within[k], TOL * length):
+            text = f"{np.degrees(turned[worst[k], k]):.3g}°"
         add_label(scene.api, f"/needs/label {k}", text, places[k] + [0.0, 0.0, 2.0 * _CROSS])
 
 
