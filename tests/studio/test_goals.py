@@ -72,7 +72,7 @@ def test_a_place_that_is_reached_the_wrong_way_shows_the_angle(session):
     session.settle()
     angle = np.degrees(session.found.check.direction_errors[0, 0])
     assert f"drill</b>: {angle:.4g}° off the direction" in verdict(session)
-    assert drawn(session, "/label 0").text == f"{angle:.3g}°"
+    assert drawn(session, "/needs/label 0").text == f"{angle:.3g}°"
 
 
 def test_a_place_can_be_the_target(session):
