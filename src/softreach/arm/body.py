@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,7 @@ from softreach.arm.part import Part, Samples, faults_under, gathered, kind_fault
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section, Stiffness, name_faults
 from softreach.arm.stations import Located, RigidPiece, Stations, placed
-from softreach.support.arrays import Array, as_stations, read_only
+from softreach.support.arrays import Array, as_stations, joined, read_only, rows
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
@@ -93,6 +93,14 @@ class RestStrains(UnseenActuator):
     @property
     def breaks(self) -> tuple[float, ...]:
         return self.shape.breaks
+
+
+class Disks(NamedTuple):
+    """Thin disks that hold tendons, (disk,) each."""
+
+    station: Array  # Z [m]
+    radius: Array  # [m]
+    tendons: Array  # How far from the axis the tendons that they hold are [m]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -250,7 +258,21 @@ class Body:
             outer_ratio=np.concatenate([nothing, *(part.outer_ratio for part in each)], axis=1),
             shape=tuple(shape for part in each for shape in part.shape),
             acts=np.concatenate([nothing.astype(bool), *(part.acts for part in each)], axis=1),
+            disk_ratio=np.concatenate([nothing, *(part.held_ratio for part in each)], axis=1),
         )
+
+    @lazy
+    def disks(self) -> Disks:
+        """Those that hold tendons, at ascending Z."""
+        parts = [Disks(*np.empty((3, 0)))]
+        for each in self.actuators:
+            if not len(z := np.array(each.disk_stations(self.profile))):
+                continue
+            outline, radius = each.outline(self.profile, self.section, z), self.profile.radius(z)
+            ratios = outline.held_ratio, outline.outer_ratio
+            parts.append(Disks(z, *(radius * ratio.max(axis=1) for ratio in ratios)))
+        every = joined(parts)
+        return rows(every, np.argsort(every.station, kind="stable"))
 
 
 def behind(owner: str, faults: Iterable[Fault]) -> list[Fault]:
@@ -267,7 +289,7 @@ def _far_faults(actuator: Actuator, profile: Profile) -> Iterator[Fault]:
     """Distances and radii beyond the length of the arm: millimeters taken for meters."""
     radius = float(np.max(profile.radius(np.linspace(0.0, profile.length, 65))))
     allowed = f"must be at most the length of the arm, {profile.length:g} m"
-    for name in ("distance", "distance_ratio", "radius", "radius_ratio"):
+    for name in ("distance", "distance_ratio", "radius", "radius_ratio", "disk_radius"):
         value: Any = getattr(actuator, name, None)
         values: Any = getattr(value, "values", value)
         scale = radius if name.endswith("ratio") else 1.0

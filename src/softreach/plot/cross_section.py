@@ -98,7 +98,7 @@ def plot_cross_section(
 def section_reach(arm: Manipulator, z: float) -> float:
     """Distance from the axis of the surface at Z, or of what lies farther outside [m]."""
     outline = arm.outline(z)
-    widest = np.max(outline.outer_ratio[outline.acts], initial=1.0)
+    widest = np.max(outline.held_ratio[outline.acts], initial=1.0)
     return float(arm.profile.radius(z)) * float(widest)
 
 
@@ -195,6 +195,7 @@ class _Placed:
     extent: float  # angular [rad]
     inner: float  # radius in the unit of the axes
     outer: float  # radius in the unit of the axes
+    held: float  # radius of the disks that hold it
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -247,7 +248,7 @@ class _Placed:
 
 def _placed(arm: Manipulator, z: float, outer: float, bundles: Collection[int]) -> list[_Placed]:
     outline = arm.outline(z)
-    ratios = outline.inner_ratio[0], outline.outer_ratio[0]
+    ratios = outline.inner_ratio[0], outline.outer_ratio[0], outline.held_ratio[0]
     sizes = outline.center[0], outline.extent, *(outer * ratio for ratio in ratios)
     ways = [actuator.fiber_direction for actuator in arm.bundle_actuators]
     return [
@@ -277,7 +278,7 @@ def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
             ax.add_collection(bundle.strokes())
     for bundle in lumens:
         ax.add_patch(Circle(bundle.middle, 0.5 * (bundle.outer - bundle.inner), **bundle.style))
-    for radius in sorted({round(line.outer / outer, 9) for line in lines if line.outer > outer}):
+    for radius in sorted({round(line.held / outer, 9) for line in lines if line.held > outer}):
         disk = {"facecolor": "none", "edgecolor": "0.6", "linewidth": 0.6, "linestyle": ":"}
         ax.add_patch(Circle((0, 0), outer * radius, **disk))
     for bundle in lines:
