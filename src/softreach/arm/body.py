@@ -246,6 +246,16 @@ class Body:
             stiffness = Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
         return stiffness
 
+    @property
+    def half_axes(self) -> tuple[float, float]:
+        """Half axes of sections along the axes of K1 and K2 over R2 [-], as pictures show them.
+
+        Those of an ellipse or a strip of these stiffnesses; what holds more than tendons is round.
+        """
+        aspect = math.sqrt(self.section.bending_ratio)
+        is_plain = {*self.outline(0.0).shape} <= {"line"}
+        return (min(1.0, aspect), min(1.0, 1.0 / aspect)) if is_plain else (1.0, 1.0)
+
     def outline(self, z: ArrayLike) -> Outline:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)

@@ -136,11 +136,17 @@ class _Span(NamedTuple):
 def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
     """The body of an arm in one configuration with so many sides: a closed tube, the last part.
 
-    Before it come disks that stand out of it and hold tendons.
+    Its sections are flat where two bending stiffnesses were measured. Before it come disks that
+    stand out of it and hold tendons.
     """
     line = _drawn_line(arm, shape)
     d1, d2 = line.directors[:, 0], line.directors[:, 1]
-    tube = tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
+    if angle := arm.section.bending_angle:
+        cos, sin = np.cos(angle), np.sin(angle)
+        d1, d2 = cos * d1 + sin * d2, cos * d2 - sin * d1
+    first, second = arm.half_axes
+    radius = arm.profile.radius(line.z)
+    tube = tube_surface(line.position, first * d1, second * d2, radius, sides)
     return joined([*_disk_surfaces(arm, line, sides), tube])
 
 

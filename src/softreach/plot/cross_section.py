@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -47,7 +47,9 @@ def plot_cross_section(
 
     Fibers and muscles fill a sector of their ring; strokes show radial and oblique ones. Where
     sectors overlap, the lower shows in stripes. Tendons are dots, dotted circles the disks that
-    hold those outside of the arm; chambers are round. What does not act at Z is left out.
+    hold those outside of the arm; chambers are round. What does not act at Z is left out. A body
+    with two measured bending stiffnesses, K1 and K2, that holds tendons at most is an ellipse whose
+    widths are as √K2 to √K1, as those of a flat strip are; the wider one is 2 R2.
 
     Args:
         arm: The design, at rest.
@@ -83,7 +85,9 @@ def plot_cross_section(
     half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
     half = float(counted.of(half))
     with styled_axes(ax, _SIZE + room, _SIZE) as ax:
+        known = len(ax.patches)
         _draw_layers(ax, arm.section, outer)
+        _flatten(ax, ax.patches[known:], arm)
         _draw_bundles(ax, placed, outer)
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
         ax.set(xlabel=counted.label("x"), ylabel=counted.label("y"))
@@ -177,6 +181,16 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
         low, high = ring.inner_ratio, ring.outer_ratio
         over = any(low < r.outer_ratio and r.inner_ratio < high for r in section.rings[:k])
         draw(low, high, ring.material, 0.5 if over else 1.0)
+
+
+def _flatten(ax: Axes, layers: Sequence[Patch], arm: Manipulator) -> None:
+    """Make ellipses of layers where two bending stiffnesses were measured."""
+    from matplotlib.transforms import Affine2D
+
+    if arm.half_axes != (1.0, 1.0):
+        flat = Affine2D().scale(*arm.half_axes).rotate(arm.section.bending_angle)
+        for layer in layers:
+            layer.set_transform(flat + ax.transData)
 
 
 def _annulus(low: float, high: float, fill: Any) -> Patch:

@@ -24,9 +24,9 @@ from softreach.arm.driving import extension_range
 from softreach.arm.lines import law_warning, line_strains
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
-from softreach.arm.number import fields_of
+from softreach.arm.number import default_of, fields_of
 from softreach.arm.part import AlongArm
-from softreach.arm.section import Stiffness
+from softreach.arm.section import Measured, Stiffness
 from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, Extreme, bending_over_bounds
 from softreach.rod.rest import Rest, rest
@@ -97,8 +97,8 @@ class DesignSummary:
     def rows(self) -> Rows:
         """Values and SI units by name, angles in degrees; the arm at rest is computed for them."""
         arm, measured = self.arm, self.arm.section.measured
-        given = () if measured is None else fields_of(type(measured)).values()
-        stiffness = zip(("K0", "K1", "K3"), self.stiffness or (), strict=False)
+        given = () if measured is None else fields_of(Measured).items()
+        known = [x.meaning for k, x in given if getattr(measured, k) != default_of(Measured, k)]
         pieces = enumerate(arm.rigid_pieces)
         rows: Rows = {
             "bundles": (arm.bundles, ""),
@@ -116,16 +116,26 @@ class DesignSummary:
             "markers": ([marker.name for marker in arm.markers], ""),
             "extension": (list(self.extension), ""),
             "curvature times L": (list(self.curvature), ""),
-            "measured": ([x.meaning for x in given if getattr(measured, x.field) is not None], ""),
-            **{
-                f"{name} at base and tip": (values.tolist(), "N" if name == "K0" else "N m²")
-                for name, values in stiffness
-            },
+            "measured": (known, ""),
+            **self._stiffness_rows(),
             "mass": (self.mass, "kg"),
             "load number": (self.load_number, ""),
         }
         known = {name: row for name, row in rows.items() if row[0] not in (None, [])}
         return known | load_rows(arm) | _rest_rows(arm)
+
+    def _stiffness_rows(self) -> Rows:
+        """K2 and the axis of K1 only where the section is not round."""
+        if self.stiffness is None:
+            return {}
+        section, (axial, bending, torsion) = self.arm.section, self.stiffness
+        ratio = section.bending_ratio
+        ends = {"K0": (axial, "N"), "K1": (bending, "N m²")}
+        ends |= {} if ratio == 1.0 else {"K2": (ratio * bending, "N m²")}
+        ends |= {"K3": (torsion, "N m²")}
+        rows: Rows = {f"{k} at base and tip": (x.tolist(), unit) for k, (x, unit) in ends.items()}
+        angle = to_degrees(section.bending_angle)
+        return rows if ratio == 1.0 else rows | {"axis of K1 from x": (angle, "deg")}
 
     def _bundle_rows(self) -> Rows:
         """Bounds and effects of each activation; neighbors that are equal share a line."""
