@@ -322,7 +322,7 @@ def flat(kind=sr.Tendon, angle=0.0, turn=0.0, bending=(0.02, 0.06), **own) -> sr
     pair = {"bending_stiffness": bending, "angle": angle}
     measured = Measured(axial_stiffness=1e5, torsion_stiffness=0.03, **pair)
     tendons = kind(name="pull", offset=0.4 + turn, **given)
-    return tube(sr.Material(), measured=measured, actuators=(tendons,))
+    return tube(sr.Material(density=1100.0), measured=measured, actuators=(tendons,))
 
 
 PULLED = np.random.default_rng(3).uniform(0.1, 1.0, (4, 3))
@@ -370,6 +370,9 @@ def test_the_axes_of_a_strip_stand_in_files_and_summaries_and_are_a_parameter():
     assert re.search(r"K2 at base and tip +0.06, 0.06 N m²\n", summary)
     assert re.search(r"axis of K1 from x +30 deg", summary)
     assert not re.search(r"K2|axis of K1", str(sr.describe(flat(bending=0.02))))
+    assert "at rest" not in summary  # under loads it is not known
+    swapped = flat(angle=np.radians(120.0), bending=(0.06, 0.02))
+    assert load_number(swapped) == pytest.approx(load_number(arm), rel=1e-12)
     assert changed(arm, {"measured.angle": 0.0}) == flat()
     with pytest.raises(InvalidDesign, match=r"angle = 0\.3: must be 0 unless bending_stiffness is"):
         flat(angle=0.3, bending=0.02)

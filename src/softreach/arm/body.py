@@ -342,7 +342,7 @@ def mass(arm: Body) -> float:
 
 
 def load_number(arm: Body) -> float:
-    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-], theory (79).
+    """Λ = (w + P/L) L³/(4 K1), with the lesser bending stiffness at the base [-], theory (79).
 
     Without loads, w is the weight per length at the base under g = 9.81 m/s², and P is 0: Λ is
     ρ g L³/(E R2²) for a solid arm of one material, and an upright cylinder buckles under its own
@@ -357,6 +357,7 @@ def load_number(arm: Body) -> float:
         raise InvalidDesign(faults)
     per_length, force = (arm.loads or Loads()).sizes(arm.section, arm.profile)
     stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
+    stiffness = min(1.0, arm.section.bending_ratio) * stiffness
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
 
 

@@ -98,7 +98,7 @@ class DesignSummary:
         """Values and SI units by name, angles in degrees; the arm at rest is computed for them."""
         arm, measured = self.arm, self.arm.section.measured
         given = () if measured is None else fields_of(Measured).items()
-        known = [x.meaning for k, x in given if getattr(measured, k) != default_of(Measured, k)]
+        found = [x.meaning for k, x in given if getattr(measured, k) != default_of(Measured, k)]
         pieces = enumerate(arm.rigid_pieces)
         rows: Rows = {
             "bundles": (arm.bundles, ""),
@@ -116,7 +116,7 @@ class DesignSummary:
             "markers": ([marker.name for marker in arm.markers], ""),
             "extension": (list(self.extension), ""),
             "curvature times L": (list(self.curvature), ""),
-            "measured": (known, ""),
+            "measured": (found, ""),
             **self._stiffness_rows(),
             "mass": (self.mass, "kg"),
             "load number": (self.load_number, ""),
@@ -345,9 +345,9 @@ def _rest_rows(arm: Manipulator) -> Rows:
     """Sag and stability of the arm without activation.
 
     Without loads: the sag under its own weight of an arm held sideways, and whether it would stand
-    upright; nothing where moduli or densities are not known.
+    upright; nothing where moduli or densities are not known, or loads can't act.
     """
-    if load_number_faults(arm):
+    if load_number_faults(arm) or arm.section.load_faults():
         return {}
     sideways, upright = " sideways", " upright"
     if arm.loads is not None:
