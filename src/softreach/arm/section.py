@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.number import as_numbers, is_path_name, number
+from softreach.arm.number import is_path_name, number
 from softreach.arm.part import AlongArm, Part, values_along
 from softreach.support.arguments import as_text
 from softreach.support.arrays import Array
@@ -177,13 +177,6 @@ class Measured(Part):
         bending = self.bending_stiffness
         first = bending[0] if isinstance(bending, tuple) else bending
         return self.axial_stiffness, first, self.torsion_stiffness
-
-    def _faults(self) -> list[Fault]:
-        faults = super()._faults()
-        if not faults and self.angle and as_numbers(self.bending_stiffness).shape != (2,):
-            allowed = "must be 0 unless bending_stiffness is a pair: it turns the axes of K1 and K2"
-            faults.append(Fault("angle", self.angle, allowed))
-        return faults
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -231,7 +231,8 @@ def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
     of_theory = (*_beyond_theory(arm), *filter(None, [law_warning(arm)]))
-    return (*scale_warnings(arm), *_overlaps(arm), *_chambers_outside(arm), *of_theory)
+    of_section = (*_overlaps(arm), *_chambers_outside(arm), *_angle_of_a_round_section(arm))
+    return (*scale_warnings(arm), *of_section, *of_theory)
 
 
 def _bending(arm: Manipulator) -> BendingRange:
@@ -297,6 +298,12 @@ def _chambers_outside(arm: Manipulator) -> Iterator[str]:
                 f"{name} reaches out to {outer:.3g} R2 at Z = {place / arm.length:.2f} L: "
                 "the arm does not enclose its lumen there"
             )
+
+
+def _angle_of_a_round_section(arm: Manipulator) -> Iterator[str]:
+    section = arm.section
+    if section.measured and section.measured.angle and section.bending_ratio == 1.0:
+        yield "measured.angle turns nothing: give bending_stiffness two numbers, K1 and K2"
 
 
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
