@@ -141,6 +141,22 @@ def test_the_body_is_closed_and_keeps_its_volume_at_rest(trunk):
     assert mesh.volume == pytest.approx(frustum, rel=1e-4)
 
 
+@pytest.mark.parametrize(("distance", "disk_radius"), [(0.01, None), (0.01, 0.02), (0.0005, None)])
+def test_disks_stand_at_guides_where_they_are_wider_than_the_body(distance, disk_radius):
+    robot = sr.designs.three_tendon_robot()
+    own = {"distance": distance, "disk_radius": disk_radius}
+    held = robot.replace(actuators=(robot.actuators[0].replace(guides=4, **own),))
+    bent = sr.configuration(held, 0.5 * held.bounds[:, 1])
+    mesh, body = (mesh_of(arm_surface(arm, bent, sides=400)) for arm in (held, robot))
+    assert mesh.is_watertight
+    radius = disk_radius or distance
+    outside = radius > held.profile.radius(0.0)
+    disks = outside * 4 * np.pi * radius**2 * held.length / 150
+    assert mesh.volume - body.volume == pytest.approx(disks, rel=1e-3)
+    farthest = np.linalg.norm(mesh.vertices[:, None] - bent.position.values, axis=2).min(axis=1)
+    assert farthest.max() == pytest.approx(max(radius, held.profile.radius(0.0)), rel=0.05)
+
+
 def test_bands_are_closed_skins_of_their_thickness(trunk, bent):
     for skin in bundle_surfaces(trunk, rest_configuration(trunk)):
         mesh = mesh_of(skin)

@@ -216,7 +216,7 @@ def test_an_unknown_parameter_costs_one_line_with_the_closest_one(trunk, name, m
 def nudged(name: str, value: float) -> float:
     """Another value near one that an arm has, at which it can still exist."""
     if math.isnan(value):
-        return 0.1 if "angle" in name or "distance" in name else 1000.0
+        return 0.1 if any(each in name for each in ("angle", "distance", "disk")) else 1000.0
     if name.endswith(("bundles", "guides")):
         return value + 1
     below = name.endswith(("end_over_length", ".end", "inner_ratio", "bore_ratio", "poisson_ratio"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy.integrate import quad
 
 import softreach as sr
 from softreach.arm import (
+    LengthTendon,
     LinearTaper,
     Manipulator,
     Material,
@@ -25,6 +27,7 @@ from softreach.arm import (
     Tendon,
 )
 from softreach.arm.body import load_number, mass
+from softreach.arm.lines import pull_error
 from softreach.arm.loads import GRAVITY
 from softreach.arm.parameters import changed
 from softreach.arm.tables import compliance, tables
@@ -310,6 +313,88 @@ def test_a_flat_strip_bends_about_each_axis_by_the_stiffness_about_it():
     assert sr.Manipulator.from_toml(made.to_toml()) == made
     with pytest.raises(InvalidDesign, match=r"\(0.04, 0.4\): must be one number where loads act"):
         strip((first, second), sr.Loads(gravity=(0.0, 0.0, 0.0)))
+
+
+def flat(kind=sr.Tendon, angle=0.0, turn=0.0, bending=(0.02, 0.06), **own) -> sr.Manipulator:
+    """A flat strip with three tendons; both may be turned about the axis."""
+    bounds = (0.0, 4.0) if kind is sr.Tendon else (-0.004, 0.004)
+    given = {"bundles": 3, "distance": 0.02, "activation_bounds": bounds} | own
+    pair = {"bending_stiffness": bending, "angle": angle}
+    measured = Measured(axial_stiffness=1e5, torsion_stiffness=0.03, **pair)
+    tendons = kind(name="pull", offset=0.4 + turn, **given)
+    return tube(sr.Material(density=1100.0), measured=measured, actuators=(tendons,))
+
+
+PULLED = np.random.default_rng(3).uniform(0.1, 1.0, (4, 3))
+FLAT = {
+    "parallel": {},
+    "twisted": {"revolution": 3.0},
+    "guided": {"revolution": 1.0, "guides": 4},
+    "by length": {"kind": LengthTendon, "tendon_stiffness": 2e3},
+    "guided by length": {"kind": LengthTendon, "tendon_stiffness": 2e3, "guides": 3},
+}
+
+
+def tips_of(arm: sr.Manipulator) -> np.ndarray:
+    low, high = arm.bounds.T
+    return sr.tip_positions(arm, low + PULLED * (high - low), tol=1e-9)
+
+
+@pytest.mark.parametrize("case", FLAT)
+def test_a_strip_that_is_turned_with_its_tendons_takes_its_tips_along(case):
+    plain, turned = flat(**FLAT[case]), flat(angle=0.7, turn=0.7, **FLAT[case])
+    cos, sin = np.cos(0.7), np.sin(0.7)
+    about = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    tips = tips_of(plain)
+    np.testing.assert_allclose(tips_of(turned), tips @ about.T, atol=1e-8 * LENGTH)
+    assert pull_error(turned) == pytest.approx(pull_error(plain), rel=1e-9)
+    # The strip alone turned by a right angle has its stiffnesses swapped, by half a turn none.
+    swapped = flat(bending=(0.06, 0.02), **FLAT[case])
+    right, half = (flat(angle=angle, **FLAT[case]) for angle in (np.pi / 2, -np.pi))
+    np.testing.assert_allclose(tips_of(right), tips_of(swapped), atol=1e-8 * LENGTH)
+    np.testing.assert_allclose(tips_of(half), tips, atol=1e-8 * LENGTH)
+    assert np.abs(tips_of(swapped) - tips).max() > 1e-3 * LENGTH
+    # Where both stiffnesses are one, no angle changes a bit.
+    round_one, any_angle = (flat(angle=a, bending=(0.02, 0.02), **FLAT[case]) for a in (0.0, 0.7))
+    single = flat(bending=0.02, **FLAT[case])
+    for other in (any_angle, single):
+        np.testing.assert_array_equal(tips_of(other), tips_of(round_one))
+
+
+def test_the_axes_of_a_strip_stand_in_files_and_summaries_and_are_a_parameter():
+    arm = flat(angle=np.radians(30.0))
+    assert "angle_deg = 30" in arm.to_toml()
+    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
+    summary = str(sr.describe(arm))
+    assert re.search(r"K1 at base and tip +0.02, 0.02 N m²", summary)
+    assert re.search(r"K2 at base and tip +0.06, 0.06 N m²\n", summary)
+    assert re.search(r"axis of K1 from x +30 deg", summary)
+    assert not re.search(r"K2|axis of K1", str(sr.describe(flat(bending=0.02))))
+    assert "at rest" not in summary  # under loads it is not known
+    swapped = flat(angle=np.radians(120.0), bending=(0.06, 0.02))
+    assert load_number(swapped) == pytest.approx(load_number(arm), rel=1e-12)
+    assert changed(arm, {"measured.angle": 0.0}) == flat()
+    for bending, warned in ((0.02, True), ((0.02, 0.06), False)):
+        said = str(sr.describe(flat(angle=0.3, bending=bending)))
+        assert ("measured.angle turns nothing" in said) == warned
+
+
+def test_pictures_show_a_strip_as_wide_as_its_stiffnesses_say():
+    """Of ellipses and strips, the widths along the axes of K1 and K2 are as √K2 to √K1."""
+    from softreach.arm.skin import arm_surface
+    from softreach.rod.kinematics import rest_configuration
+
+    for bending, widths in (((1.0, 4.0), (1.0, 0.5)), ((9.0, 1.0), (1 / 3, 1.0))):
+        arm = flat(angle=0.5, bending=bending)
+        drawn = arm_surface(arm, rest_configuration(arm), 360).vertices
+        for angle, width in zip((0.5, 0.5 + np.pi / 2), widths, strict=True):
+            along = drawn @ [np.cos(angle), np.sin(angle), 0.0]
+            assert along.max() == pytest.approx(width * RADIUS, rel=1e-4)
+        axes = sr.plot.plot_cross_section(arm, unit="m")
+        box = axes.patches[0].get_extents().transformed(axes.transData.inverted())
+        expected = np.hypot(widths[0] * np.cos(0.5), widths[1] * np.sin(0.5))
+        assert box.width == pytest.approx(2 * RADIUS * expected, rel=1e-3)
+    assert tube(measured=Measured(bending_stiffness=(1.0, 4.0))).half_axes == (1.0, 1.0)
 
 
 def test_measured_mass_per_length_is_the_weight():

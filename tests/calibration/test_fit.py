@@ -67,6 +67,21 @@ def test_tendons_driven_by_length_are_found_with_their_slack():
     assert result.values["s1.tendon_stiffness"] == pytest.approx(5e3, rel=1e-2)
 
 
+def test_the_axes_of_a_flat_strip_and_their_stiffnesses_are_found():
+    own = sr.arm.Measured(
+        axial_stiffness=1e5, bending_stiffness=(0.01, 0.03), torsion_stiffness=0.01
+    )
+    start = pulled_wire()
+    start = start.replace(section=start.section.replace(measured=own))
+    true = {"measured.bending_stiffness[1]": 0.04, "measured.angle": 0.3}
+    truth = changed(start, true)
+    data = measured(truth, noise=0.0, inputs=0.3 * random_inputs(truth, 40))
+    result = sr.calibrate(start, data, free=list(true), rivals=False, robust=False)
+    assert result.train.rms < 1e-6
+    for name, value in true.items():
+        assert result.values[name] == pytest.approx(value, rel=1e-3)
+
+
 def test_each_tendon_may_have_its_own_slack():
     truth, zeros = pulled_wire(), (0.4e-3, 0.0, -0.3e-3)
     inner, outer = truth.actuators

@@ -307,6 +307,65 @@ def test_an_arm_keeps_as_clear_as_the_disks_that_hold_its_tendons():
         assert finding.excess == pytest.approx(max(-spare, 0.0) * disks / wire.length, abs=2e-4)
 
 
+def guided(distance=0.01, **changes):
+    """A thin straight wire with four tendons that five disks hold."""
+    tendons = sr.Tendon(
+        bundles=4, distance=distance, guides=5, activation_bounds=(0.0, 40.0), **changes
+    )
+    return sr.Manipulator(
+        profile=sr.LinearTaper(length=0.2, outer_radius=0.001),
+        section=sr.Section(rings=(sr.Ring(inner_ratio=0.0, material=STEEL),)),
+        actuators=(tendons,),
+    )
+
+
+STEEL = sr.Material(young_modulus=50e9)
+PULLS = np.array([[0.0, 0.0, 0.0, 0.0], [40.0, 0.0, 0.0, 0.0], [20.0, 30.0, 0.0, 5.0]])
+
+
+@pytest.mark.parametrize("disk_radius", [None, 0.013])
+def test_clearance_counts_all_disks_and_tendons_that_pictures_show(disk_radius):
+    """Tendons on the inner side of a bend are farther from the axis than their guides."""
+    from softreach.arm.skin import arm_surface, bundle_skins
+    from softreach.geometry.surface import joined
+    from softreach.requirements.poses import Body
+    from softreach.rod.rods import as_tip_map
+
+    arm = guided(disk_radius=disk_radius)
+    shapes = sr.configuration(arm, PULLS, 201)
+    body = Body.of(as_tip_map(arm), PULLS, 800)
+    drawn = arm.length * np.array([1 / 300, 1 / 400])  # half of a disk, and of a line
+    inner = [[0.09, 0.0, 0.08], [0.05, 0.0, 0.08]]  # sides of the second pose
+    for place in [*inner, *np.random.default_rng(0).uniform(-0.15, 0.15, (20, 3))]:
+        ball = Keep(Sphere(tuple(place), 0.001), False)
+        free = 0.001 - body.missed(ball, np.arange(len(PULLS)))[0]
+        for k, least in enumerate(free):
+            shape = shapes.isel(sample=k)
+            disks, lines = arm_surface(arm, shape, 96), joined(bundle_skins(arm, shape))
+            away = [np.linalg.norm(x.vertices - place, axis=1).min() for x in (disks, lines)]
+            assert least <= min(away + drawn) + 1e-5
+
+
+@pytest.mark.parametrize("spare", [0.1, -0.1])
+@pytest.mark.parametrize("guides", [0, 5])
+def test_a_wall_must_be_as_far_away_as_the_width_of_disks_says(guides, spare):
+    arm = guided(disk_radius=0.02)
+    arm = arm.replace(actuators=(arm.actuators[0].replace(guides=guides),))
+    at_rest = Target([[0.0, 0.0, arm.length]], within=1e-6)
+    wall = HalfSpace(((1.0 + spare) * 0.02, 0.0, 0.0), (-1.0, 0.0, 0.0))
+    finding = checked(arm, targets=[at_rest], keeps=[Keep(wall, False)]).findings[-1]
+    assert finding.met == (spare > 0)
+
+
+def test_disks_that_do_not_reach_their_tendon_are_refused():
+    with pytest.raises(sr.InvalidDesign, match=r"disk_radius = 0\.009: must be at least 0\.01 m"):
+        guided(disk_radius=0.009)
+    with pytest.raises(sr.InvalidDesign, match="disk_radius = 13: must be at most the length"):
+        guided(disk_radius=13.0)
+    arm = guided(disk_radius=0.013)
+    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
+
+
 def test_a_measure_of_a_cloud_has_an_error_that_holds_the_exact_value():
     volume = sr.reachable_set(ARM, accuracy=0.01).convex_volume
     for ends, verdict in (((volume, None), "undecided"), ((1.05 * volume, None), "missed")):

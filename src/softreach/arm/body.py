@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,7 @@ from softreach.arm.part import Part, Samples, faults_under, gathered, kind_fault
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section, Stiffness, name_faults
 from softreach.arm.stations import Located, RigidPiece, Stations, placed
-from softreach.support.arrays import Array, as_stations, read_only
+from softreach.support.arrays import Array, as_stations, joined, read_only, rows
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
 
@@ -93,6 +93,14 @@ class RestStrains(UnseenActuator):
     @property
     def breaks(self) -> tuple[float, ...]:
         return self.shape.breaks
+
+
+class Disks(NamedTuple):
+    """Thin disks that hold tendons, (disk,) each."""
+
+    station: Array  # Z [m]
+    radius: Array  # [m]
+    tendons: Array  # How far from the axis the tendons that they hold are [m]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -237,6 +245,16 @@ class Body:
             stiffness = Stiffness(*(np.where(rigid, np.inf, value) for value in stiffness))
         return stiffness
 
+    @property
+    def half_axes(self) -> tuple[float, float]:
+        """Half axes of sections along the axes of K1 and K2 over R2 [-], as pictures show them.
+
+        Those of an ellipse or a strip of these stiffnesses; what holds more than tendons is round.
+        """
+        aspect = math.sqrt(self.section.bending_ratio)
+        is_plain = {*self.outline(0.0).shape} <= {"line"}
+        return (min(1.0, aspect), min(1.0, 1.0 / aspect)) if is_plain else (1.0, 1.0)
+
     def outline(self, z: ArrayLike) -> Outline:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)
@@ -249,7 +267,21 @@ class Body:
             outer_ratio=np.concatenate([nothing, *(part.outer_ratio for part in each)], axis=1),
             shape=tuple(shape for part in each for shape in part.shape),
             acts=np.concatenate([nothing.astype(bool), *(part.acts for part in each)], axis=1),
+            disk_ratio=np.concatenate([nothing, *(part.held_ratio for part in each)], axis=1),
         )
+
+    @lazy
+    def disks(self) -> Disks:
+        """Those that hold tendons, at ascending Z."""
+        parts = [Disks(*np.empty((3, 0)))]
+        for each in self.actuators:
+            if not len(z := np.array(each.disk_stations(self.profile))):
+                continue
+            outline, radius = each.outline(self.profile, self.section, z), self.profile.radius(z)
+            ratios = outline.held_ratio, outline.outer_ratio
+            parts.append(Disks(z, *(radius * ratio.max(axis=1) for ratio in ratios)))
+        every = joined(parts)
+        return rows(every, np.argsort(every.station, kind="stable"))
 
 
 def behind(owner: str, faults: Iterable[Fault]) -> list[Fault]:
@@ -266,7 +298,7 @@ def _far_faults(actuator: Actuator, profile: Profile) -> Iterator[Fault]:
     """Distances and radii beyond the length of the arm: millimeters taken for meters."""
     radius = float(np.max(profile.radius(np.linspace(0.0, profile.length, 65))))
     allowed = f"must be at most the length of the arm, {profile.length:g} m"
-    for name in ("distance", "distance_ratio", "radius", "radius_ratio"):
+    for name in ("distance", "distance_ratio", "radius", "radius_ratio", "disk_radius"):
         value: Any = getattr(actuator, name, None)
         values: Any = getattr(value, "values", value)
         scale = radius if name.endswith("ratio") else 1.0
@@ -309,7 +341,7 @@ def mass(arm: Body) -> float:
 
 
 def load_number(arm: Body) -> float:
-    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-], theory (79).
+    """Λ = (w + P/L) L³/(4 K1), with the lesser bending stiffness at the base [-], theory (79).
 
     Without loads, w is the weight per length at the base under g = 9.81 m/s², and P is 0: Λ is
     ρ g L³/(E R2²) for a solid arm of one material, and an upright cylinder buckles under its own
@@ -324,6 +356,7 @@ def load_number(arm: Body) -> float:
         raise InvalidDesign(faults)
     per_length, force = (arm.loads or Loads()).sizes(arm.section, arm.profile)
     stiffness = arm.section.stiffness_at(arm.profile, 0.0).bending
+    stiffness = min(1.0, arm.section.bending_ratio) * stiffness
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
 
 

@@ -13,6 +13,7 @@ from softreach.arm.actuators import Tendon
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.guides import Guides, has_guides
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.section import turned
 from softreach.arm.tables import quadrature, tables
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, as_rows
@@ -152,7 +153,7 @@ def pull_error(arm: Manipulator) -> float:
     slopes = np.gradient(places, step, axis=1, edge_order=2)[..., pulls]
     places = places[..., pulls]
     x, y = places
-    resistance = body.section.resistance(body.stiffness_at(z))
+    angle, resistance = body.section.bending_angle, body.section.resistance(body.stiffness_at(z))
     shares = np.rint(2.0 * np.random.default_rng(0).random((_SAMPLES, arm.inputs))) / 2.0
     low, high = arm.input_bounds.T
     gamma = Driving(arm).activations(np.unique(low + shares * (high - low), axis=0))
@@ -167,7 +168,9 @@ def pull_error(arm: Manipulator) -> float:
     linear = np.einsum("nb,skb->nsk", gamma, table.curvature)
     rest, bent = moments(0.0 * linear, 1.0 + 0.0 * zeta), linear
     for _ in range(_REPETITIONS):
-        before, bent = bent, linear + (moments(eta[..., None] * bent, zeta) - rest) / resistance
+        more = turned((moments(eta[..., None] * bent, zeta) - rest)[..., None], -angle)
+        more = turned(more / resistance[..., None], angle)[..., 0]
+        before, bent = bent, linear + more
         if np.abs(bent - before).max() * arm.length < _SETTLED:
             break
     tips = [_tips(eta[..., None] * each * step, zeta * step) for each in (linear, bent)]

@@ -160,6 +160,8 @@ class Measured(Part):
         default=None,
     )
     """K1 = K2 [N m²], or (K1, K2) about d1 and d2, as of a flat strip, without loads."""
+    angle: float = number("α", "rad", "angle of the axis of K1 from d1", default=0.0)
+    """α, angle of the axes of K1 and K2 about d3, from d1 and d2 [rad]."""
     torsion_stiffness: float | AlongArm | None = number(
         "K3", "N m²", "torsional stiffness", above=0.0, along=AlongArm, default=None
     )
@@ -236,6 +238,15 @@ class Stiffness(NamedTuple):
     """K1 = K2 [N m²]."""
     torsion: Array
     """K3 [N m²]."""
+
+
+def turned(vectors: Array, angle: float) -> Array:
+    """Components of vectors about the directors, (..., 3, n), after a turn about d3 [rad]."""
+    if angle == 0.0:
+        return vectors
+    x, y, z = np.moveaxis(vectors, -2, 0)
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.stack([cos * x - sin * y, sin * x + cos * y, z], axis=-2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -357,8 +368,13 @@ class Section(Part):
         pair = None if self.measured is None else self.measured.bending_stiffness
         return pair[1] / pair[0] if isinstance(pair, tuple) else 1.0
 
+    @property
+    def bending_angle(self) -> float:
+        """α, angle of the axes of K1 and K2 from d1 and d2 [rad]; 0 where K1 = K2."""
+        return self.measured.angle if self.measured and self.bending_ratio != 1.0 else 0.0
+
     def resistance(self, stiffness: Stiffness) -> Array:
-        """K1, K2 and K3 [N m²] about the directors by K1 and K3, one more axis of 3."""
+        """K1, K2 and K3 [N m²] about their axes by K1 and K3, one more axis of 3."""
         first, torsion = stiffness.bending, stiffness.torsion
         return np.stack([first, self.bending_ratio * first, torsion], axis=-1)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Self, TypeAlias
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 
 _LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
+_DISK = 1 / 150  # thickness of disks, in L
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
 _THICKNESS = 0.04  # of closed bands, in R2
 _SAME = 1e-9  # of the length, or of R2
@@ -133,10 +134,29 @@ class _Span(NamedTuple):
 
 
 def arm_surface(arm: Body, shape: Shape, sides: int = 32) -> Surface:
-    """The body of an arm in one configuration as a closed tube with so many sides."""
+    """The body of an arm in one configuration with so many sides: a closed tube, the last part.
+
+    Its sections are flat where two bending stiffnesses were measured. Before it come disks that
+    stand out of it and hold tendons.
+    """
     line = _drawn_line(arm, shape)
     d1, d2 = line.directors[:, 0], line.directors[:, 1]
-    return tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
+    if angle := arm.section.bending_angle:
+        cos, sin = np.cos(angle), np.sin(angle)
+        d1, d2 = cos * d1 + sin * d2, cos * d2 - sin * d1
+    first, second = arm.half_axes
+    radius = arm.profile.radius(line.z)
+    tube = tube_surface(line.position, first * d1, second * d2, radius, sides)
+    return joined([*_disk_surfaces(arm, line, sides), tube])
+
+
+def _disk_surfaces(arm: Body, line: Centerline, sides: int) -> Iterator[Surface]:
+    wider = arm.disks.radius > (1.0 + _SAME) * arm.profile.radius(arm.disks.station)
+    for z, radius in np.unique(np.column_stack(arm.disks[:2])[wider], axis=0):
+        k = int(np.abs(line.z - z).argmin())
+        d1, d2, d3 = np.repeat(line.directors[k, :, None], 2, axis=1)
+        faces = line.position[k] + np.array([[-0.5], [0.5]]) * _DISK * arm.length * d3
+        yield tube_surface(faces, d1, d2, radius, sides)
 
 
 def bundle_skins(

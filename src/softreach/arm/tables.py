@@ -17,6 +17,7 @@ from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.body import Body, RestStrains
 from softreach.arm.number import fields_of
+from softreach.arm.section import turned
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidDesign
 from softreach.support.lazy import lazy
@@ -56,9 +57,10 @@ def tables(arm: Body, stations: ArrayLike) -> Tables:
     loads = [Resultants(np.empty((len(z), 0)), np.empty((len(z), 3, 0)))]
     loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
     stiffness = arm.stiffness_at(z)
-    resistance = arm.section.resistance(stiffness)
+    resistance, angle = arm.section.resistance(stiffness), arm.section.bending_angle
     extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
-    curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
+    moment = turned(np.concatenate([load.moment for load in loads], axis=2), -angle)
+    curvature = turned(moment / resistance[..., None], angle)
     for k, actuator in enumerate(arm.bundle_actuators):
         if isinstance(actuator, RestStrains):
             curvature[..., k] = actuator.shape.curvature(z / arm.length)
@@ -197,10 +199,11 @@ class Works:
         """N and M of the unit loads at nodes, times weights, (node, work) and (node, 3, work)."""
         table = tables(self.arm, z)
         stiffness = self.arm.section.stiffness_at(self.arm.profile, z)
-        resistance = self.arm.section.resistance(stiffness)
+        section, resistance = self.arm.section, self.arm.section.resistance(stiffness)
         force = table.extension[:, self.columns] * (weights * stiffness.axial)[:, None]
-        moment = table.curvature[..., self.columns] * (weights[:, None] * resistance)[..., None]
-        return force, moment
+        bent = turned(table.curvature[..., self.columns], -section.bending_angle)
+        moment = bent * (weights[:, None] * resistance)[..., None]
+        return force, turned(moment, section.bending_angle)
 
     @lazy
     def _rates(self) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ from softreach.arm.base import Base
 from softreach.arm.driving import Driving, body_of
 from softreach.arm.guides import has_guides
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.section import turned
 from softreach.arm.tensions import LengthLaw, PulledTendons
 from softreach.calibration.free_numbers import FreeNumbers, Neighbors
 from softreach.calibration.measurements import Measurements
@@ -126,10 +127,12 @@ class MarkerModel:
         stations, offsets = marker_stations(arm, self.names)
         law, table = Driving(arm).law, node_tables(body_of(arm), stations, grid)
         bend, rise = (x[..., law.columns] for x in (table.curvature, table.extension[:, :, None]))
-        stiffness = np.zeros((*table.length.shape, 4))
+        measures, angle = np.zeros((*table.length.shape, 4, 0)), arm.section.bending_angle
         if len(law.columns):
             own = arm.section.stiffness_at(arm.profile, table.stations)
-            stiffness = np.append(arm.section.resistance(own), own.axial[..., None], axis=-1)
+            moment = turned(bend, -angle) * arm.section.resistance(own)[..., None]
+            force = rise * own.axial[..., None, None]
+            measures = np.concatenate([turned(moment, angle), force], axis=-2)
         return _Explicit(
             table,
             arm.base.rotation,
@@ -139,7 +142,7 @@ class MarkerModel:
             Driving(arm).bundles(inputs),
             law.taut_from,
             law.compliance,
-            measures=np.concatenate([bend, rise], axis=2) * stiffness[..., None],
+            measures=measures,
             rest=table.curvature @ law.rest[0],
         )
 

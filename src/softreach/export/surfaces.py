@@ -124,9 +124,9 @@ def export_arm(
 
     The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
     that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
-    ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
-    the names of the bundles in OBJ (objects), GLB (nodes) and 3MF, and numbered in VTU; their
-    colors are in all but STL and VTU.
+    ring; a tendon is a thin tube, a chamber a tube of its radius, and disks at guides, closed too,
+    belong to the body. Parts are called ``body`` and by the names of the bundles in OBJ (objects),
+    GLB (nodes) and 3MF, and numbered in VTU; their colors are in all but STL and VTU.
 
     Args:
         arm: The design.

@@ -306,7 +306,8 @@ def tube_surface(
     """A tube of circular sections of some radii [m], capped at both ends, with outward faces.
 
     Centers [m] and unit vectors in the sections have shape (stations, 3); normal x binormal points
-    along the centerline. Vertices come ring by ring, the centers of both caps last.
+    along the centerline. Shorter vectors make ellipses of sections. Vertices come ring by ring, the
+    centers of both caps last.
     """
     center = np.asarray(centerline, float)
     if center.ndim != 2 or center.shape[1] != 3 or len(center) < 2:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -47,7 +47,9 @@ def plot_cross_section(
 
     Fibers and muscles fill a sector of their ring; strokes show radial and oblique ones. Where
     sectors overlap, the lower shows in stripes. Tendons are dots, dotted circles the disks that
-    hold those outside of the arm; chambers are round. What does not act at Z is left out.
+    hold those outside of the arm; chambers are round. What does not act at Z is left out. A body
+    with two measured bending stiffnesses, K1 and K2, that holds tendons at most is an ellipse whose
+    widths are as √K2 to √K1, as those of a flat strip are; the wider one is 2 R2.
 
     Args:
         arm: The design, at rest.
@@ -83,7 +85,9 @@ def plot_cross_section(
     half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
     half = float(counted.of(half))
     with styled_axes(ax, _SIZE + room, _SIZE) as ax:
+        known = len(ax.patches)
         _draw_layers(ax, arm.section, outer)
+        _flatten(ax, ax.patches[known:], arm)
         _draw_bundles(ax, placed, outer)
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
         ax.set(xlabel=counted.label("x"), ylabel=counted.label("y"))
@@ -98,7 +102,7 @@ def plot_cross_section(
 def section_reach(arm: Manipulator, z: float) -> float:
     """Distance from the axis of the surface at Z, or of what lies farther outside [m]."""
     outline = arm.outline(z)
-    widest = np.max(outline.outer_ratio[outline.acts], initial=1.0)
+    widest = np.max(outline.held_ratio[outline.acts], initial=1.0)
     return float(arm.profile.radius(z)) * float(widest)
 
 
@@ -179,6 +183,16 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
         draw(low, high, ring.material, 0.5 if over else 1.0)
 
 
+def _flatten(ax: Axes, layers: Sequence[Patch], arm: Manipulator) -> None:
+    """Make ellipses of layers where two bending stiffnesses were measured."""
+    from matplotlib.transforms import Affine2D
+
+    if arm.half_axes != (1.0, 1.0):
+        flat = Affine2D().scale(*arm.half_axes).rotate(arm.section.bending_angle)
+        for layer in layers:
+            layer.set_transform(flat + ax.transData)
+
+
 def _annulus(low: float, high: float, fill: Any) -> Patch:
     from matplotlib.patches import Annulus, Circle
 
@@ -195,6 +209,7 @@ class _Placed:
     extent: float  # angular [rad]
     inner: float  # radius in the unit of the axes
     outer: float  # radius in the unit of the axes
+    held: float  # radius of the disks that hold it
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -247,7 +262,7 @@ class _Placed:
 
 def _placed(arm: Manipulator, z: float, outer: float, bundles: Collection[int]) -> list[_Placed]:
     outline = arm.outline(z)
-    ratios = outline.inner_ratio[0], outline.outer_ratio[0]
+    ratios = outline.inner_ratio[0], outline.outer_ratio[0], outline.held_ratio[0]
     sizes = outline.center[0], outline.extent, *(outer * ratio for ratio in ratios)
     ways = [actuator.fiber_direction for actuator in arm.bundle_actuators]
     return [
@@ -277,7 +292,7 @@ def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
             ax.add_collection(bundle.strokes())
     for bundle in lumens:
         ax.add_patch(Circle(bundle.middle, 0.5 * (bundle.outer - bundle.inner), **bundle.style))
-    for radius in sorted({round(line.outer / outer, 9) for line in lines if line.outer > outer}):
+    for radius in sorted({round(line.held / outer, 9) for line in lines if line.held > outer}):
         disk = {"facecolor": "none", "edgecolor": "0.6", "linewidth": 0.6, "linestyle": ":"}
         ax.add_patch(Circle((0, 0), outer * radius, **disk))
     for bundle in lines:

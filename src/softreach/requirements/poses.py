@@ -6,6 +6,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from softreach.arm.actuators import Tendon
 from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
@@ -20,7 +21,7 @@ from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import bending_over_bounds, bending_stations, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map
-from softreach.rod.tip_map import InvalidLoads, TipMap
+from softreach.rod.tip_map import Frames, InvalidLoads, TipMap
 from softreach.sampling import sample_cube
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask, joined, rows
@@ -174,20 +175,22 @@ class Body(NamedTuple):
     """Farthest that the body bulges between two sections from the straight line between their
     points [m], shape (n, station - 1)."""
     lost: Mask  # Poses without an arm, shape (n,)
+    disk_center: Array  # Of thin disks wider than the tendons that they hold, (n, disk, 3) [m]
+    disk_tangent: Array  # Shape (n, disk, 3)
+    disk_radius: Array  # Shape (n, disk) [m]
 
     @classmethod
     def of(cls, rod: TipMap, gamma: Array, parts: int) -> Self:
-        """The sections between so many parts."""
+        """The sections between so many parts, and disks."""
         z = np.linspace(0.0, rod.length, parts + 1)
         frames, strains = rod.frames(gamma, z), rod.strains(gamma, z)
-        radius = rod.arm.profile.radius(z)
-        if rod.arm.bundles:
-            outline = rod.arm.outline(z)
-            held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
-            held = held[2:] | held[1:-1] | held[:-2]
-            radius = radius * np.where(held, outline.outer_ratio, 0.0).max(axis=1).clip(1.0)
+        radius = np.fmax(_widest(rod.arm, z), _farthest_chords(rod, gamma, z, frames.position))
+        disks = rows(rod.arm.disks, rod.arm.disks.radius > rod.arm.disks.tendons)
+        stand = Frames(*(every[:, :0] for every in frames))
+        if len(disks.station):
+            stand = rod.frames(gamma, disks.station)
         turn = np.linalg.norm(strains.curvature, axis=2) * np.maximum(strains.extension, 1.0)
-        speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z))
+        speed = strains.extension + turn * radius + np.abs(np.gradient(radius, z, axis=1))
         step = rod.length / parts
         fastest = np.maximum(speed[:, 1:], speed[:, :-1])
         turning = fastest * np.maximum(turn[:, 1:], turn[:, :-1])
@@ -199,14 +202,17 @@ class Body(NamedTuple):
             between=_SAFETY * fastest * step,
             bulge=_SAFETY * change * step**2 / 8.0,
             lost=np.isnan(frames.position.sum(axis=(1, 2))),
+            disk_center=np.nan_to_num(stand.position),
+            disk_tangent=np.nan_to_num(stand.directors[:, :, 2]),
+            disk_radius=np.broadcast_to(disks.radius, stand.position.shape[:2]),
         )
 
     def missed(self, keep: Keep, poses: Index) -> tuple[Array, Array]:
         """Distances by which poses miss a region at stations [m], and at most between, (n,)."""
-        center, tangent, radius, farthest, bulge, lost = rows(self, poses)
-        least, most = keep.region.section_distances(center, tangent, radius)
-        missed = (most if keep.inside else -least) + keep.clearance
-        seen = missed.max(axis=1)
+        center, tangent, radius, farthest, bulge, lost, *disks = rows(self, poses)
+        missed = _missed(keep, center, tangent, radius)
+        thin = _missed(keep, *disks).max(axis=1, initial=-np.inf)
+        seen = np.maximum(missed.max(axis=1), thin)
         if (keep.inside and keep.region.convex) or isinstance(keep.region, HalfSpace):
             # Along a straight line the distance from such a region is largest at an end.
             # The bulge is that of a parabola, which a slope from end to end takes from its top.
@@ -218,6 +224,44 @@ class Body(NamedTuple):
         bound = np.maximum(between.max(axis=1), seen)
         seen[lost] = bound[lost] = np.nan
         return seen, bound
+
+
+def _widest(arm: Manipulator, z: Array) -> Array:
+    """Radius of the widest of body, tendons, and disks that stand everywhere at ascending Z [m]."""
+    radius = arm.profile.radius(z)
+    if not arm.bundles:
+        return radius
+    outline = arm.outline(z)
+    at_places = np.array([bool(part.disk_stations(arm.profile)) for part in arm.bundle_actuators])
+    ratio = np.where(at_places, outline.outer_ratio, outline.held_ratio)
+    held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
+    held = held[2:] | held[1:-1] | held[:-2]
+    return radius * np.where(held, ratio, 0.0).max(axis=1).clip(1.0)
+
+
+def _farthest_chords(rod: TipMap, gamma: Array, z: Array, centers: Array) -> Array:
+    """Distance of straight pieces between guides from the centers of sections [m], (n, station).
+
+    On the inner side of a bend they are farther from the axis than their guides.
+    """
+    farthest = np.zeros(centers.shape[:2])
+    for part in rod.arm.actuators:
+        if not isinstance(part, Tendon) or not part.has_guides:
+            continue
+        held = part.held_at(rod.length)
+        frames, points = rod.frames(gamma, held), part.points_at(rod.arm.profile, held)
+        guides = frames.position[:, :, None] + np.einsum("gdb,ngdx->ngbx", points, frames.directors)
+        shares = np.array([np.interp(z, held, one, 0.0, 0.0) for one in np.eye(len(held))])
+        lines = np.einsum("gs,ngbx->nsbx", shares, guides)
+        away = np.linalg.norm(lines - centers[:, :, None], axis=3).max(axis=2)
+        farthest = np.fmax(farthest, np.where(shares.any(axis=0), away, 0.0))
+    return farthest
+
+
+def _missed(keep: Keep, center: Array, tangent: Array, radius: Array) -> Array:
+    """Distances by which sections miss a region [m], shape (n, station)."""
+    least, most = keep.region.section_distances(center, tangent, radius)
+    return (most if keep.inside else -least) + keep.clearance
 
 
 class Posed(NamedTuple):

@@ -24,9 +24,9 @@ from softreach.arm.driving import extension_range
 from softreach.arm.lines import law_warning, line_strains
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator, scale_warnings
-from softreach.arm.number import fields_of
+from softreach.arm.number import default_of, fields_of
 from softreach.arm.part import AlongArm
-from softreach.arm.section import Stiffness
+from softreach.arm.section import Measured, Stiffness
 from softreach.arm.tables import both_sides, check_extension
 from softreach.rod.bending import BendingRange, Extreme, bending_over_bounds
 from softreach.rod.rest import Rest, rest
@@ -97,8 +97,8 @@ class DesignSummary:
     def rows(self) -> Rows:
         """Values and SI units by name, angles in degrees; the arm at rest is computed for them."""
         arm, measured = self.arm, self.arm.section.measured
-        given = () if measured is None else fields_of(type(measured)).values()
-        stiffness = zip(("K0", "K1", "K3"), self.stiffness or (), strict=False)
+        given = () if measured is None else fields_of(Measured).items()
+        found = [x.meaning for k, x in given if getattr(measured, k) != default_of(Measured, k)]
         pieces = enumerate(arm.rigid_pieces)
         rows: Rows = {
             "bundles": (arm.bundles, ""),
@@ -116,16 +116,26 @@ class DesignSummary:
             "markers": ([marker.name for marker in arm.markers], ""),
             "extension": (list(self.extension), ""),
             "curvature times L": (list(self.curvature), ""),
-            "measured": ([x.meaning for x in given if getattr(measured, x.field) is not None], ""),
-            **{
-                f"{name} at base and tip": (values.tolist(), "N" if name == "K0" else "N m²")
-                for name, values in stiffness
-            },
+            "measured": (found, ""),
+            **self._stiffness_rows(),
             "mass": (self.mass, "kg"),
             "load number": (self.load_number, ""),
         }
         known = {name: row for name, row in rows.items() if row[0] not in (None, [])}
         return known | load_rows(arm) | _rest_rows(arm)
+
+    def _stiffness_rows(self) -> Rows:
+        """K2 and the axis of K1 only where the section is not round."""
+        if self.stiffness is None:
+            return {}
+        section, (axial, bending, torsion) = self.arm.section, self.stiffness
+        ratio = section.bending_ratio
+        ends = {"K0": (axial, "N"), "K1": (bending, "N m²")}
+        ends |= {} if ratio == 1.0 else {"K2": (ratio * bending, "N m²")}
+        ends |= {"K3": (torsion, "N m²")}
+        rows: Rows = {f"{k} at base and tip": (x.tolist(), unit) for k, (x, unit) in ends.items()}
+        angle = to_degrees(section.bending_angle)
+        return rows if ratio == 1.0 else rows | {"axis of K1 from x": (angle, "deg")}
 
     def _bundle_rows(self) -> Rows:
         """Bounds and effects of each activation; neighbors that are equal share a line."""
@@ -221,7 +231,8 @@ def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
     of_theory = (*_beyond_theory(arm), *filter(None, [law_warning(arm)]))
-    return (*scale_warnings(arm), *_overlaps(arm), *_chambers_outside(arm), *of_theory)
+    of_section = (*_overlaps(arm), *_chambers_outside(arm), *_angle_of_a_round_section(arm))
+    return (*scale_warnings(arm), *of_section, *of_theory)
 
 
 def _bending(arm: Manipulator) -> BendingRange:
@@ -289,6 +300,12 @@ def _chambers_outside(arm: Manipulator) -> Iterator[str]:
             )
 
 
+def _angle_of_a_round_section(arm: Manipulator) -> Iterator[str]:
+    section = arm.section
+    if section.measured and section.measured.angle and section.bending_ratio == 1.0:
+        yield "measured.angle turns nothing: give bending_stiffness two numbers, K1 and K2"
+
+
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
     """Largest overlap of two sectors [rad] and the first Z where they overlap [m]."""
     pair = [first, second]
@@ -335,9 +352,9 @@ def _rest_rows(arm: Manipulator) -> Rows:
     """Sag and stability of the arm without activation.
 
     Without loads: the sag under its own weight of an arm held sideways, and whether it would stand
-    upright; nothing where moduli or densities are not known.
+    upright; nothing where moduli or densities are not known, or loads can't act.
     """
-    if load_number_faults(arm):
+    if load_number_faults(arm) or arm.section.load_faults():
         return {}
     sideways, upright = " sideways", " upright"
     if arm.loads is not None:

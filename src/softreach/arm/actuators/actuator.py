@@ -60,6 +60,13 @@ class Outline:
     """"sector" of a ring, "line" along the arm, or round "lumen", for each bundle."""
     acts: Mask
     """Stations at which each bundle acts, shape (station, bundle)."""
+    disk_ratio: Array | None = None
+    """Radius of disks that hold lines over R2 [-], shape (station, bundle); None: as of lines."""
+
+    @property
+    def held_ratio(self) -> Array:
+        """Radius within which each bundle and what holds it lie, over R2 [-], (station, bundle)."""
+        return self.outer_ratio if self.disk_ratio is None else self.disk_ratio
 
     @property
     def middle_ratio(self) -> Array:
@@ -194,6 +201,10 @@ class Actuator(Span, ABC):
         "along" it, "right-handed" or "left-handed" across it, or "radial".
         """
         return "along"
+
+    def disk_stations(self, profile: Profile) -> tuple[float, ...]:
+        """Z of the disks that hold it [m]; none where it follows the arm."""
+        return ()
 
     @property
     def bounds(self) -> Array:

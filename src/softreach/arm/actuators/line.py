@@ -20,6 +20,7 @@ from softreach.support.arrays import Array
 from softreach.support.errors import Fault
 
 _SAME = 1e-9  # of the length: guides that are one
+_PLACES = 65  # along a tendon, at which its distance is seen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +87,11 @@ class Tendon(PolarActuator):
         "Zg", "m", "guides", above=0.0, shape="several", instead_of="guides", default=None
     )
     """Z of the guides [m], ascending, in place of their number; its anchor holds it too."""
+    disk_radius: float | None = number(
+        "Rd", "m", "radius of the disks that hold it", above=0.0, default=None
+    )
+    """Radius of the disks at its guides, or all along where it has none [m]; None for disks that
+    just hold it. Pictures show it, and clearance counts it."""
 
     @property
     def has_guides(self) -> bool:
@@ -137,7 +143,8 @@ class Tendon(PolarActuator):
             (x, y), _ = self._path(profile, z)
             distance, straight = np.hypot(x, y), np.arctan2(y, x)
             angle = angle + np.remainder(straight - angle + np.pi, 2.0 * np.pi) - np.pi
-        ratio = distance / profile.radius(z)[:, None] * np.ones(self.bundles)
+        outer, each = profile.radius(z)[:, None], np.ones(self.bundles)
+        ratio = distance / outer * each
         return Outline(
             center=angle,
             extent=np.zeros(self.bundles),
@@ -145,7 +152,11 @@ class Tendon(PolarActuator):
             outer_ratio=ratio,
             shape=("line",) * self.bundles,
             acts=self.acts(profile, z),
+            disk_ratio=None if self.disk_radius is None else self.disk_radius / outer * each,
         )
+
+    def disk_stations(self, profile: Profile) -> tuple[float, ...]:
+        return tuple(self.held_at(profile.length)[1:].tolist()) if self.has_guides else ()
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         held = self.held_at(profile.length)[1:-1].tolist() if self.has_guides else []
@@ -158,6 +169,10 @@ class Tendon(PolarActuator):
         if (np.diff([start, *given]) <= same).any() or max(given, default=end) > end + same:
             between = f"{start:g} m, where the tendon begins, and its anchor at {end:g} m"
             faults.append(Fault("guide_stations", given, f"must rise between {between}"))
+        farthest = float(self._route(profile, np.linspace(start, end, _PLACES))[0][0].max())
+        if self.disk_radius is not None and self.disk_radius < (1.0 - _SAME) * farthest:
+            allowed = f"must be at least {farthest:g} m, how far from the axis the tendon is"
+            faults.append(Fault("disk_radius", self.disk_radius, allowed))
         return faults
 
     def _following(self, field: str, other: Any, profile: Profile, section: Section) -> Any:
