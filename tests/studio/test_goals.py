@@ -92,7 +92,7 @@ def test_a_box_is_red_where_the_arm_breaks_it_and_empty_means_around_what_is_dra
     np.testing.assert_allclose(corners, session.scene.axes.corners, atol=1e-5)
     colors = [tuple(np.asarray(node.colors).ravel()[:3]) for node in (inside, avoid)]
     assert [color == goals.VERDICTS["missed"] for color in colors] == [False, True]
-    assert "the arm keeps" in verdict(session)
+    assert "the arm has a margin of" in verdict(session)
     assert "inside or too near" in verdict(session)
 
 
