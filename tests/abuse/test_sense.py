@@ -96,8 +96,8 @@ def test_what_a_terminal_would_obey_is_printed_as_escapes(capsys):
 
 def test_a_command_that_takes_no_points_names_what_does(tmp_path, capsys):
     (tmp_path / "pts.csv").write_text("x,y,z\n0,0,0\n")
-    said = refusal_of(["volume", str(tmp_path / "pts.csv")], capsys, tmp_path)
-    assert "concave_hull(points, alpha=0.05)" in said
+    said = refusal_of(["reach", str(tmp_path / "pts.csv")], capsys, tmp_path)
+    assert "softreach volume" in said
 
 
 def test_warmup_that_cannot_keep_anything_says_so_and_fails(monkeypatch, capsys):

@@ -7,7 +7,7 @@ from softreach.atlas import DesignSpace, Metric, Need
 from softreach.atlas.space import parse_space
 from tests.abuse.refusals import raised_by
 
-NUMBERS = "must be numbers: a list, or start:stop:count"
+NUMBERS = "must be numbers; for several write a list or start:stop:count"
 ENDS = "two numbers, the lower one first"
 COUNT = "must be a whole number, from 1 to 1,000,000"
 

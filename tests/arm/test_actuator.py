@@ -187,7 +187,7 @@ class TestFiles:
             tag: object
 
         arm = trunk.replace(actuators=(TaggedCable(place=PLACE, tag=tag),))
-        with pytest.raises(sr.InvalidDesign, match=r"TaggedCable.tag = .*to fit in a design file"):
+        with pytest.raises(sr.InvalidDesign, match=r"TaggedCable.tag.*to fit in a design file"):
             arm.to_toml()
 
 
@@ -291,7 +291,7 @@ def test_parameters_of_drives_change_gains_and_keep_their_signs():
         ({"gains": {"t 9": 1.0}}, r"drives\[0\].gains = 't 9': must be a bundle of the arm: t 1"),
         ({"name": "fiber"}, r"drives\[0\].name = 'fiber': must be unlike"),
         ({"bounds": (1.0, 0.0)}, r"bounds = \(1.0, 0.0\): must be a pair"),
-        ({"gains": {}}, r"gains = \{\}: must be a mapping"),
+        ({"gains": {}}, r"gains: must be a mapping"),
         ({"offsets": {"t 2": 1.0}}, r"offsets\[t 2\] = 1: must be that of a bundle in gains"),
         ({"dead_zone": -1.0}, r"dead_zone = -1: must be a finite number >= 0"),
     ],

@@ -211,7 +211,7 @@ def test_slopes_under_loads_are_those_of_differences(loads):
 
 
 def test_a_displacement_beyond_the_length_is_told():
-    with pytest.raises(InvalidDesign, match=r"displacement_bounds.*reaches extension ζ = -"):
+    with pytest.raises(InvalidDesign, match=r"displacement_bounds.*with extension ζ = -"):
         as_tip_map(arm_of(tendons(1, activation_bounds=(0.0, 1.5), distance=1e-4)))
 
 

@@ -263,8 +263,8 @@ def _unchanged(text: str) -> sr.Manipulator:
     path = Path(text)
     suffix = path.suffix.lower()
     if suffix in _POINTS:
-        hint = "in Python, softreach.concave_hull(points, alpha=0.05) computes the volume of points"
-        raise NotPossible(f"{text} is not a design: give a .toml file; {hint} [m] of shape (n, 3)")
+        hint = "softreach volume takes points, and softreach show draws them"
+        raise NotPossible(f"{text} is not a design: give a .toml file; {hint}")
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
         return sr.Manipulator.load(text)  # which refuses what is no file, such as a pipe
