@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.support.arguments import as_integer, as_one_of
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
 
 Draw = Callable[[int, int], Array]
@@ -59,15 +59,16 @@ def _uniform(n: int, dim: int, seed: int) -> Draw:
 
 
 def _counter(n: int, dim: int, seed: int) -> Draw:
-    """The numbers that kernels make of the seed and the number of the sample."""
+    return lambda first, count: counted_points(np.arange(first, first + count), dim, seed)
+
+
+def counted_points(numbers: Index, dim: int, seed: int) -> Array:
+    """The points of the sampler `counter` with these numbers [-], shape (n, dim)."""
     from softreach.kernels.counting import fill
 
-    def draw(first: int, count: int) -> Array:
-        points, numbers = np.empty((count, dim)), np.arange(first, first + count, dtype=np.uint64)
-        fill(np.uint64(seed), numbers, points)
-        return points
-
-    return draw
+    points = np.empty((len(numbers), dim))
+    fill(np.uint64(seed), numbers.astype(np.uint64), points)
+    return points
 
 
 def _boundary(n: int, dim: int, seed: int) -> Draw:

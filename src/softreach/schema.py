@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 AXES = ("x", "y", "z")
 
 _CELL = 1 / 20  # of the arm's length
-_EDGES = POSITIVE._replace(unit="m")
+EDGES = POSITIVE._replace(unit="m")
 
 # variable -> (dimensions, unit, meaning); that of an activation follows from the arm
 _ACTIVATION = (("sample", "bundle"), None, "activation of each bundle; negative γ contracts")
@@ -323,7 +323,7 @@ def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     if "status" in cloud.coords:
         points = np.where(is_stable(cloud)[:, None], points, np.nan)
     default = _CELL * float(tip.attrs["length"])
-    return CellGrid.around(points, default if edge is None else as_number("cell", edge, _EDGES))
+    return CellGrid.around(points, default if edge is None else as_number("cell", edge, EDGES))
 
 
 def cell_dataset(grid: CellGrid, **variables: tuple[NDArray[Any], dict[str, str]]) -> xr.Dataset:

@@ -23,8 +23,7 @@ import softreach as sr
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
 from softreach.support.quantity import columns
-from softreach.support.rows import Rows, lines_of, shown, to_degrees
-from softreach.support.units import METER, POWERS, LengthUnit
+from softreach.support.units import METER, POWERS, LengthUnit, Rows, lines_of, shown, to_degrees
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,7 +12,7 @@ from softreach.cli import options
 from softreach.cli.console import console
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible
-from softreach.support.rows import Rows
+from softreach.support.units import Rows
 
 Format = Annotated[
     str | None,

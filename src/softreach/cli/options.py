@@ -263,7 +263,7 @@ def _unchanged(text: str) -> sr.Manipulator:
     path = Path(text)
     suffix = path.suffix.lower()
     if suffix in _POINTS:
-        hint = "softreach volume takes points, and softreach show draws them"
+        hint = "softreach volume and show take points (.csv .txt .parquet .ply .npy)"
         raise NotPossible(f"{text} is not a design: give a .toml file; {hint}")
     is_json = suffix == ".json" and path.is_file()
     if suffix == ".toml" or (path.exists() and not path.is_dir() and not is_json):
@@ -343,7 +343,9 @@ def points_of(
 
 def is_points(source: str) -> bool:
     """True if a source is a file of points."""
-    return source.lower().endswith((".csv", ".txt", ".parquet", ".pq", ".ply", ".npy"))
+    from softreach.exchange.points import POINT_FILES
+
+    return source.lower().endswith(POINT_FILES)
 
 
 def written_unit(arm: sr.Manipulator) -> LengthUnit:

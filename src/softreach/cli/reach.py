@@ -17,7 +17,7 @@ from softreach.support.arguments import as_number
 from softreach.support.errors import NotPossible, Range, counted
 from softreach.support.files.formats import PAGES, PICTURES
 from softreach.support.memory import check_memory
-from softreach.support.rows import ERROR, Rows
+from softreach.support.units import ERROR, Rows
 
 HULL_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
 

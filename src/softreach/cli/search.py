@@ -16,7 +16,7 @@ from softreach.cli.console import as_read, console, fields_of, for_machines
 from softreach.cli.options import UNCHANGED, Changes, Number, Whole, design_from, pairs_in, shown_in
 from softreach.support import progress
 from softreach.support.files.text import read_text
-from softreach.support.rows import to_degrees
+from softreach.support.units import to_degrees
 
 _ASKED = Group("Override the file", sort_key=1)
 _EXIT = {"met": 0, "missed": 1, "undecided": 3}  # verdict -> exit code; 2 is that of wrong input

@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.hull import convex_hull
 from softreach.geometry.lattice import CellGrid
-from softreach.kernels.counting import PARTS, SECTORS, fill, tally
+from softreach.kernels.counting import PARTS, SECTORS, tally
+from softreach.rod.bending import some_corners
 from softreach.rod.cuda import CudaRod, check_device_memory
 from softreach.rod.inputs import activation_measures
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.tip_map import Device, Frame, TipMap
-from softreach.sampling import check_sampler, cube_blocks, sample_cube
-from softreach.schema import cell_dataset, provenance
+from softreach.sampling import check_sampler, counted_points, cube_blocks, sample_cube
+from softreach.schema import EDGES, cell_dataset, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array
-from softreach.support.errors import NotPossible, Range
+from softreach.support.errors import NotPossible
 from softreach.support.interruption import check_stopped
 from softreach.support.progress import Progress, bar
 
@@ -33,7 +34,6 @@ _PILOT = 1 << 16  # samples by which the grid is laid
 _MARGIN = 0.02  # of L, of the grid around them
 _ON_CPU, _ON_GPU = 1 << 18, 1 << 30  # samples at a time; their numbers within are of 32 bits
 _CELL = 1 / 60  # of L
-_EDGES = Range(0.0, unit="m", open_low=True)
 
 
 def reached_cells(
@@ -83,7 +83,7 @@ def reached_cells(
     """
     tip_map = all_inputs(as_tip_map(arm, tol, frame=frame, point=point, device=device))
     n, seed = check_sampler("counter", n, tip_map.box.bundles, seed)
-    edge = _CELL * tip_map.length if cell is None else as_number("cell", cell, _EDGES)
+    edge = _CELL * tip_map.length if cell is None else as_number("cell", cell, EDGES)
     grid = _grid(tip_map, seed, edge)
     tallies = _Tallies(tip_map, grid)
     add = _on_cpu if tip_map.device == "cpu" else _on_gpu
@@ -125,8 +125,7 @@ class _Tallies:
         spread = sums[:, -1] / several * self.scale - ((mean * self.measured) ** 2).sum(axis=1)
         distance = np.sqrt(2.0 * (spread * several / (several - 1.0)).clip(0.0))
         numbers = np.unique(self.extreme[self.best > 0])
-        cube = np.empty((len(numbers), self.tip_map.box.bundles))
-        fill(np.uint64(seed), numbers.astype(np.uint64), cube)
+        cube = counted_points(numbers, self.tip_map.box.bundles, seed)
         tips = self.tip_map.tips(self.tip_map.box.from_cube(cube))
         hull = convex_hull(tips)
         variables = {
@@ -152,10 +151,9 @@ class _Tallies:
 
 def _grid(tip_map: ArmMap, seed: int, edge: float) -> CellGrid:
     """Cells around the first samples and the corners of the box, with a margin."""
-    box, ends = tip_map.box, 1 << min(tip_map.box.bundles, 12)
-    every = np.array([[k >> j & 1 for j in range(box.bundles)] for k in range(ends)], float)
-    cube = np.concatenate([sample_cube("counter", _PILOT, box.bundles, seed), every])
-    tips = tip_map.tips(box.from_cube(cube))
+    box = tip_map.box
+    gamma = box.from_cube(sample_cube("counter", _PILOT, box.bundles, seed))
+    tips = tip_map.tips(np.concatenate([gamma, some_corners(tip_map)]))
     tips = tips[~np.isnan(tips).any(axis=1)]
     margin = _MARGIN * tip_map.length
     return CellGrid.around(np.concatenate([tips - margin, tips + margin]), edge)

@@ -81,9 +81,9 @@ def goal_rows(
         - motions.directions[:, :, None]
         * np.einsum("ni,nij->nj", motions.directions, motions.rotations)[:, None]
     )
-    if request.cone:  # along the cone nothing is wanted
+    if request.cone:  # along the cone nothing is wanted, nor inside of it
         turn = axis[:, :, None] * np.einsum("ni,nij->nj", axis, turn)[:, None]
-    turn *= (excess > 0.0)[:, None, None] if request.cone else 1.0
+        turn *= (excess > 0.0)[:, None, None]
     weight = request.direction_weight
     rows = np.concatenate([away, weight * excess[:, None] * axis], axis=1)
     slopes = np.concatenate([moves, weight * turn], axis=1)

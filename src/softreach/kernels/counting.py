@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.vector import minus
+from softreach.kernels.vector import dot, minus
 
 SECTORS = 512
 """Sectors of directions along each side of the square that the octahedral map unfolds."""
@@ -62,7 +62,7 @@ def sector_of(v):
 @inline
 def rank_of(v, farthest, sample):
     """Distance over `farthest` in the upper 32 bits, the number of a sample in the lower ones."""
-    far = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / farthest
+    far = math.sqrt(dot(v, v)) / farthest
     return (np.uint64(min(far, 1.0) * 4294967295.0) << np.uint64(32)) | np.uint64(sample)
 
 

@@ -33,7 +33,7 @@ from softreach.rod.rest import Rest, rest
 from softreach.rod.tip_map import InvalidLoads
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault, InvalidInput
-from softreach.support.rows import Rows, lines_of, to_degrees
+from softreach.support.units import Rows, lines_of, to_degrees
 
 
 @dataclass(frozen=True, repr=False)
