@@ -1,10 +1,12 @@
 """The inverse problem: every branch, nearest points, least change."""
 
+import re
+
 import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Base, Manipulator
 from softreach.inverse import Status, branches, prepared_map, solve_inverse
 from softreach.inverse.path import PathStatus, track_path
 from softreach.rod import as_tip_map
@@ -271,6 +273,46 @@ def test_a_pose_that_some_activation_has_is_met_exactly_with_no_more_change(cone
     assert np.degrees(solutions.direction_errors - cone).max() <= 1e-6
     change, of_known = (np.linalg.norm(x / ranges, axis=1) for x in (solutions.activations, known))
     assert (change <= of_known + 1e-6).all()
+
+
+def test_a_frame_that_some_activation_has_is_met_exactly():
+    """Six rows and six tendons, in the base frame and for a marker alike."""
+    arm = designs.three_tendon_robot(segments=2)
+    arm = arm.replace(base=Base(points="down"))
+    known = in_box(arm, 12, seed=3)
+    tip_map = as_tip_map(arm)
+    frames = tip_map.tip_frames(known)
+    solutions = solve_inverse(arm, tip_map.tips(known), orientation=frames)
+    assert (solutions.statuses == Status.REACHED).all()
+    assert solutions.residuals.max() <= 1e-10 * arm.length
+    assert solutions.direction_errors.max() <= 1e-7
+    assert np.abs(tip_map.tip_frames(solutions.activations) - frames).max() <= 1e-7
+
+
+def test_a_frame_is_a_direction_and_a_turn_around_it():
+    """Tendons cannot turn a section in place: a turned frame is off by that angle or less."""
+    from scipy.spatial.transform import Rotation
+
+    arm = designs.three_tendon_robot(segments=2)
+    tip_map, known = as_tip_map(arm), in_box(arm, 6, seed=5)
+    turned = tip_map.tip_frames(known) @ Rotation.from_rotvec([0.0, 0.0, 0.3]).as_matrix()
+    target = tip_map.tips(known)
+    by_frame = solve_inverse(arm, target, orientation=turned)
+    by_direction = solve_inverse(arm, target, direction=turned[:, :, 2])
+    assert (by_direction.statuses == Status.REACHED).all()
+    assert (by_frame.statuses == Status.NOT_FOUND).all()
+    assert (by_frame.direction_gaps <= 0.3 + 1e-6).all()
+    allowed = solve_inverse(arm, target, orientation=turned, cone=0.3 + 1e-6)
+    assert (allowed.statuses == Status.REACHED).all()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [(np.eye(2), "orientation.shape"), (-np.eye(3), "orientation"), (2 * np.eye(3), "orientation")],
+)
+def test_an_orientation_is_a_rotation_matrix(trunk, wrong, name):
+    with pytest.raises(InvalidInput, match=re.escape(name)):
+        solve_inverse(trunk, [[0.0, 0.0, 0.5]], orientation=wrong)
 
 
 def test_a_family_of_poses_meets_the_direction_each():

@@ -1,8 +1,9 @@
 """Poses: a place and a direction of the tip as rows of one search, by Gauss-Newton in the box.
 
 Rows are (tip - target)/L and w q, where the rotation vector q = (θ - cone)+ (e × d3)/|e × d3| says
-how far the direction d3 is from the cone around the wanted e: theory (40). Both vanish at a pose
-that meets its goals, next to which steps gain twice as many digits each.
+how far the direction d3 is from the cone around the wanted e: theory (40). Where a whole frame is
+wanted, q is the rotation vector between both frames. Both vanish at a pose that meets its goals,
+next to which steps gain twice as many digits each.
 """
 
 from __future__ import annotations
@@ -61,6 +62,8 @@ def direction_errors(tip_map: TipMap, request: Request, target: Index, gamma: Ar
         return np.full(len(gamma), np.nan)
     if not len(gamma):
         return np.empty(0)
+    if request.orientation is not None:
+        return _angles_of_frames(tip_map.tip_frames(gamma), request.orientation[target])[0]
     return _angles(tip_map.tip_directions(gamma), request.direction[target])[0]
 
 
@@ -74,13 +77,14 @@ def goal_rows(
     moves = motions.slopes / tip_map.length
     if request.within:
         away, moves = _beyond(away, moves, _INSIDE * request.within / tip_map.length)
-    angle, axis = _angles(motions.directions, wanted)
+    turn = motions.rotations
+    if request.orientation is not None:
+        angle, axis = _angles_of_frames(tip_map.tip_frames(gamma), request.orientation[which])
+    else:
+        angle, axis = _angles(motions.directions, wanted)
+        along = np.einsum("ni,nij->nj", motions.directions, turn)
+        turn = turn - motions.directions[:, :, None] * along[:, None]
     excess = (angle - request.cone).clip(0.0)
-    turn = (
-        motions.rotations
-        - motions.directions[:, :, None]
-        * np.einsum("ni,nij->nj", motions.directions, motions.rotations)[:, None]
-    )
     if request.cone:  # along the cone nothing is wanted, nor inside of it
         turn = axis[:, :, None] * np.einsum("ni,nij->nj", axis, turn)[:, None]
         turn *= (excess > 0.0)[:, None, None]
@@ -107,6 +111,15 @@ def _angles(directions: Array, wanted: Array) -> tuple[Array, Array]:
     sine = np.linalg.norm(cross, axis=1)
     axis = cross / np.where(sine > 0.0, sine, 1.0)[:, None]
     return np.arctan2(sine, np.einsum("ni,ni->n", directions, wanted)), axis
+
+
+def _angles_of_frames(frames: Array, wanted: Array) -> tuple[Array, Array]:
+    """Angles [rad] and axes of the rotations from wanted frames to others, both (n, 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_matrix(frames @ wanted.transpose(0, 2, 1)).as_rotvec()
+    angle = np.linalg.norm(turn, axis=1)
+    return angle, turn / np.where(angle > 0.0, angle, 1.0)[:, None]
 
 
 def _descended(tip_map: TipMap, request: Request, start: Array, pulls: tuple[float, ...]) -> Poses:

@@ -35,7 +35,8 @@ class Request:
     reach_tol: float  # |tip - target| at which a target counts as reached [m], `residual` at least
     near: Array  # activations of the free bundles to stay near to [-], (t, dimension)
     direction: Array | None = None  # wanted tip tangents, unit vectors, (t, 3)
-    cone: float = 0.0  # angle from `direction` that is allowed [rad]
+    orientation: Array | None = None  # wanted frames, d3 the `direction`, (t, 3, 3)
+    cone: float = 0.0  # angle from `direction` or `orientation` that is allowed [rad]
     direction_weight: float = 0.1  # of an angle [rad] against a distance in L
     within: float = 0.0  # |tip - target| that does where no pose meets both to `residual` [m]
     family: int = 1  # activations wanted for each target where there are infinitely many
@@ -49,8 +50,10 @@ class Request:
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""
-        direction = None if self.direction is None else self.direction[rows]
-        return replace(self, targets=self.targets[rows], near=self.near[rows], direction=direction)
+        names = ("targets", "near", "direction", "orientation")
+        parts = {name: getattr(self, name) for name in names}
+        chosen = {name: part[rows] for name, part in parts.items() if part is not None}
+        return replace(self, **chosen)
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
@@ -60,6 +63,18 @@ def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count:
         raise InvalidInput(f"{name}.shape", rows.shape, f"of shape ({m},), or ({count}, {m})")
     check_finite(name, rows)
     return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
+
+
+def as_orientations(orientation: ArrayLike, count: int) -> Array:
+    """Rotation matrices (3, 3) or (t, 3, 3) as (t, 3, 3)."""
+    frames = as_floats("orientation", orientation)
+    if frames.shape not in ((3, 3), (count, 3, 3)):
+        raise InvalidInput("orientation.shape", frames.shape, f"(3, 3) or ({count}, 3, 3)")
+    frames = np.broadcast_to(frames, (count, 3, 3))
+    square = frames @ frames.transpose(0, 2, 1) - np.eye(3)
+    if not (np.abs(square) < 1e-6).all() or not (np.linalg.det(frames) > 0.0).all():
+        raise InvalidInput("orientation", frames, "rotation matrices: orthonormal, determinant 1")
+    return frames
 
 
 def positions_in(text: str, source: str, length: float | None = None) -> list[list[float]]:

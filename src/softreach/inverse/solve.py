@@ -11,7 +11,7 @@ from softreach.inverse.direction import compromises, direction_errors
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import RESIDUALS, Request, as_activations
+from softreach.inverse.request import RESIDUALS, Request, as_activations, as_orientations
 from softreach.inverse.roots import (
     Roots,
     conditions,
@@ -27,7 +27,7 @@ from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask, as_directions, as_points, joined, rows
-from softreach.support.errors import Range
+from softreach.support.errors import InvalidInput, Range
 from softreach.workspace.search import CLOSELY, nearest_tips
 
 _WEIGHTS = Range(0.0, 1e6, open_low=True)
@@ -44,6 +44,7 @@ def solve_inverse(
     within: float = 0.0,
     near: ArrayLike | None = None,
     direction: ArrayLike | None = None,
+    orientation: ArrayLike | None = None,
     cone: float = 0.0,
     direction_weight: float = 0.1,
     family: int = 1,
@@ -83,7 +84,11 @@ def solve_inverse(
         direction: Wanted tip tangents d3, shape (3,) or (t, 3), of any length. A target then
             counts as reached only where the direction is met as well: by one of all solutions of
             three free bundles, or by a search for both with more.
-        cone: Angle from `direction` that is allowed [rad]; a millionth more is rounding.
+        orientation: Wanted frames of the tip in place of directions: rotation matrices with the
+            directors d1, d2, d3 as columns, shape (3, 3) or (t, 3, 3). Angles are then those of the
+            rotation from the wanted frame to the tip's.
+        cone: Angle from `direction`, or `orientation`, that is allowed [rad]; a millionth more is
+            rounding.
         direction_weight: w [-] where no activation meets both: `nearest` has least
             |tip - target|²/L² + w² θ² with the angle θ beyond the cone.
         family: With more than three free bundles: how many activations to give for each target,
@@ -104,13 +109,17 @@ def solve_inverse(
         One `Solution` for each target; failures are its status, never an exception.
 
     Raises:
-        InvalidInput: Arguments of another shape, not finite, or out of range.
+        InvalidInput: Arguments of another shape, not finite, or out of range; both a direction and
+            an orientation.
     """
     prepared = prepared_map(arm, tol, frame=frame, point=point)
     points, box = as_points("targets", targets), prepared.whole.box
     preferred = np.zeros(box.bundles) if near is None else near
     measures, length = prepared.whole.measures, prepared.whole.length
+    if direction is not None and orientation is not None:
+        raise InvalidInput("direction", direction, "left out, as d3 of the orientation is one")
     unit = None if direction is None else as_directions("direction", direction, len(points))
+    frames = None if orientation is None else as_orientations(orientation, len(points))
     residual = as_number("residual_over_length", residual_over_length, RESIDUALS) * length
     within = as_number("within", within, Range(0.0, unit="m"))
     request = Request(
@@ -118,7 +127,8 @@ def solve_inverse(
         residual=residual,
         reach_tol=max(residual, prepared.whole.tol * length, within),
         near=as_activations("near", preferred, box, len(points)) / measures[box.free],
-        direction=unit,
+        direction=unit if frames is None else frames[:, :, 2],
+        orientation=frames,
         cone=as_number("cone", cone, Range(0.0, np.pi, unit="rad")),
         direction_weight=as_number("direction_weight", direction_weight, _WEIGHTS),
         within=within,

@@ -298,8 +298,12 @@ class TipMap(ABC):
 
     def tip_directions(self, activations: ArrayLike) -> Array:
         """Tangents d3 of the tips [-], shape (n, 3)."""
+        return np.ascontiguousarray(self.tip_frames(activations)[:, :, 2])
+
+    def tip_frames(self, activations: ArrayLike) -> Array:
+        """Frames of the tips with the directors d1, d2, d3 as columns [-], shape (n, 3, 3)."""
         end = self.length if self.point is None else self.point.station_at("station", self.length)
-        return np.ascontiguousarray(self.frames(activations, [end]).directors[:, 0, 2])
+        return self.frames(activations, [end]).directors[:, 0].transpose(0, 2, 1)
 
     def _filled(self, activations: ArrayLike, *wanted: str) -> tuple[Any, ...]:
         """Tips, and what else of `TipOutputs` is wanted, on all threads."""
