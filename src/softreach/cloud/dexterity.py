@@ -7,19 +7,20 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.tip_map import BLOCK
 from softreach.schema import activation_units, cell_dataset, check_cloud, tip_cells
 from softreach.support import parallel
-from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.support.arguments import as_integer, as_number
+from softreach.support.arrays import Array, Index, as_directions, as_points
+from softreach.support.errors import InvalidInput, Range
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dexterity", "solution_measure"]
+__all__ = ["capability_map", "dexterity", "sight", "solution_measure"]
 
 Signs = NDArray[np.int8]
 
@@ -117,6 +118,91 @@ def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Data
         solution_measure=(scale * total, name),
         solution_measure_error=(scale * scatter, error),
     ).assign_attrs(cloud.attrs)
+
+
+def capability_map(
+    cloud: xr.Dataset, *, cell: float | None = None, directions: int | ArrayLike = 100
+) -> xr.Dataset:
+    """Which directions the tip has in each cell of space: a capability map [Zacharias2007].
+
+    The directions d3 of the samples' tips are counted by the nearest of some directions that
+    share the sphere evenly. A direction without a sample may still be possible: more samples find
+    more of them, and `inverse.directions_at` all at one place.
+
+    Args:
+        cloud: A cloud; its activations are read in blocks.
+        cell: Edge of the cells [m]; None for L/20.
+        directions: How many directions, or the directions themselves, shape (k, 3).
+
+    Returns:
+        Dataset over the centers x, y, z [m] of cells and over `direction`: `samples`, the number of
+        them with a direction nearest to that one, and `capability`, the share of the directions
+        that a cell has [-]. The coordinate `toward` (direction, axis) holds unit vectors.
+
+    Raises:
+        InvalidInput: The dataset is no cloud; cells that are not positive or too many; no such
+            directions, or more than 10,000.
+    """
+    grid, toward = tip_cells(cloud, cell), _toward(directions)
+    k, placed = len(toward), np.flatnonzero(grid.cells < np.prod(grid.shape))
+    counts = np.zeros(int(np.prod(grid.shape)) * k, np.int32)
+    for part in parallel.blocks(len(placed), 4 * BLOCK):
+        rows = placed[part]
+        nearest = (_directions(cloud, rows) @ toward.T).argmax(axis=1)
+        np.add.at(counts, grid.cells[rows] * k + nearest, 1)
+    samples = counts.reshape(*grid.shape, k)
+    about = {"units": "1", "long_name": "share of the directions that the tip has"}
+    share = (samples > 0).mean(axis=-1)
+    result = cell_dataset(grid, capability=(share, about)).assign_attrs(cloud.attrs)
+    return result.assign(samples=(("x", "y", "z", "direction"), samples)).assign_coords(
+        toward=(("direction", "axis"), toward)
+    )
+
+
+def sight(cloud: xr.Dataset, place: ArrayLike, *, radius: float = 0.0) -> xr.DataArray:
+    """By how much the tip of each sample points past a ball: what a camera there can see.
+
+    Args:
+        cloud: A cloud.
+        place: Center of the ball [m], shape (3,).
+        radius: Of the ball [m].
+
+    Returns:
+        Angles [rad] over `sample` from the direction d3 of the tip to the ball, 0 where d3 points
+        at it. `cloud.tip[sight(cloud, place) <= half_view]` are the places from which a camera at
+        the tip with half the angle of view `half_view` sees the middle of it.
+
+    Raises:
+        InvalidInput: The dataset is no cloud; no such place or radius.
+    """
+    check_cloud(cloud)
+    center = as_points("place", place)[0]
+    size = as_number("radius", radius, Range(0.0, unit="m"))
+    angles = np.empty(cloud.sizes["sample"])
+    for rows in parallel.blocks(len(angles), 4 * BLOCK):
+        away = center - cloud.tip[rows].values
+        distance = np.linalg.norm(away, axis=1)
+        along = np.einsum("ni,ni->n", away, _directions(cloud, rows))
+        off = np.arccos(np.clip(along / np.maximum(distance, 1e-300), -1.0, 1.0))
+        half = np.arcsin(np.minimum(1.0, size / np.maximum(distance, 1e-300)))
+        angles[rows] = np.where(distance <= size, 0.0, (off - half).clip(0.0))
+    about = {"units": "rad", "long_name": "angle from the tip's direction to the ball"}
+    return cloud.tip[:, 0].copy(data=angles).drop_vars("axis").rename("sight").assign_attrs(about)
+
+
+def _toward(directions: int | ArrayLike) -> Array:
+    """Directions given, or as many of equal shares of the sphere along a spiral."""
+    if np.ndim(directions):
+        return as_directions("directions", np.atleast_2d(np.asarray(directions, float)))
+    count = as_integer("directions", directions, 1, 10_000)
+    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turn, around = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count), np.sqrt(1.0 - height**2)
+    return np.stack([around * np.cos(turn), around * np.sin(turn), height], axis=1)
+
+
+def _directions(cloud: xr.Dataset, rows: Index | slice) -> Array:
+    """Directions d3 of the tips of some samples, (n, 3)."""
+    return tip_map_of(cloud).tip_directions(cloud.activation[rows].values)
 
 
 def manipulability_unit(inputs: Sequence[str], length: str = "m") -> str:
