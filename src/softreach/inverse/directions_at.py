@@ -18,7 +18,7 @@ from softreach.inverse.solve import solve_inverse
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.schema import activation_attributes, bundle_coordinates, provenance
 from softreach.support.arguments import as_number
-from softreach.support.arrays import Array, as_points
+from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.workspace.search import CLOSELY, nearest_tips
 
@@ -135,7 +135,7 @@ def _tangents(tip_map: TipMap, gamma: Array) -> Array:
     return np.concatenate([kernel, -kernel], axis=1)
 
 
-def _largest_turn(tip_map: TipMap, source: Array, gamma: Array, near: Array) -> float:
+def _largest_turn(tip_map: TipMap, source: Array, gamma: Array, near: Mask) -> float:
     before, after = tip_map.tip_directions(source[near]), tip_map.tip_directions(gamma[near])
     chord = np.linalg.norm(after - before, axis=1).max(initial=0.0)
     return 2.0 * float(np.arcsin(min(1.0, 0.5 * chord)))
