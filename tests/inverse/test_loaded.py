@@ -107,7 +107,7 @@ def test_nothing_is_proved_of_a_loaded_arm(heavy):
 
 def test_an_arm_without_any_stable_equilibrium_is_refused(monkeypatch):
     """A stubby one whose payload squeezes it to nothing; all of a coarse grid are tried."""
-    monkeypatch.setattr("softreach.inverse.prepared._MOST", 1000)
+    monkeypatch.setattr("softreach.inverse.prepared._MOST_SEEDS", 1000)
     arm = designs.minimal_trunk(taper=0.0, length=0.2)
     arm = arm.replace(profile=arm.profile.replace(outer_radius=0.1))
     held = arm.with_bounds(np.full((3, 2), [-1e-3, 0.0]))
