@@ -72,7 +72,7 @@ class Base(Part):
 
     @lazy
     def rotation(self) -> Array:
-        """The axes of the base in the world as columns, shape (3, 3), read-only."""
+        """The axes of the base in the world as columns [-], shape (3, 3), read-only."""
         turned = np.array(_as_rotation(self.points), float)
         if np.abs(turned @ turned.T - np.eye(3)).max() > 1e-15:  # typed with fewer digits
             left, _, right = np.linalg.svd(turned)

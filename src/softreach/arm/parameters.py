@@ -349,6 +349,12 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     Raises:
         InvalidInput: An unknown parameter, or one that is given under two names.
         InvalidDesign: No such arm can exist; the error names every fault.
+
+    Examples:
+        >>> from softreach.arm.parameters import changed
+        >>> arm = changed(sr.designs.minimal_trunk(), {"length": 0.3, "taper": 0.02})
+        >>> arm.length, arm.profile.taper
+        (0.3, 0.02)
     """
     as_instance("values", values, Mapping, "a dictionary of parameters")
     known = find_parameters(a_manipulator("arm", arm), tuple(values))

@@ -67,6 +67,7 @@ class Metric:
     unit: str
     """As in "m", "m3", "1/m"; "1" if there is none."""
     meaning: str
+    """Meaning in a few words, for tables and labels."""
     needs: tuple[Need, ...]
     """Arguments of `compute`, in this order."""
     compute: Callable[..., Any]

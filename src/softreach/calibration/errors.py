@@ -24,10 +24,13 @@ class PlacementErrors(NamedTuple):
     """Distances between predicted and measured places [m]."""
 
     median: float
+    """Half of the distances are below it [m]."""
     mean: float
+    """Mean distance [m]."""
     rms: float
+    """Root of the mean square [m]."""
     most: float
-    """95 % of them are below it."""
+    """95 % of the distances are below it [m]."""
     number: int
     """Number of places."""
 
@@ -89,6 +92,7 @@ class Verdict(NamedTuple):
     limit: str
     """"noise", "memory", "physics" or "columns"; "data" where there is too little to tell."""
     sentence: str
+    """The verdict in words, with its numbers."""
 
 
 def judged(

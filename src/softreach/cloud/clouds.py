@@ -82,6 +82,11 @@ def compute_cloud(
             says what to use instead.
         MissingExtra: `softreach[cuda]` is not installed.
         NotPossible: There is no GPU, no driver for it, or the arm has loads.
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=1000)
+        >>> cloud.tip.shape, cloud.activation.shape
+        ((1000, 3), (1000, 3))
     """
     report = None if progress is None else as_function("progress", progress)
     whole = all_inputs(as_tip_map(arm, tol, frame=frame, point=point, device=device))
@@ -128,6 +133,12 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool 
         InvalidInput: The dataset is no cloud, its design, bundles and length do not agree, or
             something else is there.
         NotWritten: It cannot be written.
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=1000)
+        >>> sr.save_cloud(cloud, "trunk.zarr")
+        >>> sr.open_cloud("trunk.zarr").tip.equals(cloud.tip)
+        True
     """
     place, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     schema.check_stored_cloud(cloud)

@@ -59,9 +59,9 @@ class Solution:
     direction_errors: Array
     """Angles between the tip's direction and that wanted [rad], NaN if none is, shape (k,)."""
     conditions: Array
-    """Condition numbers of ∂r/∂γ of the free bundles, infinite on a fold, shape (k,)."""
+    """Condition numbers of ∂r/∂γ of the free bundles [-], infinite on a fold, shape (k,)."""
     margins: Array
-    """Distance to the nearest bound of a free bundle, relative to its range, shape (k,)."""
+    """Distance to the nearest bound of a free bundle over its range [-], shape (k,)."""
     leans: Mask
     """Mask of those whose posture leans to one of two sides, under loads, shape (k,)."""
     sheets: Index

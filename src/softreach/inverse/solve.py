@@ -105,6 +105,12 @@ def solve_inverse(
 
     Raises:
         InvalidInput: Arguments of another shape, not finite, or out of range.
+
+    Examples:
+        >>> arm = sr.designs.minimal_trunk()
+        >>> found = sr.solve_inverse(arm, [[0.2, 0.1, 0.6]])
+        >>> sr.tip_positions(arm, found.activations).round(6)
+        array([[0.2, 0.1, 0.6]])
     """
     prepared = prepared_map(arm, tol, frame=frame, point=point)
     points, box = as_points("targets", targets), prepared.whole.box

@@ -48,6 +48,7 @@ class Finding:
     kind: str
     """"reach", "cover", "stay_inside", "avoid", "limit" or "measure"."""
     verdict: Verdict
+    """"met", "missed" or "undecided"."""
     excess: float
     """0 where it is met; else gaps and distances over L, angles beyond cones [rad], and limits by
     their share [-]. Where it is undecided, what is missed if there were no error."""

@@ -67,8 +67,8 @@ class Target:
     within: float = 0.0
     """Distance to which the tip must come to a place [m]; 0 for the error of the tips."""
     direction: ArrayLike | None = None
-    """Direction of the tip's tangent d3 at the places, in the world and of any length, shape (3,)
-    for all of them or (n, 3); None if any will do."""
+    """Direction of the tip's tangent d3 at the places, in the world and of any length [-], shape
+    (3,) for all of them or (n, 3); None if any will do."""
     cone: float = 0.0
     """Angle from it that is allowed [rad]; with π any direction will do."""
     name: str = ""
@@ -202,12 +202,12 @@ class Limits:
 
     @property
     def given(self) -> dict[str, float]:
-        """Those that there are, by name."""
+        """Limits that are not None, by name [unit of each]."""
         return {name: value for name, value in vars(self).items() if value is not None}
 
     @property
     def of_poses(self) -> dict[str, float]:
-        """Those of them that poses are judged by."""
+        """Given limits that poses are judged by [unit of each]."""
         return {name: value for name, value in self.given.items() if name in _OF_POSES}
 
 

@@ -203,7 +203,7 @@ class HalfSpace(Region):
     point: Triple
     """A point of the plane [m]."""
     normal: Triple
-    """Out of the half-space, of any length."""
+    """Normal that points out of the half-space [-], of any length."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", _triple("point", self.point))

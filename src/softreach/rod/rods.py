@@ -57,7 +57,9 @@ class ArmMap(TipMap):
     unstable: bool = False
     """True if unstable equilibria have tips."""
     arm: Manipulator = field(init=False, compare=False)
+    """The arm."""
     tol: float = field(init=False, compare=False)
+    """Largest tip error over L [-]."""
 
     def __post_init__(self) -> None:
         driving = self.inputs.driving

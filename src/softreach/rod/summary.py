@@ -165,6 +165,10 @@ def describe(arm: Manipulator) -> DesignSummary:
 
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+
+    Examples:
+        >>> print(sr.describe(sr.designs.lce_arm()))  # doctest: +ELLIPSIS
+        bundles                  ...
     """
     check_extension(a_manipulator("arm", arm))
     base_radius, tip_radius = (float(arm.profile.radius(z)) for z in (0.0, arm.length))

@@ -95,6 +95,11 @@ def volume_gradient(
         InvalidInput: Fewer than three free bundles, no parameters, one that the design lacks or
             that counts something, or one whose change holds or frees a bundle.
         InvalidDesign: The design has no neighbors with other values of a parameter.
+
+    Examples:
+        >>> found = sr.volume_gradient(sr.designs.minimal_trunk(), ["taper", "revolution"])
+        >>> found.volume.round(1)  # [m³/rad]
+        array([-1.5,  0.2])
     """
     arm, names = a_manipulator("arm", arm), as_names("parameters", parameters)
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
@@ -150,11 +155,11 @@ class VolumeGradient:
     volume: Array
     """∂V/∂p [m³ per unit of the parameter], shape (parameter,)."""
     volume_error: Array
-    """Errors of these derivatives."""
+    """Errors of these derivatives [m³ per unit]."""
     convex_volume: Array
     """Derivatives of the volume of the convex hull [m³ per unit], shape (parameter,)."""
     convex_volume_error: Array
-    """Errors of these derivatives."""
+    """Errors of these derivatives [m³ per unit]."""
 
     @property
     def route(self) -> str:
@@ -169,7 +174,7 @@ class VolumeGradient:
 
     @property
     def unreachability_error(self) -> Array:
-        """Errors of these derivatives."""
+        """Errors of these derivatives [1 per unit]."""
         volume, convex = self.solid.volume, self.solid.convex_volume
         return (volume * self.convex_volume_error / convex + self.volume_error) / convex
 

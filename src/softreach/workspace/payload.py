@@ -112,7 +112,7 @@ class PayloadCurve:
     lost_shares: Array
     """Share of the activation box that is left out for want of stability [-], shape (n,)."""
     accuracy: float
-    """Relative error allowed in each volume."""
+    """Relative error allowed in each volume [-]."""
     _known: dict[float, _Volume]
 
     @property

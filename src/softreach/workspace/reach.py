@@ -120,6 +120,13 @@ def reachable_set(
 
     Warns:
         SoftreachWarning: The estimated error is larger than asked.
+
+    Examples:
+        >>> reach = sr.reachable_set(sr.designs.minimal_trunk(), accuracy=0.02)
+        >>> print(f"{reach.volume:.3f} m³")
+        0.692 m³
+        >>> reach.contains([[0, 0, 0.5], [0, 0, 2]])
+        array([ True, False])
     """
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)

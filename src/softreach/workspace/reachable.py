@@ -59,7 +59,7 @@ class Shell(NamedTuple):
     """A thin set as a sheet: the area of its middle, half of that of both sides."""
 
     area: Estimate
-    """[m²]."""
+    """Area of the sheet [m²]."""
     thickness: Estimate
     """Volume over that area [m]."""
 

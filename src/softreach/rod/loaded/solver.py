@@ -39,7 +39,7 @@ class Equilibria(NamedTuple):
     margin: Array
     """Margin of stability, from 1 to below 0 [-], shape (n,)."""
     frame: Array
-    """First axis of the world at the nodes, tip first, as the base of the unloaded arm sees it,
+    """First axis of the world at the nodes [-], tip first, as the base of the unloaded arm sees it,
     (n, 3 node); with loads of several directions also the second one, (n, 6 node)."""
 
     @property
