@@ -133,7 +133,9 @@ def test_the_navigation_and_the_pages_are_the_same():
 
 
 def test_files_that_the_design_names_are_there():
-    named = re.findall(r"`([a-z_]+/[\w/]*)(?:\.py)?`", (ROOT / "DESIGN.md").read_text("utf-8"))
+    pages = ROOT / "DESIGN.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "design").glob("*.md"))
+    text = "".join(page.read_text("utf-8") for page in pages)
+    named = re.findall(r"`([a-z_]+/[\w/]*)(?:\.py)?`", text)
     folders = [ROOT, *(path for path in (ROOT / "src").rglob("*") if path.is_dir())]
     assert len(named) > 100
     for name in {name.rstrip("/") for name in named}:
