@@ -73,7 +73,7 @@ def _row(cls: griffe.Class, member: griffe.Object, text: str) -> griffe.Docstrin
     default = _default_of(cls, member.value) if isinstance(member, griffe.Attribute) else ""
     if _is_enum(cls):
         text, default = text or default.strip("\"'"), ""
-    is_said = default and "instance-attribute" in member.labels
+    is_said = default and {"class-attribute", "instance-attribute"} <= member.labels
     said = f"{text} Default: `{default}`." if is_said else text
     return griffe.DocstringAttribute(member.name, annotation=kind, description=said)
 

@@ -57,7 +57,7 @@ class Base(Part):
     """The way the straight arm points: "up", "down" (it hangs; turned about x), "x", "-x" (turned
     about y), "y", "-y" (about x); or a rotation, kept as the rows of its matrix."""
     turn: float = number("ψ", "rad", "turn about the way the arm points", default=0.0)
-    """By the right hand [rad], before the arm is made to point."""
+    """Turn about the axis of the arm by the right hand [rad], before the arm is made to point."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -92,7 +92,7 @@ class Drive(Part):
 
     @property
     def numbers(self) -> dict[str, Number]:
-        """With its bounds, and gains and offsets for each of its bundles."""
+        """Its numbers, with its bounds, and gain and offset of each of its bundles."""
         declared = {
             "lower": ("min u", "lowest input"),
             "upper": ("max u", "highest input"),

@@ -280,7 +280,7 @@ def number(
         high: Largest value.
         above: Largest value that is too small.
         below: Least value that is too large.
-        integer: It counts something.
+        integer: Whether it counts something.
         default: Default of the field; without one it is required, None makes it optional.
         options: Other fields of `Number`, such as `shape`.
 

@@ -52,7 +52,7 @@ class Parameter:
     owner: str = ""
     """The part that it belongs to, such as `left` or `rings[0].material`; "" for the whole arm."""
     number: Number
-    """Its declaration."""
+    """Declaration of the number."""
     places: tuple[Address, ...] = ()
     """The numbers of parts that it is."""
     read: Callable[[Manipulator], tuple[float, ...]] | None = None
@@ -82,7 +82,7 @@ class Parameter:
 
     @property
     def whole(self) -> bool:
-        """It counts something."""
+        """True if it counts something."""
         return self.range.whole
 
     @property

@@ -223,7 +223,7 @@ class Layer(NamedTuple):
     outer_ratio: float
     """Outer radius over R2 [-]."""
     material: Material
-    """Its material."""
+    """Material of the layer."""
 
 
 class Stiffness(NamedTuple):

@@ -56,7 +56,7 @@ class Repeatability(NamedTuple):
     """By how much places differ when inputs are the same."""
 
     rms: float
-    """Of a place about its mean [m]; NaN where no inputs are repeated."""
+    """Scatter of a place about its mean [m]; NaN where no inputs are repeated."""
     pairs: int
     """Pairs of samples that it is of."""
 

@@ -78,7 +78,7 @@ class Calibration(Reported):
     start: Manipulator
     """The design before."""
     data: Measurements
-    """All samples."""
+    """The measurements, those held out among them."""
     held: Mask
     """Samples that the fit did not see, shape (n,)."""
     fit: Fit
@@ -149,7 +149,7 @@ class Calibration(Reported):
 
     @cached_property
     def repeatability(self) -> Repeatability:
-        """By how much the data repeats itself."""
+        """Scatter of the data where inputs are repeated."""
         return repeatability(self.data, self.residuals)
 
     @cached_property

@@ -229,7 +229,7 @@ class Candidate:
     """A design that was judged."""
 
     values: Values
-    """Its free parameters."""
+    """Values of the free parameters."""
     objectives: tuple[Estimate, ...] = ()
     """One for each goal [its unit]; none where requirements are missed."""
     excess: float = 0.0

@@ -69,7 +69,7 @@ class Search(Reported):
 
     @property
     def verdict(self) -> Verdict:
-        """Of the best under all requirements: met, missed or undecided."""
+        """Verdict on the best design under all requirements: met, missed or undecided."""
         if self.best.is_feasible:
             return "undecided" if self.best.undecided else "met"
         return "undecided" if {*self.best.missed} <= {*self.best.undecided} else "missed"

@@ -77,12 +77,12 @@ class Sensitivity:
     gradient_error: Array
     """Errors of `gradient` [goal per unit], (goals, reals)."""
     multipliers: tuple[Multiplier, ...]
-    """Of the first goal, those that decide most first, over their sizes."""
+    """Prices of requirements for the first goal, those that decide most first."""
     residual: float
     """Share of the first goal's slope that no requirement explains [-]: 0 at an optimum, NaN
     without any."""
     variance: tuple[VarianceShares | None, ...]
-    """For each goal; None if one of the designs cannot exist or has no such number."""
+    """Shares of variance for each goal; None if a design cannot exist or has no such number."""
     designs: int
     """Designs that were looked at."""
 

@@ -52,7 +52,7 @@ class Coverage(NamedTuple):
     """Share of a region that the tip reaches."""
 
     name: str
-    """Of the target."""
+    """Name of the target."""
     payload: float | None
     """Mass at the tip [kg]; None for the loads of the design."""
     share: float

@@ -134,8 +134,8 @@ class Keep:
     """The tip alone, or the arm from base to tip as wide as the widest of its body and its bundles
     before activation: tendons outside of the body run through disks of at least that radius."""
     when: Literal["targets", "always"] = "targets"
-    """In the poses that are used at the targets, or in every pose within the bounds, among which
-    the worst is searched for: samples and a polish, no proof."""
+    """Poses that are judged: those used at the targets, or every pose within the bounds, among
+    which samples and a polish search the worst, without proof."""
     clearance: float = 0.0
     """Distance to keep from the boundary [m]."""
     name: str = ""

@@ -89,7 +89,7 @@ class DesignSummary:
 
     @property
     def table(self) -> str:
-        """All but the warnings and the limits of the linear laws, a line each."""
+        """The summary, a line each, without warnings and limits of the linear laws."""
         lines = lines_of(self.rows | self._bundle_rows(), self.arm.length_unit)
         return "\n".join([*lines, *self.lacking])
 

@@ -399,7 +399,7 @@ class TipOutputs(NamedTuple):
     """Arrays for n activations that a tip map fills; None for what is not wanted."""
 
     tips: Array
-    """r [m], shape (n, 3); NaN without an equilibrium."""
+    """Tips r [m], shape (n, 3); NaN without an equilibrium."""
     slopes: Array | None = None
     """∂r/∂γ [m], shape (n, 3, bundles)."""
     twists: Array | None = None
@@ -414,7 +414,7 @@ class TipMotions(NamedTuple):
     """Positions and directions of tips with their derivatives along each activation."""
 
     tips: Array
-    """r [m], shape (n, 3)."""
+    """Tips r [m], shape (n, 3)."""
     slopes: Array
     """∂r/∂γ [m], shape (n, 3, bundles)."""
     directions: Array

@@ -47,7 +47,7 @@ class AllEquilibria:
     activation: Array
     """Activation of each bundle [unit of the bundle], shape (bundles,)."""
     tips: Array
-    """r [m], shape (n, 3)."""
+    """Tips r [m], shape (n, 3)."""
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
     margin: Array

@@ -33,7 +33,7 @@ class Equilibria(NamedTuple):
     """Equilibria of activations, one for each, and where the search for one ended."""
 
     tips: Array
-    """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
+    """Tips r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
     status: Status
     """`TipStatus`, shape (n,)."""
     margin: Array
