@@ -350,7 +350,7 @@ class Uncertainty:
 
     @property
     def sigma(self) -> Array:
-        """Standard deviations [unit of each], infinite where the data is mute, (number,)."""
+        """Standard deviations [unit of each], infinite where unknown, (number,)."""
         return np.where(self.told, np.sqrt(np.diag(self.covariance)), np.inf)
 
     @property

@@ -64,7 +64,7 @@ def compute_cloud(
         seed: Seed of the sampler.
         sampler: `uniform` (the paper's), `boundary`, `sobol` or `grid`; see `sampling.sample_cube`.
         tol: Largest tip error, in L.
-        frame: In which tips are told: that of the "world", or of the "base", whose z is along the
+        frame: Frame of the tips: that of the "world", or of the "base", whose z is along the
             straight arm. The attributes hold it, and the pose of the base.
         point: Name of the marker that counts as the tip, such as that of a tool; by default that
             of the design. Of a tip map its own counts.
