@@ -128,11 +128,14 @@ def test_every_figure_has_words():
 
 def test_the_navigation_and_the_pages_are_the_same():
     named = re.findall(r"(?m)(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
-    assert sorted(named) == [page.name for page in sorted((ROOT / "docs").rglob("*.md"))]
+    pages = (ROOT / "docs").rglob("*.md")
+    assert sorted(named) == sorted(page.relative_to(ROOT / "docs").as_posix() for page in pages)
 
 
 def test_files_that_the_design_names_are_there():
-    named = re.findall(r"`([a-z_]+/[\w/]*)(?:\.py)?`", (ROOT / "DESIGN.md").read_text("utf-8"))
+    pages = ROOT / "DESIGN.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "design").glob("*.md"))
+    text = "".join(page.read_text("utf-8") for page in pages)
+    named = re.findall(r"`([a-z_]+/[\w/]*)(?:\.py)?`", text)
     folders = [ROOT, *(path for path in (ROOT / "src").rglob("*") if path.is_dir())]
     assert len(named) > 100
     for name in {name.rstrip("/") for name in named}:

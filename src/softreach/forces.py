@@ -70,6 +70,12 @@ def blocked_force(
     Raises:
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
         InvalidDesign: A material has no Young's modulus.
+
+    Examples:
+        >>> arm = sr.designs.three_tendon_robot()
+        >>> found = sr.forces.blocked_force(arm, None, [0, 0, 1], start=[4, 4, 4])
+        >>> print(f"{found.force.values[0]:.2f} N")
+        0.63 N
     """
     as_directions("direction", direction)
     progress = as_progress(progress)

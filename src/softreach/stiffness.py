@@ -63,9 +63,9 @@ class PrincipalCompliances(NamedTuple):
     values: Array
     """|∂r| per |F| along each axis of the ellipsoid, largest first [m/N], shape (n, 3)."""
     displacements: Array
-    """Unit vectors along which the tip moves, as rows, shape (n, 3, 3)."""
+    """Unit vectors along which the tip moves [-], as rows, shape (n, 3, 3)."""
     forces: Array
-    """Unit vectors along which a force moves it so, as rows, shape (n, 3, 3).
+    """Unit vectors along which a force moves it so [-], as rows, shape (n, 3, 3).
 
     Those of `displacements` where the compliance is symmetric and the equilibrium stable.
     """

@@ -57,7 +57,7 @@ class Base(Part):
     """The way the straight arm points: "up", "down" (it hangs; turned about x), "x", "-x" (turned
     about y), "y", "-y" (about x); or a rotation, kept as the rows of its matrix."""
     turn: float = number("ψ", "rad", "turn about the way the arm points", default=0.0)
-    """By the right hand [rad], before the arm is made to point."""
+    """Turn about the axis of the arm by the right hand [rad], before the arm is made to point."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -72,7 +72,7 @@ class Base(Part):
 
     @lazy
     def rotation(self) -> Array:
-        """The axes of the base in the world as columns, shape (3, 3), read-only."""
+        """The axes of the base in the world as columns [-], shape (3, 3), read-only."""
         turned = np.array(_as_rotation(self.points), float)
         if np.abs(turned @ turned.T - np.eye(3)).max() > 1e-15:  # typed with fewer digits
             left, _, right = np.linalg.svd(turned)

@@ -42,9 +42,10 @@ class Drive(Part):
     bounds: tuple[float, float]
     """(lower, upper) of u [unit]."""
     gains: Mapping[str, float]
-    """Activation per u of each bundle that it drives, by the bundle's name."""
+    """Activation per u of each bundle that it drives [unit of the bundle per unit of u], by the
+    bundle's name."""
     offsets: Mapping[str, float] = NamedFloats()
-    """Activation of these bundles at u = 0; 0 where none is given."""
+    """Activation of these bundles at u = 0 [unit of the bundle]; 0 where none is given."""
     dead_zone: float = number("u0", "", "largest |u| without effect", low=0.0, default=0.0)
     """Largest |u| that has no effect [unit]."""
 
@@ -91,7 +92,7 @@ class Drive(Part):
 
     @property
     def numbers(self) -> dict[str, Number]:
-        """With its bounds, and gains and offsets for each of its bundles."""
+        """Its numbers, with its bounds, and gain and offset of each of its bundles."""
         declared = {
             "lower": ("min u", "lowest input"),
             "upper": ("max u", "highest input"),

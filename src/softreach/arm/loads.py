@@ -65,21 +65,21 @@ class Loads(Part):
     payload_arm: Triple = number(
         "a", "m", "lever arm of the payload", default=_ZERO, shape="triple"
     )
-    """From the tip to the center of the payload, in the directors of the tip [m]."""
+    """Place of the center of the payload from the tip, in the directors of the tip [m]."""
     tip_force: Triple = number("F", "N", "force on the tip", default=_ZERO, shape="triple")
-    """[N]."""
+    """Force on the tip, in the world [N]."""
     tip_moment: Triple = number("M", "N m", "moment on the tip", default=_ZERO, shape="triple")
-    """[N m]."""
+    """Moment on the tip, in the world [N m]."""
     follower_force: Triple = number(
         "F'", "N", "force that follows the tip", default=_ZERO, shape="triple"
     )
-    """On the tip, in its directors [N]."""
+    """Force on the tip that turns with it, in its directors [N]."""
     follower_moment: Triple = number(
         "M'", "N m", "moment that follows the tip", default=_ZERO, shape="triple"
     )
-    """On the tip, in its directors [N m]."""
+    """Moment on the tip that turns with it, in its directors [N m]."""
     force_per_length: Triple = number("f", "N/m", "force per length", default=_ZERO, shape="triple")
-    """Beside weight, per length before activation [N/m]."""
+    """Force per length before activation, beside weight [N/m]."""
     point_loads: tuple[PointLoad, ...] = ()
     """Forces and moments anywhere along the arm."""
 

@@ -116,18 +116,30 @@ class NamedFloats(Mapping[str, float]):
 class Number:
     """A number of a part of an arm."""
 
-    field: str = ""  # Name in the part
-    symbol: str  # Symbol in formulas
-    meaning: str  # Meaning in a few words
-    allowed: Range  # Unit, limits, and whether it is an integer
+    field: str = ""
+    """Name in the part."""
+    symbol: str
+    """Symbol in formulas."""
+    meaning: str
+    """Meaning in a few words."""
+    allowed: Range
+    """Unit, limits, and whether it is an integer."""
     shape: Shape = "single"
-    along: type | None = None  # Class of functions along the arm that may take its place
-    optional: bool = False  # None is allowed
-    named: bool = False  # The name of a station of the arm may take its place
-    pair: str = ""  # Two values that may take its place, such as "two at its ends"; "" for none
-    each: bool = False  # One value for each bundle of an actuator may take its place
-    instead_of: str = ""  # Field that says the same in another way: one of the two is given
-    hint: str = ""  # Ends the sentence "give exactly one of ..."
+    """Whether it is one number, three, or several."""
+    along: type | None = None
+    """Class of functions along the arm that may take its place."""
+    optional: bool = False
+    """True if None is allowed."""
+    named: bool = False
+    """The name of a station of the arm may take its place."""
+    pair: str = ""
+    """Two values that may take its place, such as "two at its ends"; "" for none."""
+    each: bool = False
+    """One value for each bundle of an actuator may take its place."""
+    instead_of: str = ""
+    """Field that says the same in another way: one of the two is given."""
+    hint: str = ""
+    """Ends the sentence "give exactly one of ..."."""
 
     @property
     def unit(self) -> str:
@@ -147,7 +159,7 @@ class Number:
 
     @lazy
     def usual(self) -> tuple[float, float]:
-        """Ends between which a float is neither refused nor changed, both included."""
+        """Ends [unit] between which a float is neither refused nor changed, both included."""
         if self.shape != "single" or self.allowed.whole:
             return math.inf, -math.inf
         each = self.allowed, self._sense
@@ -268,9 +280,18 @@ def number(
         high: Largest value.
         above: Largest value that is too small.
         below: Least value that is too large.
-        integer: It counts something.
+        integer: Whether it counts something.
         default: Default of the field; without one it is required, None makes it optional.
         options: Other fields of `Number`, such as `shape`.
+
+    Examples:
+        >>> from dataclasses import dataclass
+        >>> from softreach.arm.number import fields_of, number
+        >>> @dataclass(frozen=True, kw_only=True)
+        ... class Disk:
+        ...     radius: float = number("R", "m", "outer radius", above=0.0)
+        >>> fields_of(Disk)["radius"].key
+        'radius_m'
     """
     ends = max(low, above), min(high, below)
     allowed = Range(*ends, unit, above > -math.inf, below < math.inf, integer)

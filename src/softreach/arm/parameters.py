@@ -52,7 +52,7 @@ class Parameter:
     owner: str = ""
     """The part that it belongs to, such as `left` or `rings[0].material`; "" for the whole arm."""
     number: Number
-    """Its declaration."""
+    """Declaration of the number."""
     places: tuple[Address, ...] = ()
     """The numbers of parts that it is."""
     read: Callable[[Manipulator], tuple[float, ...]] | None = None
@@ -82,7 +82,7 @@ class Parameter:
 
     @property
     def whole(self) -> bool:
-        """It counts something."""
+        """True if it counts something."""
         return self.range.whole
 
     @property
@@ -349,6 +349,12 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     Raises:
         InvalidInput: An unknown parameter, or one that is given under two names.
         InvalidDesign: No such arm can exist; the error names every fault.
+
+    Examples:
+        >>> from softreach.arm.parameters import changed
+        >>> arm = changed(sr.designs.minimal_trunk(), {"length": 0.3, "taper": 0.02})
+        >>> arm.length, arm.profile.taper
+        (0.3, 0.02)
     """
     as_instance("values", values, Mapping, "a dictionary of parameters")
     known = find_parameters(a_manipulator("arm", arm), tuple(values))

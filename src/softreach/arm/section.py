@@ -173,7 +173,7 @@ class Measured(Part):
 
     @property
     def stiffnesses(self) -> tuple[float | AlongArm | None, ...]:
-        """K0, K1 and K3, each None where it was not measured."""
+        """K0 [N], K1 and K3 [N m²], each None where it was not measured."""
         bending = self.bending_stiffness
         first = bending[0] if isinstance(bending, tuple) else bending
         return self.axial_stiffness, first, self.torsion_stiffness
@@ -223,7 +223,7 @@ class Layer(NamedTuple):
     outer_ratio: float
     """Outer radius over R2 [-]."""
     material: Material
-    """Its material."""
+    """Material of the layer."""
 
 
 class Stiffness(NamedTuple):
@@ -344,7 +344,7 @@ class Section(Part):
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Z/L inside (0, 1) where what was measured is not smooth."""
+        """Z/L inside (0, 1) where what was measured is not smooth [-]."""
         return () if self.measured is None else self.measured.breaks
 
     @property

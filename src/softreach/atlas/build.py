@@ -260,6 +260,12 @@ def build_atlas(
 
     Warns:
         SoftreachWarning: Gaps, failed or damaged designs, or points too sparse for the radius.
+
+    Examples:
+        >>> space = sr.DesignSpace.grid(sr.designs.minimal_trunk(), taper=[0.0, 0.03])
+        >>> atlas = sr.build_atlas(space, "tapers.zarr", n=500, metrics=["convex"])
+        >>> atlas.convex_volume.sel(taper=0.03).item() > 0
+        True
     """
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)

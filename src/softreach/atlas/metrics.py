@@ -65,12 +65,13 @@ class Metric:
     name: str
     """Name of the variable in the atlas."""
     unit: str
-    """As in "m", "m3", "1/m"; "1" if there is none."""
+    """Unit, such as "m", "m3", "1/m"; "1" if there is none."""
     meaning: str
+    """Meaning in a few words, for tables and labels."""
     needs: tuple[Need, ...]
     """Arguments of `compute`, in this order."""
     compute: Callable[..., Any]
-    """Returns the number. Worker processes can use functions of a module only, no lambdas."""
+    """Function that returns the number. Worker processes take those of a module, no lambdas."""
     over: tuple[str, ...] = ()
     """Dimensions of the result: () for a number, ("station", "quantile") for a profile."""
     nan_if: str = ""

@@ -88,14 +88,19 @@ class AtlasStatus:
     """Status of an atlas: numbers of its designs."""
 
     designs: int
+    """Number of designs, gaps among them."""
     done: int
+    """Designs whose cloud and metrics are stored."""
     failed: int
+    """Designs that failed; `messages` says why."""
     gaps: int
+    """Combinations of parameters that no arm can have."""
     unstable: int
     """Designs of which no activation has a stable equilibrium."""
     damaged: int
     """Designs of which a stored chunk is damaged; the command that built them does so again."""
     todo: int
+    """Designs that are still to be computed."""
     tips_verified: bool = field(compare=False)
     """True if stored tips were read too, or there are none."""
     messages: dict[int, str]
@@ -218,6 +223,12 @@ def best_designs(
 
     Raises:
         InvalidInput: No such metric or parameter, or an argument of another kind.
+
+    Examples:
+        >>> space = sr.DesignSpace.grid(sr.designs.minimal_trunk(), taper=[0.0, 0.03])
+        >>> atlas = sr.build_atlas(space, "tapers.zarr", n=500, metrics=["convex"])
+        >>> sr.atlas.best_designs(atlas, "convex_volume").taper.values
+        array([0.])
     """
     metric, smallest = arguments.as_text("metric", metric), arguments.as_flag("smallest", smallest)
     count, opened = arguments.as_integer("count", count, 1), opened_atlas(atlas)

@@ -82,6 +82,18 @@ def calibrate(
 
     Warns:
         SoftreachWarning: The fit did not converge, or numbers end at a bound.
+
+    Examples:
+        >>> from softreach.arm.parameters import changed
+        >>> arm, pulls = sr.designs.three_tendon_robot(), np.eye(3) * 5.0
+        >>> x, y, z = sr.tip_positions(arm, pulls).T
+        >>> data = {f"tendon {k + 1}_N": pulls[:, k] for k in range(3)}
+        >>> data |= {"tip_x_m": x, "tip_y_m": y, "tip_z_m": z}
+        >>> modulus = "rings[0].material.young_modulus"
+        >>> stiff = changed(arm, {modulus: 60e9})
+        >>> found = sr.calibrate(stiff, data, free=[modulus], rivals=False)
+        >>> print(f"{found.values[modulus] / 1e9:.1f} GPa")
+        54.0 GPa
     """
     begin = perf_counter()
     arm = a_manipulator("arm", arm)

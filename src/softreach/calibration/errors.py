@@ -24,10 +24,13 @@ class PlacementErrors(NamedTuple):
     """Distances between predicted and measured places [m]."""
 
     median: float
+    """Half of the distances are below it [m]."""
     mean: float
+    """Mean distance [m]."""
     rms: float
+    """Root of the mean square [m]."""
     most: float
-    """95 % of them are below it."""
+    """95 % of the distances are below it [m]."""
     number: int
     """Number of places."""
 
@@ -53,7 +56,7 @@ class Repeatability(NamedTuple):
     """By how much places differ when inputs are the same."""
 
     rms: float
-    """Of a place about its mean [m]; NaN where no inputs are repeated."""
+    """Scatter of a place about its mean [m]; NaN where no inputs are repeated."""
     pairs: int
     """Pairs of samples that it is of."""
 
@@ -89,6 +92,7 @@ class Verdict(NamedTuple):
     limit: str
     """"noise", "memory", "physics" or "columns"; "data" where there is too little to tell."""
     sentence: str
+    """The verdict in words, with its numbers."""
 
 
 def judged(

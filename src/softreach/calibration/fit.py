@@ -341,21 +341,21 @@ class Uncertainty:
     """Covariance of the fitted numbers."""
 
     covariance: Array
-    """Of what the data tells, shape (number, number)."""
+    """Covariance that the data supports [units of both numbers], shape (number, number)."""
     told: Mask
     """False for a number that the data does not tell at the end of the fit, of which no residuals
     are left to say how well, or which is at a bound; shape (number,)."""
     freedom: Array
-    """Degrees of freedom of the interval of each number, shape (number,)."""
+    """Degrees of freedom of the interval of each number [-], shape (number,)."""
 
     @property
     def sigma(self) -> Array:
-        """Standard deviations, infinite for what the data does not tell, shape (number,)."""
+        """Standard deviations [unit of each], infinite where unknown, (number,)."""
         return np.where(self.told, np.sqrt(np.diag(self.covariance)), np.inf)
 
     @property
     def correlation(self) -> Array:
-        """Shape (number, number)."""
+        """Correlation of the numbers [-], shape (number, number)."""
         sigma = np.sqrt(np.diag(self.covariance))
         sigma = np.where(sigma > 0, sigma, 1.0)
         return self.covariance / np.outer(sigma, sigma)

@@ -62,7 +62,7 @@ class Measurements:
     """Poses of an arm, one row for each sample."""
 
     inputs: Array
-    """Inputs of the arm, in their units, shape (n, input)."""
+    """Inputs of the arm [unit of each], shape (n, input)."""
     places: Array
     """Markers in the axes of the data [m], NaN where one was not seen, shape (n, marker, 3)."""
     input_names: tuple[str, ...]

@@ -44,9 +44,9 @@ class PosePlan:
     markers: tuple[str, ...]
     """Markers that are going to be seen."""
     activations: Array
-    """Inputs of the arm, in their units, in an order by chance; shape (n, input)."""
+    """Inputs of the arm [unit of each], in an order by chance; shape (n, input)."""
     information: Array
-    """JᵀJ of all places by the numbers, in m² over the squares of their units."""
+    """JᵀJ of all places by the numbers [m² over the units of both], shape (number, number)."""
 
     def __len__(self) -> int:
         return len(self.activations)

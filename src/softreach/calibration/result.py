@@ -60,10 +60,13 @@ class Rival(NamedTuple):
     """Another law, fitted to the same samples."""
 
     name: str
+    """Name of the law."""
     numbers: int
     """Number of fitted parameters."""
     train: PlacementErrors
+    """Errors at the samples that it was fitted to."""
     held_out: PlacementErrors
+    """Errors at the samples that were held out."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,17 +78,21 @@ class Calibration(Reported):
     start: Manipulator
     """The design before."""
     data: Measurements
-    """All samples."""
+    """The measurements, those held out among them."""
     held: Mask
     """Samples that the fit did not see, shape (n,)."""
     fit: Fit
+    """End of the fit: the fitted numbers and what is left of the residuals."""
     uncertainty: Uncertainty
+    """Covariance of the fitted numbers."""
     date: str
+    """Day of the fit, such as "2026-11-27"."""
     rivals: tuple[Rival, ...] = ()
     """Other laws on the same samples."""
     exchange: tuple[str, float] | None = None
     """Columns by whose exchange the same numbers would fit far better, and the error then [m]."""
     seconds: float = 0.0
+    """Time that the fit took [s]."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,12 +101,12 @@ class Calibration(Reported):
 
     @property
     def values(self) -> dict[str, float]:
-        """Fitted numbers by name, in their units."""
+        """Fitted numbers by name [unit of each]."""
         return dict(zip(self.names, self.fit.values.tolist(), strict=True))
 
     @property
     def sigma(self) -> dict[str, float]:
-        """Their standard deviations."""
+        """Standard deviations of the fitted numbers by name [unit of each]."""
         return dict(zip(self.names, self.uncertainty.sigma.tolist(), strict=True))
 
     @property
@@ -142,7 +149,7 @@ class Calibration(Reported):
 
     @cached_property
     def repeatability(self) -> Repeatability:
-        """By how much the data repeats itself."""
+        """Scatter of the data where inputs are repeated."""
         return repeatability(self.data, self.residuals)
 
     @cached_property
@@ -188,13 +195,13 @@ class Calibration(Reported):
 
     @property
     def ratios(self) -> dict[str, float]:
-        """Fitted numbers over those of the design, of all that cannot be below 0 and are not."""
+        """Fitted numbers over those of the design [-], of numbers that stay above 0."""
         numbers = zip(self.fit.free.numbers, self.fit.values.tolist(), strict=True)
         return {n.name: v / n.start for n, v in numbers if n.range.low >= 0 and n.start > 0}
 
     @property
     def correlated(self) -> list[tuple[str, str, float]]:
-        """Pairs of numbers that the data hardly tells apart, with their correlation."""
+        """Pairs of numbers that the data hardly tells apart, with their correlation [-]."""
         matrix, names = self.uncertainty.correlation, self.names
         pairs = np.argwhere(np.triu(np.abs(matrix) > _CORRELATED, 1)).tolist()
         return [(names[a], names[b], float(matrix[a, b])) for a, b in pairs]

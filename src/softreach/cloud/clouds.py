@@ -64,7 +64,7 @@ def compute_cloud(
         seed: Seed of the sampler.
         sampler: `uniform` (the paper's), `boundary`, `sobol` or `grid`; see `sampling.sample_cube`.
         tol: Largest tip error, in L.
-        frame: In which tips are told: that of the "world", or of the "base", whose z is along the
+        frame: Frame of the tips: that of the "world", or of the "base", whose z is along the
             straight arm. The attributes hold it, and the pose of the base.
         point: Name of the marker that counts as the tip, such as that of a tool; by default that
             of the design. Of a tip map its own counts.
@@ -82,6 +82,11 @@ def compute_cloud(
             says what to use instead.
         MissingExtra: `softreach[cuda]` is not installed.
         NotPossible: There is no GPU, no driver for it, or the arm has loads.
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=1000)
+        >>> cloud.tip.shape, cloud.activation.shape
+        ((1000, 3), (1000, 3))
     """
     report = None if progress is None else as_function("progress", progress)
     whole = all_inputs(as_tip_map(arm, tol, frame=frame, point=point, device=device))
@@ -128,6 +133,12 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool 
         InvalidInput: The dataset is no cloud, its design, bundles and length do not agree, or
             something else is there.
         NotWritten: It cannot be written.
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=1000)
+        >>> sr.save_cloud(cloud, "trunk.zarr")
+        >>> sr.open_cloud("trunk.zarr").tip.equals(cloud.tip)
+        True
     """
     place, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     schema.check_stored_cloud(cloud)

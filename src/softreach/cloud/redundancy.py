@@ -60,6 +60,11 @@ def activation_distance(
     Raises:
         InvalidInput: No cloud, tips or activations that are not finite, a radius below zero, or
             queries that are no samples of the cloud.
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.redundant_trunk(), n=5000)
+        >>> sr.activation_distance(cloud, radius=0.1, queries=3).values.round(1)
+        array([0.8, 0.6, 0.4])
     """
     import xarray as xr
 

@@ -67,6 +67,11 @@ def concave_hull(
 
     References:
         [EdelsbrunnerMuecke1994]
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=20_000)
+        >>> print(f"{sr.concave_hull(cloud.tip, alpha=0.1).volume:.2f} m³")
+        0.63 m³
     """
     bias, positions, radius = as_flag("bias", bias), _positions(points), _radius(alpha, points)
     quarter = None

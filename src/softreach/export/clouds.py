@@ -141,6 +141,10 @@ def export_cloud(
             something else is there.
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=1000)
+        >>> sr.export.export_cloud(cloud, "cloud.csv", unit="mm")
     """
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     cloud = a_cloud("cloud", cloud)

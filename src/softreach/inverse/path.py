@@ -79,6 +79,12 @@ def track_path(
 
     Raises:
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
+
+    Examples:
+        >>> path = sr.track_path(sr.designs.minimal_trunk(), [[0.2, 0.1, 0.6], [0.2, 0.15, 0.6]])
+        >>> path.activation.values.round(2)
+        array([[-1.14, -0.82, -0.92],
+               [-1.16, -0.85, -0.89]])
     """
     points = as_points("path", path)
     tip_map = measured_bundles(as_tip_map(arm, tol, point=point))

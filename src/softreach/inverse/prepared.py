@@ -59,7 +59,7 @@ class PreparedMap:
     whole: TipMap
     """The tip map of all bundles, whose activations are in its `measures`."""
     cells: int = _CELLS
-    """With three free bundles: cells along each axis of the activation box."""
+    """Cells along each axis of the activation box, with three free bundles."""
 
     @lazy
     def tip_map(self) -> TipMap:

@@ -35,13 +35,12 @@ class Status(IntEnum):
     """Outcome of the search for a target."""
 
     REACHED = 0
-    """Some activation within the bounds puts the tip there, in a stable equilibrium, or as near as
-    `tol`, the error of the tips, can tell, or as `within` asks; its residual says how near."""
+    """Some activation within the bounds puts the tip there, stable, to `tol` or `within`; its
+    residual says how near."""
     UNREACHABLE = 1
-    """None does, which is proved: no tip is nearer than `gap_bound`, which exceeds `tol` L."""
+    """It is proved that no activation does: no tip is nearer than `gap_bound`, above `tol` L."""
     NOT_FOUND = 2
-    """The search ended without one, farther away than `tol` L, and without a proof that there is
-    none."""
+    """The search found no activation, and no proof that there is none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,9 +58,9 @@ class Solution:
     direction_errors: Array
     """Angles between the tip's direction and that wanted [rad], NaN if none is, shape (k,)."""
     conditions: Array
-    """Condition numbers of ∂r/∂γ of the free bundles, infinite on a fold, shape (k,)."""
+    """Condition numbers of ∂r/∂γ of the free bundles [-], infinite on a fold, shape (k,)."""
     margins: Array
-    """Distance to the nearest bound of a free bundle, relative to its range, shape (k,)."""
+    """Distance to the nearest bound of a free bundle over its range [-], shape (k,)."""
     leans: Mask
     """Mask of those whose posture leans to one of two sides, under loads, shape (k,)."""
     sheets: Index
@@ -79,7 +78,7 @@ class Solution:
     """A proved lower bound of the distance to all tips within the bounds [m], more than their
     error; 0 if nothing is proved."""
     tip_maps: tuple[TipMap, ...]
-    """That of postures from rest, and those of other sheets of postures that loads leave."""
+    """Tip maps: that of postures from rest, and those of other sheets that loads leave."""
 
     def __len__(self) -> int:
         return len(self.activations)
@@ -186,7 +185,7 @@ class Solutions(Sequence[Solution]):
     bundles: tuple[str, ...]
     """Names of the bundles that were solved for."""
     tip_maps: tuple[TipMap, ...]
-    """That of postures from rest, and those of other sheets."""
+    """Tip maps: that of postures from rest, and those of other sheets."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:

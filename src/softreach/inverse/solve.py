@@ -100,8 +100,8 @@ def solve_inverse(
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
             keeps its own.
-        frame: In which targets and directions are told: that of the "world", or of the "base",
-            whose z is along the straight arm.
+        frame: That of targets and directions: "world", or "base", whose z is along the straight
+            arm.
         point: Name of the marker that counts as the tip, such as that of a tool; by default that
             of the design. Of a tip map its own counts.
 
@@ -111,6 +111,12 @@ def solve_inverse(
     Raises:
         InvalidInput: Arguments of another shape, not finite, or out of range; both a direction and
             an orientation.
+
+    Examples:
+        >>> arm = sr.designs.minimal_trunk()
+        >>> solutions = sr.solve_inverse(arm, [[0.2, 0.1, 0.6]])
+        >>> sr.tip_positions(arm, solutions.activations).round(6)
+        array([[0.2, 0.1, 0.6]])
     """
     prepared = prepared_map(arm, tol, frame=frame, point=point)
     points, box = as_points("targets", targets), prepared.whole.box

@@ -72,34 +72,39 @@ class Spread:
     """A number of arms as they are made: to first order, and of arms really made."""
 
     name: str
+    """Name of the number."""
     unit: str
     """SI unit; "1" for none."""
     nominal: float
-    """Of the design itself."""
+    """Value of the design itself [unit]."""
     mean: float
+    """Mean of the arms to first order [unit]."""
     deviation: float
-    """Standard deviation."""
+    """Standard deviation to first order [unit]."""
     quantile: float
-    """5 % quantile of the arms."""
+    """Quantile of the arms to first order [unit]: 5 %, or 95 % where small values are good."""
     error: float = 0.0
-    """Of the mean, from how finely sets were computed."""
+    """Error of the mean, from how finely sets were computed [unit]."""
     sense: float = 1.0
-    """1 if large values are good, -1 if small ones are."""
+    """1 if large values are good, -1 if small ones are [-]."""
     made: int = 0
     """Arms that were made; the fields below are NaN without any."""
     made_mean: float = math.nan
+    """Mean of the arms made [unit]."""
     made_error: float = math.nan
-    """Standard error of their mean."""
+    """Standard error of `made_mean` [unit]."""
     made_deviation: float = math.nan
+    """Standard deviation of the arms made [unit]."""
     deviation_error: float = math.nan
-    """Standard error of their standard deviation."""
+    """Standard error of `made_deviation` [unit]."""
     made_quantile: float = math.nan
+    """Quantile of the arms made [unit]."""
     quantile_error: float = math.nan
-    """Standard error of their quantile, from the ranks within one of it."""
+    """Standard error of `made_quantile`, from the ranks within one of it [unit]."""
 
     @property
     def level(self) -> float:
-        """Share of arms below the quantile: 0.05, or 0.95 where small values are good."""
+        """Share of arms below the quantile [-]: 0.05, or 0.95 where small values are good."""
         return _QUANTILE if self.sense > 0.0 else 1.0 - _QUANTILE
 
     @property

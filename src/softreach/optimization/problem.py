@@ -90,9 +90,13 @@ class Objective:
     """A number of a design that a search makes large or small."""
 
     name: str
+    """Name, as `search` takes it."""
     unit: str
+    """SI unit; "1" for none."""
     meaning: str
+    """Meaning in a few words."""
     compute: Callable[[DesignCase], Estimate]
+    """Function from a design to its number and the error of that."""
     asks: str = ""
     """Part of the requirements that it is about: "targets" or "regions"; "" for none."""
     smooth: bool = True
@@ -225,17 +229,18 @@ class Candidate:
     """A design that was judged."""
 
     values: Values
-    """Its free parameters."""
+    """Values of the free parameters."""
     objectives: tuple[Estimate, ...] = ()
-    """One for each goal; none where requirements are missed."""
+    """One for each goal [its unit]; none where requirements are missed."""
     excess: float = 0.0
-    """Sum of what is missed, over L or relative; 0 if all requirements are met, infinite where no
-    such arm can exist."""
+    """Sum of what is missed, over L or relative [-]; 0 if all requirements are met, infinite where
+    no such arm can exist."""
     missed: Mapping[str, float] = field(default_factory=dict)
-    """Part of it by requirement."""
+    """Share of `excess` [-] by requirement."""
     undecided: tuple[str, ...] = ()
     """Requirements whose margin is smaller than the error of that."""
     fidelity: Fidelity = "coarse"
+    """Accuracy at which it was judged."""
     fault: str = ""
     """Reason why no such arm can exist, or why it has no such number."""
     designs: int = 1

@@ -45,6 +45,7 @@ class Search(Reported):
     """The best designs of a search."""
 
     problem: Problem
+    """Parameters, requirements and goals of the search."""
     front: tuple[Candidate, ...]
     """Designs that no other beats in every objective, judged to full accuracy; for one objective
     the best alone. Without a design that meets all requirements, the one that misses least."""
@@ -55,8 +56,9 @@ class Search(Reported):
     designs: int
     """Designs that were looked at, those of polishes too."""
     seconds: float
-    """Time of this run, without those that it went on from."""
+    """Time of this run [s], without those that it went on from."""
     seed: int
+    """Seed of the sampler."""
     sampler: str
     """Sampler of Optuna, as chosen."""
 
@@ -67,7 +69,7 @@ class Search(Reported):
 
     @property
     def verdict(self) -> Verdict:
-        """Of the best under all requirements: met, missed or undecided."""
+        """Verdict on the best design under all requirements: met, missed or undecided."""
         if self.best.is_feasible:
             return "undecided" if self.best.undecided else "met"
         return "undecided" if {*self.best.missed} <= {*self.best.undecided} else "missed"

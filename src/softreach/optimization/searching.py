@@ -92,6 +92,12 @@ def search(
         InvalidInput: An argument out of range, an unknown parameter or objective, or a storage that
             cannot be used or belongs to another search.
         MissingExtra: Optuna is not installed.
+
+    Examples:
+        >>> arm, free = sr.designs.minimal_trunk(), {"taper": (0.0, 0.05)}
+        >>> found = sr.search(arm, free, maximize="exact_volume", designs=4, accuracy=0.1)
+        >>> print(f"taper of {found.best.values['taper']:.3f} rad")
+        taper of 0.028 rad
     """
     needs = Requirements() if requirements is None else requirements
     as_instance("requirements", needs, Requirements, "Requirements")

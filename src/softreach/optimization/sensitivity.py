@@ -38,7 +38,8 @@ class Multiplier(NamedTuple):
     name: str
     """Requirement, place of a target, or end of a parameter's range."""
     value: float
-    """Gain of the goal per unit that is allowed more; for a place per m that it comes nearer."""
+    """Gain of the goal per unit that is allowed more [goal per unit]; for a place per m that it
+    comes nearer."""
     unit: str
     """Unit of what is allowed; "" where it is that of the limit."""
 
@@ -47,12 +48,13 @@ class VarianceShares(NamedTuple):
     """Share of a goal's variance over the searched ranges by each free parameter."""
 
     first: Array
-    """By itself: Sobol's index of first order, shape (parameters,)."""
+    """Share of each parameter by itself [-]: Sobol's index of first order, shape (parameters,)."""
     first_error: Array
-    """Half the confidence interval of 95 %, by bootstrap over the rows of designs."""
+    """Half the confidence interval of 95 % [-], by bootstrap over the rows of designs."""
     total: Array
-    """With all that it does together with others: the total index."""
+    """Share of each parameter together with others [-]: the total index, shape (parameters,)."""
     total_error: Array
+    """Half the confidence interval of `total` [-], as of `first`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -60,7 +62,9 @@ class Sensitivity:
     """Influences on a design: of parameters nearby and over their ranges, and of requirements."""
 
     goals: tuple[str, ...]
+    """Names of the goals."""
     goal_units: tuple[str, ...]
+    """Unit of each goal."""
     reals: tuple[str, ...]
     """Parameters that can change a little."""
     units: tuple[str, ...]
@@ -71,12 +75,14 @@ class Sensitivity:
     """Derivatives of the goals with poses that follow [goal per unit], (goals, reals); NaN of goals
     without derivatives."""
     gradient_error: Array
+    """Errors of `gradient` [goal per unit], (goals, reals)."""
     multipliers: tuple[Multiplier, ...]
-    """Of the first goal, those that decide most first, over their sizes."""
+    """Prices of requirements for the first goal, those that decide most first."""
     residual: float
-    """Part of the goal's slope that no requirement explains: 0 at an optimum, NaN without any."""
+    """Share of the first goal's slope that no requirement explains [-]: 0 at an optimum, NaN
+    without any."""
     variance: tuple[VarianceShares | None, ...]
-    """For each goal; None if one of the designs cannot exist or has no such number."""
+    """Shares of variance for each goal; None if a design cannot exist or has no such number."""
     designs: int
     """Designs that were looked at."""
 

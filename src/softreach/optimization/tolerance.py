@@ -46,16 +46,17 @@ class TargetTolerance(NamedTuple):
     """Probability that each place of a target is within reach of an arm as it is made."""
 
     name: str
+    """Name of the target."""
     probability: Array
-    """To first order, under the worst of the payloads, shape (places,)."""
+    """Probability to first order [-], under the worst of the payloads, shape (places,)."""
     made: Array
-    """Share of the arms made that reach it, NaN for places that were not tried."""
+    """Share of the arms made that reach it [-], NaN for places that were not tried."""
     arms: int
     """Arms that were made."""
 
     @property
     def made_error(self) -> Array:
-        """Standard errors of these shares; with 0 or 1, what one arm more would make of it."""
+        """Standard errors of these shares [-]; with 0 or 1, what one arm more would make of it."""
         return share_error(self.made, max(self.arms, 1))
 
     @property
@@ -124,6 +125,7 @@ class Tolerance:
     """Numbers of a design as it is made."""
 
     arm: Manipulator
+    """The design."""
     parameters: tuple[str, ...]
     """Names of the parameters that deviate."""
     units: tuple[str, ...]
@@ -131,17 +133,18 @@ class Tolerance:
     sigmas: Array
     """Standard deviation of each [its unit], shape (parameters,)."""
     kept: Spread
-    """Share of the reachable volume that is still reached."""
+    """Share of the reachable volume that is still reached [-]."""
     volume: Spread
     """Reachable volume [m³]."""
     unreachability: Spread
-    """Unreachability; its quantile is the 95 % one."""
+    """Unreachability [-]; its quantile is the 95 % one."""
     targets: tuple[TargetTolerance, ...]
     """Targets that have places."""
     regions: tuple[Spread, ...]
-    """Share of each region that is covered."""
+    """Share of each region that is covered [-]."""
     costs: Array
-    """Mean share of the volume that is lost if a parameter deviates alone, shape (parameters,)."""
+    """Mean share of the volume that is lost if a parameter deviates alone [-], shape
+    (parameters,)."""
     made: int
     """Arms that were made to check all this."""
     impossible: int
@@ -154,7 +157,7 @@ class Tolerance:
 
     @property
     def spreads(self) -> tuple[Spread, ...]:
-        """All that is but one number, regions last."""
+        """Every result that is one number [its unit], regions last."""
         return self.kept, self.volume, self.unreachability, *self.regions
 
     def to_dataset(self) -> xr.Dataset:

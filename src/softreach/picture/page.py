@@ -59,8 +59,10 @@ class ColorScale(NamedTuple):
 class Figure3D:
     """A figure that turns in a browser; `save_figure` writes it as .html, notebooks show it."""
 
-    html: str = field(repr=False)  # The page
-    note: str  # Points and triangles that it shows, and of how many; empty for arms alone
+    html: str = field(repr=False)
+    """The page, in one file."""
+    note: str
+    """Points and triangles that it shows, and of how many; empty for arms alone."""
 
     def _repr_html_(self) -> str:
         page = html.escape(self.html, quote=True)

@@ -167,9 +167,13 @@ class DesignPanel(NamedTuple):
     """One arm in a row of arms."""
 
     title: str
+    """Text above the arm."""
     arm: Manipulator
+    """The arm that is drawn."""
     view: View = "front"
-    bundles: Collection[int] | None = None  # Bundles to draw, by index; None for all
+    """Side from which it is seen."""
+    bundles: Collection[int] | None = None
+    """Bundles to draw, by index; None for all."""
 
 
 def plot_designs(

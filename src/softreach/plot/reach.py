@@ -185,6 +185,10 @@ def plot_views(
     Raises:
         InvalidInput: As `plot_cloud`; an arm beside a cloud that does not know L, without a unit.
         MissingExtra: matplotlib is not installed.
+
+    Examples:
+        >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=1000)
+        >>> sr.plot.save_figure(sr.plot.plot_views(cloud), "cloud.png")
     """
     cloud = a_cloud("cloud", cloud)
     counted = style.unit_of(cloud["tip"], unit)

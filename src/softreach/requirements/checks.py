@@ -52,13 +52,13 @@ class Coverage(NamedTuple):
     """Share of a region that the tip reaches."""
 
     name: str
-    """Of the target."""
+    """Name of the target."""
     payload: float | None
     """Mass at the tip [kg]; None for the loads of the design."""
     share: float
+    """Share of the places tried that the tip reaches [-]."""
     error: float
-    """Standard deviation of a share of so many places, which are spread more evenly than chance
-    would."""
+    """Standard deviation of the share [-]; the places are spread more evenly than chance would."""
     places: int
     """Number of places in the region that were tried."""
 
@@ -70,6 +70,7 @@ class Check(Reported):
     arm: Manipulator
     """The design, with its own loads."""
     requirements: Requirements
+    """The requirements."""
     payloads: tuple[float | None, ...]
     """Masses at the tip [kg]; None for the loads of the design."""
     findings: tuple[Finding, ...]
@@ -77,10 +78,11 @@ class Check(Reported):
     coverages: tuple[Coverage, ...]
     """Shares of regions that are to be covered, by payload and target."""
     accuracy: float
+    """Relative error allowed in shares of regions and in volumes [-]."""
     gaps: Array
     """Distance of the tip to every place of every target [m], shape (payload, place)."""
     poses: Array
-    """Inputs chosen for each place, in their units, shape (payload, place, inputs)."""
+    """Inputs chosen for each place [unit], shape (payload, place, inputs)."""
     effort: Array
     """√Σ(γ/g)² of these, g being the larger size of the bounds of an input [-], shape (payload,
     place)."""
@@ -241,6 +243,12 @@ def check(
 
     Warns:
         SoftreachWarning: The error of a reachable set is larger than asked.
+
+    Examples:
+        >>> target = sr.requirements.Target([0.2, 0.1, 0.6], name="shelf")
+        >>> found = sr.check(sr.designs.minimal_trunk(), sr.Requirements(targets=[target]))
+        >>> found.findings[0].verdict
+        'met'
     """
     arm = a_manipulator("arm", arm).at_point(point)
     needs = as_instance("requirements", requirements, Requirements, "Requirements")

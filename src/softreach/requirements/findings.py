@@ -48,11 +48,12 @@ class Finding:
     kind: str
     """"reach", "cover", "stay_inside", "avoid", "limit" or "measure"."""
     verdict: Verdict
+    """"met", "missed" or "undecided"."""
     excess: float
     """0 where it is met; else gaps and distances over L, angles beyond cones [rad], and limits by
     their share [-]. Where it is undecided, what is missed if there were no error."""
     text: str
-    """In words, with units."""
+    """The finding in words, with units."""
 
     @property
     def met(self) -> bool:

@@ -67,8 +67,8 @@ class Target:
     within: float = 0.0
     """Distance to which the tip must come to a place [m]; 0 for the error of the tips."""
     direction: ArrayLike | None = None
-    """Direction of the tip's tangent d3 at the places, in the world and of any length, shape (3,)
-    for all of them or (n, 3); None if any will do."""
+    """Direction of the tip's tangent d3 at the places, in the world and of any length [-], shape
+    (3,) for all of them or (n, 3); None if any will do."""
     cone: float = 0.0
     """Angle from it that is allowed [rad]; with π any direction will do."""
     name: str = ""
@@ -134,8 +134,8 @@ class Keep:
     """The tip alone, or the arm from base to tip as wide as the widest of its body and its bundles
     before activation: tendons outside of the body run through disks of at least that radius."""
     when: Literal["targets", "always"] = "targets"
-    """In the poses that are used at the targets, or in every pose within the bounds, among which
-    the worst is searched for: samples and a polish, no proof."""
+    """Poses that are judged: those used at the targets, or every pose within the bounds, among
+    which samples and a polish search the worst, without proof."""
     clearance: float = 0.0
     """Distance to keep from the boundary [m]."""
     name: str = ""
@@ -202,12 +202,12 @@ class Limits:
 
     @property
     def given(self) -> dict[str, float]:
-        """Those that there are, by name."""
+        """Limits that are not None, by name [unit of each]."""
         return {name: value for name, value in vars(self).items() if value is not None}
 
     @property
     def of_poses(self) -> dict[str, float]:
-        """Those of them that poses are judged by."""
+        """Given limits that poses are judged by [unit of each]."""
         return {name: value for name, value in self.given.items() if name in _OF_POSES}
 
 

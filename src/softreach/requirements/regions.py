@@ -39,7 +39,7 @@ class Region(ABC):
     """A part of space; lengths in m, in the world."""
 
     convex: ClassVar[bool] = True
-    """With two points it holds all between them."""
+    """True if it holds all between any two of its points."""
 
     @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
@@ -159,9 +159,9 @@ class Sphere(Region):
     """
 
     center: Triple
-    """Its middle [m]."""
+    """Middle of the sphere [m]."""
     radius: float
-    """Its radius [m]."""
+    """Radius of the sphere [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", _triple("center", self.center))
@@ -203,7 +203,7 @@ class HalfSpace(Region):
     point: Triple
     """A point of the plane [m]."""
     normal: Triple
-    """Out of the half-space, of any length."""
+    """Normal that points out of the half-space [-], of any length."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", _triple("point", self.point))

@@ -71,8 +71,8 @@ class Requirements:
     """Masses at the tip under each of which every target must be reached [kg]; none for the loads
     of the design as they are."""
     measures: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
-    """Metric of an atlas, such as "exact_volume" -> least and largest value that it may have, in
-    its unit; None for no limit."""
+    """Metric of an atlas, such as "exact_volume" -> least and largest value that it may have [unit
+    of the metric]; None for no limit."""
 
     def __post_init__(self) -> None:
         for name, kind, what in (("targets", Target, "Targets"), ("keeps", Keep, "Keeps")):

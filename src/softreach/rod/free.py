@@ -53,7 +53,9 @@ class ArmRod(TipMap):
     """
 
     arm: Manipulator
+    """The arm."""
     tol: float = 1e-6
+    """Largest tip error over L [-]."""
     fixed_steps: int | None = None
     """Steps along the arm, if nothing breaks it, in place of those that `tol` needs; an arm in so
     many steps is known to keep ζ > 0."""

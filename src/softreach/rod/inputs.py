@@ -28,7 +28,7 @@ class ActivationBox:
     """
 
     bounds: tuple[tuple[float, float], ...]
-    """(lower, upper) for each bundle, in its own unit."""
+    """(lower, upper) for each bundle [unit of the bundle]."""
     names: tuple[str, ...]
     """A name for each bundle."""
 
@@ -51,22 +51,22 @@ class ActivationBox:
 
     @lazy
     def low(self) -> Array:
-        """Lower bounds, shape (bundles,)."""
+        """Lower bounds [unit of each bundle], shape (bundles,)."""
         return read_only(np.array([low for low, _ in self.bounds]))
 
     @lazy
     def high(self) -> Array:
-        """Upper bounds, shape (bundles,)."""
+        """Upper bounds [unit of each bundle], shape (bundles,)."""
         return read_only(np.array([high for _, high in self.bounds]))
 
     @lazy
     def widths(self) -> Array:
-        """Upper minus lower bounds, shape (bundles,)."""
+        """Upper minus lower bounds [unit of each bundle], shape (bundles,)."""
         return read_only(self.high - self.low)
 
     @lazy
     def scales(self) -> Array:
-        """`widths`, with 1 for fixed bundles: the measure of changes of activation."""
+        """`widths`, with 1 for fixed bundles: changes are measured in them [unit of each]."""
         return read_only(np.where(self.widths > 0, self.widths, 1.0))
 
     @lazy
@@ -86,7 +86,7 @@ class ActivationBox:
 
     @property
     def volume(self) -> float:
-        """Product of the widths of the free bundles; 1 if none is."""
+        """Product of the widths of the free bundles [product of their units]; 1 if none is."""
         return float(np.prod(self.widths[self.free]))
 
     def from_cube(self, cube: Array, out: Array | None = None) -> Array:

@@ -57,6 +57,11 @@ def tip_positions(
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
         MissingExtra: `softreach[cuda]` is not installed.
         NotPossible: There is no GPU, no driver for it, or the arm has loads.
+
+    Examples:
+        >>> sr.tip_positions(sr.designs.minimal_trunk(), [[0, 0, 0], [-1, 0, 0]]).round(3)
+        array([[0.   , 0.   , 1.   ],
+               [0.398, 0.167, 0.022]])
     """
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame, device=device))
     return tip_map.tips(tip_map.check_activations("activations", activations))
@@ -89,6 +94,12 @@ def tip_jacobian(
         InvalidInput: As for `tip_positions`.
         MissingExtra: As for `tip_positions`.
         NotPossible: As for `tip_positions`.
+
+    Examples:
+        >>> twists = sr.tip_jacobian(sr.designs.minimal_trunk(), [[-1, -0.5, 0]])
+        >>> linear, angular = twists[0, :3], twists[0, 3:]
+        >>> linear.shape
+        (3, 3)
     """
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame, device=device))
     return tip_map.tip_twists(tip_map.check_activations("activations", activations))[1]
@@ -166,6 +177,13 @@ def configuration(
     Raises:
         InvalidInput: Activations or stations of another shape or out of range, or activations
             under which there is no arm (ζ <= 0).
+
+    Examples:
+        >>> shape = sr.configuration(sr.designs.three_tendon_robot(), [1, 0, 0], stations=3)
+        >>> shape.position.values.round(3)  # [m], of base, middle and tip
+        array([[0.   , 0.   , 0.   ],
+               [0.   , 0.005, 0.1  ],
+               [0.   , 0.02 , 0.199]])
     """
     tip_map = with_unstable(as_tip_map(arm, tol, frame=frame))
     values = as_floats("activation", activation)

@@ -20,7 +20,7 @@ class Rest:
     activation: Array
     """The activation of least size within the bounds, zero where these hold it [unit]."""
     tip: Array
-    """Of the loaded arm in the world [m]; NaN without equilibrium."""
+    """Tip of the loaded arm in the world [m]; NaN without equilibrium."""
     sag: float
     """Distance by which the loads move the tip [m]; NaN without equilibrium."""
     sag_over_length: float

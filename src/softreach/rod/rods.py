@@ -53,11 +53,13 @@ class ArmMap(TipMap):
     inputs: Inputs
     """The activations of the rod at x."""
     pose: Base = UPRIGHT
-    """Of the base in the frame of places."""
+    """Pose of the base in the frame of places."""
     unstable: bool = False
     """True if unstable equilibria have tips."""
     arm: Manipulator = field(init=False, compare=False)
+    """The arm."""
     tol: float = field(init=False, compare=False)
+    """Largest tip error over L [-]."""
 
     def __post_init__(self) -> None:
         driving = self.inputs.driving

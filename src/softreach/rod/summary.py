@@ -89,7 +89,7 @@ class DesignSummary:
 
     @property
     def table(self) -> str:
-        """All but the warnings and the limits of the linear laws, a line each."""
+        """The summary, a line each, without warnings and limits of the linear laws."""
         lines = lines_of(self.rows | self._bundle_rows(), self.arm.length_unit)
         return "\n".join([*lines, *self.lacking])
 
@@ -165,6 +165,10 @@ def describe(arm: Manipulator) -> DesignSummary:
 
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+
+    Examples:
+        >>> print(sr.describe(sr.designs.lce_arm()))  # doctest: +ELLIPSIS
+        bundles                  ...
     """
     check_extension(a_manipulator("arm", arm))
     base_radius, tip_radius = (float(arm.profile.radius(z)) for z in (0.0, arm.length))

@@ -78,7 +78,7 @@ class TipMap(ABC):
     arm: Manipulator
     """The design, to be stored beside results; nothing here looks inside it."""
     tol: float
-    """Largest tip error, in L."""
+    """Largest tip error over L [-]."""
 
     @lazy
     @abstractmethod
@@ -153,7 +153,7 @@ class TipMap(ABC):
 
     @property
     def kinks(self) -> list[Array]:
-        """Values of each activation at which the map has a kink, for all values of the others."""
+        """Values of each activation [its unit] at which the map has a kink, whatever the others."""
         return [np.empty(0)] * self.box.bundles
 
     @property
@@ -163,7 +163,7 @@ class TipMap(ABC):
 
     @lazy
     def measures(self) -> Array:
-        """Size of one unit of each activation in the unit of its bundle, shape (bundles,)."""
+        """Size of one unit of each activation [unit of its bundle], shape (bundles,)."""
         return np.ones(self.box.bundles)
 
     def prepare(self) -> None:  # noqa: B027
@@ -353,7 +353,7 @@ class Frames(NamedTuple):
     position: Array
     """Centerline r [m], shape (n, station, 3)."""
     directors: Array
-    """d1, d2, d3 as rows, shape (n, station, 3, 3)."""
+    """d1, d2, d3 as rows [-], shape (n, station, 3, 3)."""
 
 
 class Strains(NamedTuple):
@@ -381,7 +381,7 @@ class Held(NamedTuple):
     is_doubled: NDArray[np.bool_]
     """Mask of nodes at which two are held on the side of the posture, shape (nodes,)."""
     frames: Array | None = None
-    """Of each, from which `TipMap.continued_from` goes on, shape (n, component)."""
+    """Frames of each [-], from which `TipMap.continued_from` goes on, shape (n, component)."""
 
 
 class Shapes(NamedTuple):
@@ -390,7 +390,7 @@ class Shapes(NamedTuple):
     position: Array
     """Centerline r [m], shape (n, framed station, 3)."""
     directors: Array
-    """d1, d2, d3 as rows, shape (n, framed station, 3, 3)."""
+    """d1, d2, d3 as rows [-], shape (n, framed station, 3, 3)."""
     curvature: Array
     """u in the directors, per unit of activated arclength [1/m], (n, strained station, 3)."""
     extension: Array
@@ -403,7 +403,7 @@ class TipOutputs(NamedTuple):
     """Arrays for n activations that a tip map fills; None for what is not wanted."""
 
     tips: Array
-    """r [m], shape (n, 3); NaN without an equilibrium."""
+    """Tips r [m], shape (n, 3); NaN without an equilibrium."""
     slopes: Array | None = None
     """∂r/∂γ [m], shape (n, 3, bundles)."""
     twists: Array | None = None
@@ -418,7 +418,7 @@ class TipMotions(NamedTuple):
     """Positions and directions of tips with their derivatives along each activation."""
 
     tips: Array
-    """r [m], shape (n, 3)."""
+    """Tips r [m], shape (n, 3)."""
     slopes: Array
     """∂r/∂γ [m], shape (n, 3, bundles)."""
     directions: Array

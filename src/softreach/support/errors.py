@@ -76,12 +76,19 @@ class Range(NamedTuple):
     """The numbers that a quantity may take."""
 
     low: float = -math.inf
+    """Lower end [unit]."""
     high: float = math.inf
+    """Upper end [unit]."""
     unit: str = ""
+    """SI unit; "" for none."""
     open_low: bool = False
+    """True if the lower end itself is refused."""
     open_high: bool = False
+    """True if the upper end itself is refused."""
     whole: bool = False
-    why: str = ""  # Reason for the limits, if they follow from other values
+    """True if only integers are allowed."""
+    why: str = ""
+    """Reason for the limits, if they follow from other values."""
 
     def admits(self, value: object) -> bool:
         """True if the value is a finite number (an integer where asked) in the range."""
@@ -112,9 +119,12 @@ class Range(NamedTuple):
 class Fault(NamedTuple):
     """One thing wrong with a design."""
 
-    path: str  # Place of the fault: ``taper``, or ``fibers[1].extent``
-    value: object  # The value that was given; None if there was none
-    allowed: Range | str  # Values that are allowed, and what to do
+    path: str
+    """Place of the fault: `taper`, or `fibers[1].extent`."""
+    value: object
+    """The value that was given; None if there was none."""
+    allowed: Range | str
+    """Values that are allowed, and what to do."""
 
     def __str__(self) -> str:
         if self.value is None or isinstance(self.value, dict) or _is_tables(self.value):

@@ -41,11 +41,15 @@ class Report:
     """What was found: `str` gives its lines, `save` writes its page."""
 
     title: str
+    """Heading of the page."""
     verdict: str
+    """The result in one sentence."""
     state: str
     """Kind of verdict, by which the page is colored: met, missed, undecided, noise and so on."""
     sections: Sequence[Section]
-    facts: Sequence[str] = ()  # Remarks on the whole
+    """Parts of the page, each with a heading."""
+    facts: Sequence[str] = ()
+    """Remarks on the whole."""
 
     def __str__(self) -> str:
         lines = [self.verdict, *self.facts]

@@ -70,31 +70,36 @@ def volume_gradient(
 ) -> VolumeGradient:
     """Derivatives of the reachable volume by design parameters, for three free bundles or more.
 
-    The images of the six faces of the activation box move with the design: what they sweep is the
-    change of the signed volume, theory (83), and is exact to seven digits or so. That is all where
-    the map is one to one. Where the image of three bundles folds or overlaps, what folds and hidden
-    faces sweep is added, and for more bundles everything is what the boundary sweeps, theory (98):
-    how lines of sight meet it is most of the error stated. Where cells are left out of the box, for
-    lack of a stable equilibrium, nobody knows how the boundary moves: derivatives are differences
-    between neighboring designs, which takes much longer and is rougher.
+    The images of the six faces of the activation box move with the design. The volume that they
+    sweep is the change of the signed volume, theory (83), exact to seven digits or so; no more is
+    needed where the map is one to one. Where the image of three bundles folds or overlaps, the
+    volume that folds and hidden faces sweep is added. With more bundles the boundary alone sweeps,
+    theory (98), and most of the stated error comes from lines of sight. Where cells without a
+    stable equilibrium are left out of the box, the motion of the boundary is unknown: derivatives
+    are then differences between neighboring designs, which take much longer and are rougher.
 
     The convex hull changes with its corners, theory (84). Its volume, as that of the reachable set,
     has kinks where the touched places jump; there the derivative is that of one side.
 
-    By a parameter that several parts share, the derivative is the sum of those by the parts' own:
+    The derivative by a parameter that several parts share is the sum of those by the parts' own:
     all of them grow by the same amount, revolutions each in its own sense.
 
     Args:
         arm: The design.
         parameters: Names as in atlases: `taper`, `revolution`, `rings[0].inner_ratio`,
             `left.offset`, and the bounds of activations, `lower`, `upper` or `left.lower[1]`.
-        accuracy: As for `reachable_set`: of the convex hull, and of what lines of sight tell.
+        accuracy: As for `reachable_set`: of the convex hull, and of lines of sight.
         progress: Called with the number of parameters done since its last call.
 
     Raises:
         InvalidInput: Fewer than three free bundles, no parameters, one that the design lacks or
             that counts something, or one whose change holds or frees a bundle.
         InvalidDesign: The design has no neighbors with other values of a parameter.
+
+    Examples:
+        >>> found = sr.volume_gradient(sr.designs.minimal_trunk(), ["taper", "revolution"])
+        >>> found.volume.round(1)  # [m³/rad]
+        array([-1.5,  0.2])
     """
     arm, names = a_manipulator("arm", arm), as_names("parameters", parameters)
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
@@ -150,11 +155,11 @@ class VolumeGradient:
     volume: Array
     """∂V/∂p [m³ per unit of the parameter], shape (parameter,)."""
     volume_error: Array
-    """Errors of these derivatives."""
+    """Errors of these derivatives [m³ per unit]."""
     convex_volume: Array
     """Derivatives of the volume of the convex hull [m³ per unit], shape (parameter,)."""
     convex_volume_error: Array
-    """Errors of these derivatives."""
+    """Errors of these derivatives [m³ per unit]."""
 
     @property
     def route(self) -> str:
@@ -169,7 +174,7 @@ class VolumeGradient:
 
     @property
     def unreachability_error(self) -> Array:
-        """Errors of these derivatives."""
+        """Errors of these derivatives [1 per unit]."""
         volume, convex = self.solid.volume, self.solid.convex_volume
         return (volume * self.convex_volume_error / convex + self.volume_error) / convex
 

@@ -42,6 +42,7 @@ class Lattice(NamedTuple):
     cell: float
     """Edge h of a cell [m]."""
     shape: tuple[int, int, int]
+    """Number of cells along x, y and z."""
 
     @classmethod
     def around(cls, points: Array, cell: float) -> Lattice:
@@ -93,10 +94,11 @@ class Image:
     grid: LiftedGrid
     """Tips at the vertices of the box."""
     lattice: Lattice
+    """Cells of space that cover the image."""
     unit: float
-    """Whole units to a cell: vertices are rounded to cell / unit."""
+    """Whole units to a cell [-]: vertices are rounded to cell / unit."""
     vertices: Array
-    """Mapped vertices in these units from the lattice's origin, shape (n, 3)."""
+    """Mapped vertices from the lattice's origin [cell / unit], shape (n, 3)."""
     triangles: Index
     """Critical triangles, as `kernels.image.raster.critical_triangles` lists them."""
     half: LiftedGrid | None = None
@@ -179,7 +181,7 @@ class Image:
 
     @lazy
     def signed_field(self) -> Array:
-        """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
+        """Distance of the cell centers to the boundary [cells], negative inside, up to 2.5.
 
         A plane that cuts the axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear
         interpolation between centers gives the crossings back, to second order in the cell.

@@ -37,7 +37,9 @@ class Estimate(NamedTuple):
     """A number and how far off it may be."""
 
     value: float
+    """The number, in the unit of what it estimates [unit]."""
     error: float = np.nan
+    """How far off it may be [unit]; NaN where that is unknown."""
 
 
 def named(**estimates: Estimate) -> dict[str, Any]:

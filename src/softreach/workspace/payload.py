@@ -84,7 +84,7 @@ class LargestPayload(NamedTuple):
     payload_error: float
     """Error of the payload, by the search and by the errors of the volumes [kg]."""
     share: float
-    """Of the volume without payload that is kept [-]."""
+    """Share of the volume without payload that is kept [-]."""
 
     def __repr__(self) -> str:
         mass = quantity(self.payload, "kg", self.payload_error)
@@ -106,18 +106,18 @@ class PayloadCurve:
     payloads: Array
     """[kg], ascending from 0, shape (n,)."""
     volumes: Array
-    """Of the exact reachable set [m³], shape (n,)."""
+    """Volume of the exact reachable set under each payload [m³], shape (n,)."""
     volume_errors: Array
     """Error of each volume [m³], shape (n,)."""
     lost_shares: Array
     """Share of the activation box that is left out for want of stability [-], shape (n,)."""
     accuracy: float
-    """Relative error allowed in each volume."""
+    """Relative error allowed in each volume [-]."""
     _known: dict[float, _Volume]
 
     @property
     def shares(self) -> Array:
-        """Of the volume without payload that is left [-], shape (n,)."""
+        """Share of the volume without payload that is left [-], shape (n,)."""
         return self.volumes / self.volumes[0]
 
     @property

@@ -74,36 +74,35 @@ def reachable_set(
     """Everything that the tip can reach: the image of the activation box, without a point cloud.
 
     Three free bundles: the box is cut into n³ cells and these into tetrahedra (Freudenthal), whose
-    corners are mapped; in between the map is taken as linear, and the image is rasterized on cells
-    of edge h. The resolutions follow from the accuracy ε: n = √(5/ε), even; h = √(ε/30) times the
-    cube root of the volume of the bounding box. The volume itself is then far more accurate than
-    asked. Where the map folds, what lies behind the fold is reached more than once: n is doubled
-    until the volume of that changes by less than ε as well. A fold thinner than a cell of the grid
-    may be missed. Where the raster finds no place reached twice and no fold (`route` is "flux"),
-    what flows through the six faces of the box gives the volume to nine digits or so, and their
-    images are the surface; under loads and of maps with kinks this is not asked.
+    corners are mapped. In between the map counts as linear, and the image is rasterized on cells of
+    edge h. The accuracy ε decides both: n = √(5/ε), even, and h = √(ε/30) times the cube root of
+    the volume of the bounding box. The volume is then far more accurate than asked. Where the map
+    folds, places behind the fold are reached more than once, and n is doubled until their volume
+    changes by less than ε too. A fold thinner than a cell of the grid may be missed. Where the
+    raster finds no fold and no place reached twice (`route` is "flux"), the flux through the six
+    faces of the box gives the volume to nine digits or so, and their images are the surface. Arms
+    under loads and maps with kinks always use the raster.
 
-    More free bundles: simplices would be too many, so the image is searched for in space, from tips
-    of a cloud and from neighbors: how far is the center of each cell from the nearest tip? A closed
-    surface of tips is wrapped around all that is nearer than 0.75 h, of whatever thinness; its
-    volume changes with h by more than it errs. Where lines of sight through all centers that are
-    reached tell the volume better, theirs is taken: where the boundary cuts edges between centers
-    is found to 1 % of h. h begins at √ε / 2.5 of the mean side of the bounding box, 1/16 of it at
-    most, and shrinks until the estimated error is within ε. Each place that counts has an
-    activation that reaches it; parts that no search meets may be missing, gaps below 1.5 h are
-    filled. The convex volume lies between the hull of tips and the planes that none goes beyond.
+    More free bundles: the image is searched in space, from tips of a cloud and from neighbors. A
+    closed surface of tips is wrapped around all that is nearer than 0.75 h to a tip, of whatever
+    thinness. Lines of sight through the centers that are reached give the volume instead where they
+    give it better; the boundary between two centers is found to 1 % of h. h begins at √ε / 2.5 of
+    the mean side of the bounding box, 1/16 of it at most, and shrinks until the estimated error is
+    within ε. Every place that counts has an activation that reaches it. Parts that no search meets
+    may be missing, and gaps below 1.5 h are filled. The convex volume lies between the hull of tips
+    and the planes that no tip crosses.
 
-    Under loads all postures count that are held without a snap from rest, on all their sheets and
-    up to the edges of these: `hysteresis_share` tells where two are held, `lost_share` where none
-    is. Of more bundles than three only the posture to which each activation leads from rest does.
+    Under loads every posture counts that is held without a snap from rest, on all sheets and up to
+    their edges: `hysteresis_share` is where two are held, `lost_share` where none is. With more
+    than three bundles only the posture counts to which each activation leads from rest.
 
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
             dimension.
-        accuracy: Relative error ε allowed in the volume; of several sheets under loads twice that.
-        cell: Edge h of a cell [m], instead of the rule's.
+        accuracy: Relative error ε allowed in the volume [-]; twice that of sheets under loads.
+        cell: Edge h of a cell [m], in place of the rule above.
         tol: Largest tip error, in L.
-        frame: In which places are told: that of the "world", or of the "base", whose z is along the
+        frame: Frame of the places: that of the "world", or of the "base", whose z is along the
             straight arm.
         point: Name of the marker that counts as the tip, such as that of a tool; by default that
             of the design. Of a tip map its own counts.
@@ -120,6 +119,13 @@ def reachable_set(
 
     Warns:
         SoftreachWarning: The estimated error is larger than asked.
+
+    Examples:
+        >>> reach = sr.reachable_set(sr.designs.minimal_trunk(), accuracy=0.02)
+        >>> print(f"{reach.volume:.3f} m³")
+        0.692 m³
+        >>> reach.contains([[0, 0, 0.5], [0, 0, 2]])
+        array([ True, False])
     """
     accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)

@@ -59,7 +59,7 @@ class Shell(NamedTuple):
     """A thin set as a sheet: the area of its middle, half of that of both sides."""
 
     area: Estimate
-    """[m²]."""
+    """Area of the sheet [m²]."""
     thickness: Estimate
     """Volume over that area [m]."""
 
@@ -109,7 +109,7 @@ class ReachableSet:
     hysteresis_share: float = 0.0
     """Share of the activation box at which two postures are held, the one or the other by the way
     that the arm has come [-]; mirror images of those that lean do not count. 0 for more than
-    three free bundles, of which nothing tells."""
+    three free bundles, where it is not known."""
     multiplicity: Mapping[int, float] = field(default_factory=dict)
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for other
     numbers of free bundles than three."""

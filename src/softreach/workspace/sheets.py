@@ -42,7 +42,8 @@ class Sheets(Surface):
     lines: NDArray[np.int32]
     """Edges of the box, folds and crossings, as pairs of vertices, shape (n, 2)."""
     activation: Array | None
-    """That leads to each vertex, shape (v, bundles); None where it is not known."""
+    """Activation that leads to each vertex [unit of each bundle], shape (v, bundles); None where it
+    is not known."""
 
     @classmethod
     def of(cls, surface: Surface) -> Self:

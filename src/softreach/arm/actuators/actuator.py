@@ -129,7 +129,7 @@ class Actuator(Span, ABC):
 
     @property
     def numbers(self) -> dict[str, Number]:
-        """With those of each bundle, and the bounds: `lower` of all, `lower[1]` of one."""
+        """Its numbers, those of bundles, and bounds: `lower` of all, `lower[1]` of one."""
         allowed = Range(unit="" if self.unit == "1" else self.unit)
         bundles = ["", *(f"[{k}]" for k in range(self.bundles))] if self.bundles > 1 else [""]
         ends = ("lower", "min", "lowest activation"), ("upper", "max", "highest activation")

@@ -39,11 +39,11 @@ class RingIntegrals(NamedTuple):
     """Integrals over the ring x = R/R2 from ρ to 1 [-], theory (3)."""
 
     axial: Array
-    """I0 = ∫ x k dx."""
+    """I0 = ∫ x k dx [-]."""
     bending: Array
-    """I1 = ∫ x² k dx."""
+    """I1 = ∫ x² k dx [-]."""
     torsion: Array
-    """I3 = ∫ x² t dx."""
+    """I3 = ∫ x² t dx [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -41,7 +41,7 @@ class Tendon(PolarActuator):
     is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "tendon"
     least: ClassVar[float] = 0.0
-    """Least activation that a bound may be."""
+    """Least activation that a bound may be [N]."""
     validity: ClassVar[str] = (
         "The material is linear: real silicone (neo-Hookean) bends less, by about 2.3 τ/K0. A "
         "tendon that is not parallel to the axis is taken to pull as it lies before activation. "

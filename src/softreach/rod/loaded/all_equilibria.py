@@ -45,16 +45,16 @@ class AllEquilibria:
     solver: Solver | None
     """Solver that walked along it; None without loads, or with too heavy ones for a search."""
     activation: Array
-    """Of each bundle, shape (bundles,)."""
+    """Activation of each bundle [unit of the bundle], shape (bundles,)."""
     tips: Array
-    """r [m], shape (n, 3)."""
+    """Tips r [m], shape (n, 3)."""
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
     margin: Array
     """Margin of stability, from 1 to below 0 [-], shape (n,); 0 of stable rings."""
     directions: Array
-    """Direction of gravity as the tip sees it, in the frame of the base of the unloaded arm, shape
-    (n, 3); NaN without loads."""
+    """Direction of gravity as the tip sees it [-], in the frame of the base of the unloaded arm,
+    shape (n, 3); NaN without loads."""
     signs: NDArray[np.int8]
     """Sense of rotation of the map of directions there: kept (1), or turned over (-1) where the
     ways to fall are odd in number; 0 of rings; shape (n,)."""
@@ -166,6 +166,12 @@ def equilibria(
 
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
+
+    Examples:
+        >>> arm = sr.designs.lce_arm().replace(loads=sr.Loads(payload=0.001))
+        >>> found = sr.equilibria(arm, arm.bounds.mean(axis=1))
+        >>> len(found.tips), found.complete
+        (1, True)
     """
     whole = of_tip(as_tip_map(arm, tol, warn=False))  # the degree says whether any is missing
     gamma = whole.check_activations("activations", activations)

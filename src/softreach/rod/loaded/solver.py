@@ -33,13 +33,13 @@ class Equilibria(NamedTuple):
     """Equilibria of activations, one for each, and where the search for one ended."""
 
     tips: Array
-    """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
+    """Tips r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
     status: Status
     """`TipStatus`, shape (n,)."""
     margin: Array
     """Margin of stability, from 1 to below 0 [-], shape (n,)."""
     frame: Array
-    """First axis of the world at the nodes, tip first, as the base of the unloaded arm sees it,
+    """First axis of the world at the nodes [-], tip first, as the base of the unloaded arm sees it,
     (n, 3 node); with loads of several directions also the second one, (n, 6 node)."""
 
     @property
