@@ -19,8 +19,8 @@ from softreach.cloud import cells
 from softreach.cloud.cells import reached_cells
 from softreach.rod.rods import as_tip_map, refined
 
-FEW = 12  # samples
-SAMPLES = 150  # in cells
+FEW = 5  # samples
+SAMPLES = 60  # in cells
 VARIABLES = ("count", "activation_distance", "extreme_tip")
 
 
@@ -39,7 +39,7 @@ def _arms():
     }
 
 
-@patch.object(cells, "_PILOT", 100)
+@patch.object(cells, "_PILOT", 40)
 def _results(device):
     """Everything that a device computes, by name."""
     results = {}
