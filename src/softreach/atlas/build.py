@@ -1,7 +1,5 @@
 """Building an atlas: every design of a space, stored as it comes, resumed where it stopped."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import secrets
@@ -11,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from zarr.storage import MemoryStore, StoreLike  # noqa: TID253  (imported where stores are)
@@ -28,12 +26,10 @@ from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance
 from softreach.support.arrays import Array
 from softreach.support.files.stores import StoreFailed
 from softreach.support.interruption import check_stopped
+from softreach.support.lazy import Dataset
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, as_progress, bar
 from softreach.workspace.reach import ACCURACIES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Values = dict[str, Array]
 Outcome = tuple[int, str]  # Number of a design, and why it failed; empty if it did not
@@ -212,7 +208,7 @@ def build_atlas(
     durable: bool = False,
     device: Device = "cpu",
     progress: Progress | None = None,
-) -> xr.Dataset:
+) -> Dataset:
     """Compute the cloud and the metrics of every design (sections 3 and 4), or what is missing.
 
     All designs share one set of unit activations, scaled to each one's bounds. Every design is
@@ -305,7 +301,7 @@ def _shard_of(name: str, value: Any) -> tuple[int, int]:
     raise errors.InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
 
 
-def _warn_of_metrics(built: xr.Dataset) -> None:
+def _warn_of_metrics(built: Dataset) -> None:
     if len(unstable := np.flatnonzero(built["status"].values == UNSTABLE)):
         number, message = (built[x].values.flat[unstable[0]] for x in ("number", "message"))
         without = f"{errors.counted(len(unstable), 'design')} without metrics"

@@ -1,7 +1,5 @@
 """Measured poses of an arm: a table of inputs and of the places of markers, with units in names."""
 
-from __future__ import annotations
-
 import bz2
 import csv
 import gzip
@@ -15,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,10 +30,8 @@ from softreach.support.errors import (
     warn,
 )
 from softreach.support.files.text import MEGABYTE, text_of
+from softreach.support.lazy import DataFrame
 from softreach.support.quantity import sizes_in
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _SIZES = {
     name.lower(): (unit, size) for unit in ("m", "N", "Pa") for name, size in sizes_in(unit).items()
@@ -90,7 +86,7 @@ class Measurements:
         """Number of markers."""
         return self.places.shape[1]
 
-    def of(self, rows: NDArray[np.intp] | Mask) -> Measurements:
+    def of(self, rows: NDArray[np.intp] | Mask) -> "Measurements":
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
         rank = np.argsort(self.order)
@@ -177,7 +173,7 @@ def read_measurements(
     )
 
 
-def _runs_and_order(table: pd.DataFrame, run: str | None, order: str | None) -> dict[str, Any]:
+def _runs_and_order(table: DataFrame, run: str | None, order: str | None) -> dict[str, Any]:
     """Names of runs, the run of each sample, and samples run by run in the order of each."""
     every = np.full(len(table), "all") if run is None else table[run].to_numpy(object)
     names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
@@ -187,7 +183,7 @@ def _runs_and_order(table: pd.DataFrame, run: str | None, order: str | None) -> 
     return {"run_names": tuple(names.tolist()), "runs": runs, "order": taken}
 
 
-def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
+def _places(table: DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
     """Places of markers from their columns [m], NaN where one was not seen."""
     each = [[_numbers(table, x, gaps=True) * _unit(x)[2] for x in y] for y in columns.values()]
     places = np.moveaxis(np.array(each), 2, 0)
@@ -198,7 +194,7 @@ def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
     return places
 
 
-def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
+def _inputs(table: DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
     """Inputs in their units from their columns, 0 without one, shape (n, input)."""
     values = np.zeros((len(table), len(sources)))
     for k, (name, unit) in enumerate(zip(sources, units, strict=True)):
@@ -214,7 +210,7 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
     return values
 
 
-def _table(data: Any) -> tuple[pd.DataFrame, str]:
+def _table(data: Any) -> tuple[DataFrame, str]:
     """A table of one row at least, no two columns of which have one name, and its own name."""
     table, source = _opened(data)
     if not len(table):
@@ -229,7 +225,7 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
     return table.set_axis(columns, axis=1), source
 
 
-def _opened(data: Any) -> tuple[pd.DataFrame, str]:
+def _opened(data: Any) -> tuple[DataFrame, str]:
     import pandas as pd
 
     if isinstance(data, pd.DataFrame):
@@ -249,7 +245,7 @@ def _opened(data: Any) -> tuple[pd.DataFrame, str]:
     return read_table(path, str(path)), path.name
 
 
-def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
+def read_table(file: Path | IO[bytes], name: str) -> DataFrame:
     """The table of a file whose name says Parquet, else CSV, packed if it says .gz or .zip."""
     import pandas as pd
 
@@ -418,7 +414,7 @@ def _unit_text(unit: str) -> str:
     return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
 
 
-def _numbers(table: pd.DataFrame, column: str, *, gaps: bool = False) -> Array:
+def _numbers(table: DataFrame, column: str, *, gaps: bool = False) -> Array:
     """Finite numbers of a column; NaN where there is none, if it may have gaps."""
     try:
         values = table[column].to_numpy(float)

@@ -1,11 +1,9 @@
 """Poses worth measuring: those that tell most about the free numbers of an arm."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +20,7 @@ from softreach.support.arguments import as_integer, as_names, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.files.text import write_table
-
-if TYPE_CHECKING:
-    import xarray as xr
+from softreach.support.lazy import Dataset
 
 _CORNERS = 10  # free inputs up to which all corners of their box are candidates
 _APART = 0.5  # distance of two poses in the box at least, over the mean distance of so many points
@@ -74,7 +70,7 @@ class PosePlan:
         widths = noise * scale * np.sqrt(np.diag(inverse))
         return dict(zip(self.names, widths.tolist(), strict=True))
 
-    def to_dataset(self, noise: float = 1e-3) -> xr.Dataset:
+    def to_dataset(self, noise: float = 1e-3) -> Dataset:
         """Activations over `pose`; values, standard deviations to expect and JᵀJ over `number`.
 
         Args:

@@ -1,13 +1,11 @@
 """Result of a calibration: numbers with their errors, beside those of other laws."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,14 +28,11 @@ from softreach.support.arguments import as_flag, as_integer
 from softreach.support.arrays import Array, Index, Mask, as_rows
 from softreach.support.errors import counted
 from softreach.support.files.text import write_text
+from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.quantity import quantity
 from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit, as_unit, readable_unit
 from softreach.support.versions import versions
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 _OUTLIER = 5.0  # robust widths from which a sample is listed
 _CORRELATED = 0.95
@@ -275,7 +270,7 @@ class Calibration(Reported):
     def _held_text(self) -> str:
         return f"{int(self.held.sum())} {'in held-out runs' if self.held_runs else 'held out'}"
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """Numbers with their errors over `number`, residuals over `sample`, `marker`, `axis`."""
         import xarray as xr
 
@@ -345,7 +340,7 @@ class Calibration(Reported):
             rows.append((f"{name}, {counted(numbers, 'number')}", on, errors[held > 0]))
         return rows
 
-    def table(self, unit: str = "m") -> pd.DataFrame:
+    def table(self, unit: str = "m") -> DataFrame:
         """Inputs, measured and predicted places and their distances, a row for each sample.
 
         Args:

@@ -4,8 +4,6 @@
 nowhere to write, 141 standard output was closed, 128 + signal.
 """
 
-from __future__ import annotations
-
 import traceback
 from contextlib import suppress
 from typing import Annotated, Any, cast

@@ -1,7 +1,5 @@
 """`softreach calibrate` and `plan-poses`: the arm on the bench from measured poses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,12 +15,11 @@ from softreach.support.arguments import POSITIVE
 from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_table
+from softreach.support.lazy import Dataset
 from softreach.support.quantity import columns
 from softreach.support.units import TYPED, LengthUnit, read_length, readable
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from softreach.arm.parameters import Written
 
 _COLUMNS = Group("Column names", sort_key=1)
@@ -155,7 +152,7 @@ def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
     }
 
 
-def _numbers(found: xr.Dataset) -> list[dict[str, Any]]:
+def _numbers(found: Dataset) -> list[dict[str, Any]]:
     records = []
     for number in (found.isel(number=k) for k in range(found.sizes["number"])):
         names, unit = ("value", "sigma", "start"), str(number["unit"].item())
@@ -225,14 +222,14 @@ def plan_poses(
         plan.save(out, overwrite=output.overwrite)
 
 
-def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
+def _rows(found: Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
     names = ("number", "unit", "value", "sigma")
     for name, own, value, width in zip(*(found[k].values.tolist() for k in names), strict=True):
         share = f"{100 * width / abs(value):.2g} %" if value else "-"
         yield name, readable(value, own, unit, width, digits=2), share
 
 
-def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
+def free_names(arm: "sr.Manipulator", texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
     from softreach.arm.parameters import Written
 
@@ -241,7 +238,7 @@ def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
     return [_tied(names, name) for name in given if name]
 
 
-def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def priors(arm: "sr.Manipulator", texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Width, or mean and width, of numbers in their units by name, from NAME=MEAN:WIDTH.
 
     Raises:
@@ -267,6 +264,6 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
     return result
 
 
-def _tied(names: Written, name: str) -> str:
+def _tied(names: "Written", name: str) -> str:
     parts = (part.strip() for part in name.split("="))
     return " = ".join(names.by_key[x].name if x in names.by_key else x for x in parts)

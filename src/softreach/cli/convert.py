@@ -1,7 +1,5 @@
 """`softreach export` and `import`: clouds, arms and designs of other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

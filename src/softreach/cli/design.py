@@ -1,7 +1,5 @@
 """`softreach design`: angles, radii, stiffness, weight and loads of a design."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import softreach as sr

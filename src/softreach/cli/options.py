@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
@@ -21,10 +21,8 @@ from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, R
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
 from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.lazy import Dataset
 from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _POSTURES = {"upright": "up", "hanging": "down"}  # words for the way that a base points
 _MATTER = {"young_modulus": "1MPa", "density": "1000kg/m3"}
@@ -321,7 +319,7 @@ def is_stored(source: str) -> bool:
 
 def cloud_of(
     source: str, sampling: Sampling, changes: Changes, unit: str | None
-) -> tuple[xr.Dataset, sr.Manipulator]:
+) -> tuple[Dataset, sr.Manipulator]:
     """The stored cloud, or one of the design; its design."""
     if is_stored(source):
         refuse(STORED, **changes.given, **vars(sampling))
@@ -334,7 +332,7 @@ def cloud_of(
 
 def points_of(
     source: str, sampling: Sampling, changes: Changes, unit: str | None
-) -> tuple[xr.Dataset, LengthUnit]:
+) -> tuple[Dataset, LengthUnit]:
     """The points of a file, which have no design, and the unit to print them in."""
     refuse("on points, which have no design", **changes.given, **vars(sampling))
     points = sr.exchange.read_points(source, unit=unit)
@@ -363,7 +361,7 @@ def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation
     raise InvalidInput(name, text, allowed)
 
 
-def shape_of(text: str | None, arm: sr.Manipulator) -> xr.Dataset:
+def shape_of(text: str | None, arm: sr.Manipulator) -> Dataset:
     """The arm as activations bend it, which must leave it a shape."""
     import numpy as np
 

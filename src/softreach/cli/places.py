@@ -1,7 +1,5 @@
 """`softreach solve`, `track` and `equilibria`: activations that lead to places, and back."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`softreach reach`, `payload`, `gradient`; `cloud`, `volume`, `show`: exact sets, and samples."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -88,7 +86,7 @@ def _is_drawn(path: Path) -> bool:
 
 def _write(
     reached: sr.workspace.ReachableSet,
-    arm: sr.Manipulator,
+    arm: "sr.Manipulator",
     path: Path,
     at: list[float] | None,
     overwrite: bool,

@@ -1,7 +1,5 @@
 """`softreach studio`: the design desk in the browser."""
 
-from __future__ import annotations
-
 import secrets
 import warnings
 import webbrowser
@@ -102,7 +100,7 @@ def _write_static(
     console.line(f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB")
 
 
-def begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
+def begun(source: str, *, fresh: bool) -> "tuple[Start, KeptWork]":
     """What is shown first, and the work that is kept; a state or a cloud is shown as it is."""
     from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 

@@ -1,7 +1,5 @@
 """Writers that clouds and surfaces share."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Deviations of arms as they are made, and their effect to first order: theory (99)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

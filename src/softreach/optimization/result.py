@@ -1,7 +1,5 @@
 """Result of a search: the best designs with their numbers, and all that was judged."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -9,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -26,14 +24,11 @@ from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, check_installed, counted
 from softreach.support.files.atomic import check_place
 from softreach.support.files.text import write_table, write_text
+from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit, as_unit, readable, readable_unit
 from softreach.support.versions import versions
 from softreach.workspace.measure import Estimate
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 _AT_END = 1e-3  # of a range
 _FOUND = "# Found by a search of softreach"
@@ -152,7 +147,7 @@ class Search(Reported):
         """Objectives with their senses."""
         return self.problem.goals
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """All designs over `design`: those on the way in their order, then those at full accuracy.
 
         Values over `parameter`, where a choice counts from 0, and over `objective`; `front` says
@@ -246,7 +241,7 @@ class Search(Reported):
         lines = (f"# {key}: {text}" for key, text in [*numbers.items(), *self.provenance.items()])
         return "\n".join([head, *lines]) + f"\n\n{arm.file_text}"
 
-    def table(self, *, every: bool = False, unit: str = "m") -> pd.DataFrame:
+    def table(self, *, every: bool = False, unit: str = "m") -> DataFrame:
         """Parameters and objectives with their errors, a row for each design of the front.
 
         Args:

@@ -1,12 +1,10 @@
 """Sensitivity of a search: what each parameter is worth, and which requirement decides."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,11 +17,9 @@ from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, no_warnings
+from softreach.support.lazy import Dataset
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _ACTIVE = 1e-3  # room below which a requirement may decide
 _AT_END = 1e-6  # of a range
@@ -80,7 +76,7 @@ class Sensitivity:
     designs: int
     """Designs that were looked at."""
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """Gradients, shares of variance and multipliers, labeled."""
         import xarray as xr
 

@@ -3,13 +3,11 @@
 Their effect is known to first order, theory (99), and checked by arms that are really made.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,13 +24,11 @@ from softreach.support import errors, parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, NotPossible, counted
+from softreach.support.lazy import Dataset
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES, reachable_set
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.search import nearest_tips
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _POOL = 1 << 17  # places of space among which those are that are followed
 _FOLLOWED = 1 << 13  # near the boundary, and as many away from it
@@ -76,7 +72,7 @@ def tolerance(
     accuracy: float = 1e-2,
     seed: int = 0,
     progress: Progress | None = None,
-) -> Tolerance:
+) -> "Tolerance":
     """Share of the reach, and of the targets, that arms keep which deviate as they are made.
 
     To first order the boundary of the reachable set moves along its normal by σ_n, the root of the
@@ -157,7 +153,7 @@ class Tolerance:
         """All that is but one number, regions last."""
         return self.kept, self.volume, self.unreachability, *self.regions
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """All numbers, labeled: to first order and of arms made."""
         import xarray as xr
 
@@ -251,7 +247,7 @@ class _Followed(NamedTuple):
     share: float  # Share of the volume near the boundary
 
     @classmethod
-    def of(cls, first: FirstOrder, seed: int) -> _Followed:
+    def of(cls, first: FirstOrder, seed: int) -> "_Followed":
         solid, boundary = first.solid, first.boundary
         low, high = boundary.places.min(axis=0), boundary.places.max(axis=0)
         pool = low + (high - low) * sample_cube("sobol", _POOL, 3, seed)

@@ -3,8 +3,6 @@
 Arrays are base64: places in 16 bits of the box along each axis, colors in 8 bits a channel.
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import json

@@ -1,7 +1,5 @@
 """Orthographic views of space on paper, by name or by the direction of the camera."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

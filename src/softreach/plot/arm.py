@@ -1,7 +1,5 @@
 """Pictures of arms, lit tubes with their bundles: side by side, at their targets, under loads."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,20 +14,18 @@ from softreach.picture.zbuffer import ZBuffer, draw_mesh, faces_to_eye
 from softreach.plot import style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
-from softreach.plot.style import Axes, Figure
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
 from softreach.support.arrays import Array, as_floats, as_stations
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import Axes, Dataset, Figure
 from softreach.support.palette import BODY, MET, MISSED, bundle_color
 from softreach.support.quantity import round_below
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
 
@@ -59,7 +55,7 @@ _COLOR = "tab:orange"
 
 def plot_arm(
     arm: Manipulator,
-    configuration: xr.Dataset | None = None,
+    configuration: Dataset | None = None,
     *,
     ax: Axes | None = None,
     view: View = "front",
@@ -95,7 +91,7 @@ def plot_arm(
     return panel.ax
 
 
-def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
+def shapes_of(configuration: Dataset | None) -> list[Dataset]:
     """The single configurations of a dataset that may hold several."""
     if configuration is None:
         return []
@@ -105,7 +101,7 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
     return [configuration.isel(sample=k) for k in range(configuration.sizes["sample"])]
 
 
-def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
+def arm_points(arm: Manipulator, shape: Dataset, unit: LengthUnit) -> Array:
     """Points of one configuration: its surface, bundles outside of it, markers; shape (n, 3)."""
     outline = arm.outline(shape["Z"].values)
     out = (outline.outer_ratio > _BULGE) & outline.acts
@@ -119,7 +115,7 @@ def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
 def draw_arms(
     panel: Panel,
     arm: Manipulator,
-    shapes: list[xr.Dataset],
+    shapes: list[Dataset],
     bundles: Collection[int],
     fade: float = 0.0,
 ) -> None:
@@ -129,7 +125,7 @@ def draw_arms(
         draw_markers(panel, arm, shapes, fade)
 
 
-def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
+def draw_markers(panel: Panel, arm: Manipulator, shapes: list[Dataset], fade: float) -> None:
     """Small dots where the markers of all shapes are."""
     if arm.markers:
         points = np.concatenate([marker_points(arm.markers, shape) for shape in shapes])
@@ -140,7 +136,7 @@ def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade:
 def arm_images(
     panel: Panel,
     arm: Manipulator,
-    shapes: list[xr.Dataset],
+    shapes: list[Dataset],
     bundles: Collection[int],
     fade: float = 0.0,
 ) -> tuple[ZBuffer, ZBuffer | None]:
@@ -285,7 +281,7 @@ def _draw_places(panel: Panel, check: Any) -> None:
 
 
 def plot_equilibria(
-    equilibria: AllEquilibria,
+    equilibria: "AllEquilibria",
     *,
     ax: Axes | None = None,
     view: View = "front",
@@ -345,7 +341,7 @@ def plot_equilibria(
 
 def plot_compliance(
     arm: Manipulator,
-    configuration: xr.Dataset,
+    configuration: Dataset,
     compliance: ArrayLike,
     *,
     ax: Axes | None = None,
@@ -402,7 +398,7 @@ def plot_compliance(
 
 
 def plot_payload_curve(
-    curve: PayloadCurve, *, ax: Axes | None = None, largest: Sequence[LargestPayload] = ()
+    curve: "PayloadCurve", *, ax: Axes | None = None, largest: "Sequence[LargestPayload]" = ()
 ) -> Axes:
     """Draw the share of the reachable volume against the payload, with its errors.
 
@@ -432,7 +428,7 @@ def plot_payload_curve(
     return ax
 
 
-def _circle(equilibria: AllEquilibria, k: int) -> Array:
+def _circle(equilibria: "AllEquilibria", k: int) -> Array:
     """Where the tip of a ring of equilibria may be [m], shape (n, 3)."""
     assert equilibria.solver is not None
     pose, axis = equilibria.rod.pose, equilibria.solver.tables.axes[0]
@@ -441,7 +437,7 @@ def _circle(equilibria: AllEquilibria, k: int) -> Array:
     return pose.to_world(along + np.cos(angle) * (tip - along) + np.sin(angle) * across)
 
 
-def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
+def _gravity_arrow(panel: Panel, equilibria: "AllEquilibria") -> None:
     if equilibria.solver is None:
         return
     tables = equilibria.solver.tables

@@ -1,11 +1,9 @@
 """Pictures of results: errors of a calibration, and the designs of a search."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +11,10 @@ from softreach.picture.projection import View, on_paper, view_angles
 from softreach.plot import style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import COLORMAP
-from softreach.plot.style import Axes, Figure
 from softreach.support.arrays import Array, Mask
+from softreach.support.lazy import Axes, Dataset, Figure
 from softreach.support.palette import BEST, MET, MISSED
 from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _WIDTH = 7.2  # inches
 _SPACE, _ROW = 3.6, 1.75  # heights of the upper part and of each row of inputs [inch]
@@ -81,7 +76,7 @@ def plot_calibration(
 
 
 class _Errors:
-    def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
+    def __init__(self, data: Dataset, unit: LengthUnit) -> None:
         self.data, self.unit, self.label = data, unit, unit.label("error")
         self.markers = [str(name) for name in data["marker"].values]
         moving = np.ptp(data["input_value"].values, axis=0) > 0
@@ -199,7 +194,7 @@ def plot_search(search: Any, *, unit: style.Unit = None) -> Figure:
 
 
 class _Designs:
-    def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
+    def __init__(self, data: Dataset, unit: LengthUnit) -> None:
         self.data, self.unit = data, unit
         self.feasible: Mask = data["feasible"].values
         count = data.sizes["design"]

@@ -1,14 +1,12 @@
 """Style of every figure: light, small type, thin lines, images sharp at print size."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +19,8 @@ from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
+from softreach.support.lazy import Axes, DataArray, Dataset, Figure
 from softreach.support.units import METER, LengthUnit, as_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-else:  # matplotlib is imported where it draws
-    Axes = Figure = Any
 
 Unit = str | LengthUnit | None  # one asked for, "m", "cm", "mm" or "L"; None for L if known, else m
 DPI = 250  # pixels per inch of images inside figures, and of saved PNG files
@@ -230,7 +222,7 @@ def as_box(name: str, value: Any) -> Array:
     raise InvalidInput(name, corners.tolist(), allowed)
 
 
-def unit_of(data: xr.Dataset | xr.DataArray, unit: Unit = None) -> LengthUnit:
+def unit_of(data: Dataset | DataArray, unit: Unit = None) -> LengthUnit:
     """The unit of lengths on paper for data, whose attributes may say how long the arm is [m]."""
     length = data.attrs.get("length")
     return unit_for(None if length is None else float(length), unit)

@@ -1,11 +1,9 @@
 """A design against requirements: the verdict, by how much, and what it would take."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,14 +30,11 @@ from softreach.schema import AXES, provenance
 from softreach.support.arguments import as_instance, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import NotPossible, Range, counted, no_warnings
-from softreach.support.lazy import lazy
+from softreach.support.lazy import Dataset, lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSet, reachable_set
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LEAST_PLACES = 64  # in a region to be covered
 _MOST_PLACES = 100_000
@@ -129,7 +124,7 @@ class Check(Reported):
         kept = ((keep.kind, keep.region) for keep in self.requirements.keeps)
         return (*kept, *(("cover", region) for _, region in self.requirements.regions))
 
-    def shapes(self, count: int) -> xr.Dataset | None:
+    def shapes(self, count: int) -> Dataset | None:
         """The arm in poses of some places that are apart, under the largest payload.
 
         Args:
@@ -169,7 +164,7 @@ class Check(Reported):
             ],
         )
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """Places with their gaps, poses and efforts, and the findings, labeled."""
         import xarray as xr
 

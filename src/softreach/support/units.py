@@ -1,7 +1,5 @@
 """Units of length that a user chooses, and named values of a result as lines in them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -45,7 +43,7 @@ class LengthUnit(NamedTuple):
         """True if it is L, the length of the arm."""
         return self.name == "L"
 
-    def of(self, values: ArrayLike, power: int = 1) -> Array:
+    def of(self, values: "ArrayLike", power: int = 1) -> "Array":
         """Lengths [m] in this unit; areas [m²] for power 2, volumes [m³] for 3."""
         import numpy as np  # the command line reads units before it needs arrays
 
