@@ -21,26 +21,16 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_one_of, as_text
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import (
-    InvalidInput,
-    NotPossible,
-    counted,
-    did_you_mean,
-    in_short,
-    warn,
-)
+from softreach.support.errors import InvalidInput, NotPossible, counted, did_you_mean, warn
 from softreach.support.files.text import MEGABYTE, text_of
 from softreach.support.lazy import DataFrame
 from softreach.support.quantity import sizes_in
 
 _SIZES = {
-    name.lower(): (unit, size) for unit in ("m", "N", "Pa") for name, size in sizes_in(unit).items()
-} | {
-    "gf": ("N", 9.80665e-3),
-    "mbar": ("Pa", 1e2),
-    "psi": ("Pa", 6894.757293168361),
-    "percent": ("1", 1e-2),
+    x.lower(): (unit, size) for unit in ("m", "N", "Pa") for x, size in sizes_in(unit).items()
 }
+_SIZES |= {"gf": ("N", 9.80665e-3), "mbar": ("Pa", 1e2), "psi": ("Pa", 6894.757293168361)}
+_SIZES |= {"percent": ("1", 1e-2)}
 """Suffixes of columns, in small letters: unit and size in it."""
 
 _RUNS = ("run", "pattern", "group", "trial", "cluster", "sequence")
@@ -90,14 +80,8 @@ class Measurements:
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
         rank = np.argsort(self.order)
-        return replace(
-            self,
-            inputs=self.inputs[rows],
-            places=self.places[rows],
-            runs=self.runs[rows],
-            order=np.argsort(rank[rows], kind="stable"),
-            rows=self.rows[rows],
-        )
+        kept = {name: getattr(self, name)[rows] for name in ("inputs", "places", "runs", "rows")}
+        return replace(self, order=np.argsort(rank[rows], kind="stable"), **kept)
 
 
 def marker_names(arm: Manipulator) -> tuple[str, ...]:
@@ -161,16 +145,10 @@ def read_measurements(
     _refuse_far(arm, places, [triples[start] for start in chosen.values()])
     _refuse_inputs(arm, values, sources)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
-    return Measurements(
-        inputs=values,
-        places=places,
-        input_names=tuple(sources),
-        marker_names=tuple(chosen),
-        rows=np.arange(len(values)),
-        source=source,
-        digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
-        **_runs_and_order(table, run, order),
-    )
+    known: dict[str, Any] = _runs_and_order(table, run, order) | {"rows": np.arange(len(values))}
+    known |= {"input_names": tuple(sources), "marker_names": tuple(chosen), "source": source}
+    digest = hashlib.sha256(numbers.tobytes()).hexdigest()
+    return Measurements(inputs=values, places=places, digest=digest, **known)
 
 
 def _runs_and_order(table: DataFrame, run: str | None, order: str | None) -> dict[str, Any]:
@@ -419,7 +397,7 @@ def _numbers(table: DataFrame, column: str, *, gaps: bool = False) -> Array:
     try:
         values = table[column].to_numpy(float)
     except (ValueError, TypeError) as error:
-        raise InvalidInput(f"column {column}", in_short(str(error)), "numbers") from None
+        raise InvalidInput(f"column {column}", str(error), "numbers") from None
     wrong = np.isinf(values) if gaps else ~np.isfinite(values)
     if wrong.any():
         row = int(wrong.argmax())

@@ -133,18 +133,9 @@ class MarkerModel:
             moment = turned(bend, -angle) * arm.section.resistance(own)[..., None]
             force = rise * own.axial[..., None, None]
             measures = np.concatenate([turned(moment, angle), force], axis=-2)
-        return _Explicit(
-            table,
-            arm.base.rotation,
-            np.array(arm.base.position),
-            scale,
-            offsets,
-            Driving(arm).bundles(inputs),
-            law.taut_from,
-            law.compliance,
-            measures=measures,
-            rest=table.curvature @ law.rest[0],
-        )
+        own, place = Driving(arm).bundles(inputs), np.array(arm.base.position)
+        tendons = law.taut_from, law.compliance, measures, table.curvature @ law.rest[0]
+        return _Explicit(table, arm.base.rotation, place, scale, offsets, own, *tendons)
 
     def _block(
         self,
