@@ -108,15 +108,10 @@ def _plan(
         chunks = [1 if dim in command.space.dims else size for dim, size in sizes.items()]
     else:
         chunks = [min(size, _CHUNK) for size in sizes.values()]
-    options = {
-        "shape": tuple(sizes.values()),
-        "dtype": dtype,
-        "chunks": tuple(max(size, 1) for size in chunks),
-        "fill_value": fill,
-        "compressors": (Crc32cCodec(),),
-        "dimension_names": tuple(sizes),
-        "attributes": attrs | {OF: stores.sha256(command.to_json().encode())},
-    }
+    options = {"shape": tuple(sizes.values()), "dtype": dtype, "fill_value": fill}
+    options |= {"chunks": tuple(max(size, 1) for size in chunks)}
+    options |= {"compressors": (Crc32cCodec(),), "dimension_names": tuple(sizes)}
+    options |= {"attributes": attrs | {OF: stores.sha256(command.to_json().encode())}}
     if name == "tip":  # activations are random bits, and the same bytes anywhere
         blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
         options["compressors"] = blosc, Crc32cCodec()

@@ -8,14 +8,8 @@ import traceback
 from contextlib import suppress
 from typing import Annotated, Any, cast
 
-from cyclopts import (
-    App,
-    CycloptsError,
-    Group,
-    MissingArgumentError,
-    Parameter,
-    UnusedCliTokensError,
-)
+import cyclopts
+from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter
 
 import softreach as sr
 from softreach.cli.console import HelpConsole, console
@@ -136,10 +130,10 @@ def run(arguments: list[str]) -> int:
     return code or 0
 
 
-def _unfit(error: MissingArgumentError | UnusedCliTokensError) -> str:
+def _unfit(error: MissingArgumentError | cyclopts.UnusedCliTokensError) -> str:
     """Words that a command needs, or cannot use."""
     command = " ".join(error.command_chain or ["softreach"])
-    if isinstance(error, UnusedCliTokensError):
+    if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"{command} takes no {', '.join(error.unused_tokens or ())}"
     if error.keyword is None:
         return f"{command} needs {error.argument.name if error.argument else 'more words'}"
@@ -150,7 +144,7 @@ def _unfit(error: MissingArgumentError | UnusedCliTokensError) -> str:
 def _message(error: Exception) -> str:
     if isinstance(error, CycloptsError) and isinstance(error.__cause__, SoftreachError):
         error = error.__cause__
-    if isinstance(error, MissingArgumentError | UnusedCliTokensError):
+    if isinstance(error, MissingArgumentError | cyclopts.UnusedCliTokensError):
         return _unfit(error)
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; ask for fewer samples or less accuracy"

@@ -76,18 +76,11 @@ def build(
     groups = tuple(sr.atlas.METRIC_GROUPS if metrics is None else metrics.split(","))
     if "concave" not in groups:
         options.refuse("without the metrics concave", alpha=alpha)
-    sr.build_atlas(
-        _space_of(space, design, vary, changes),
-        store,
-        **sampling.arguments,
-        alpha_over_length=0.05 if alpha is None else _over_length(alpha),
-        metrics=groups,
-        keep_clouds=keep_clouds,
-        executor=_executor(scheduler, scheduler_file),
-        shard=(int(first), int(count)),
-        durable=durable,
-        device=device,
-    )
+    how: Any = {"metrics": groups, "keep_clouds": keep_clouds, "durable": durable}
+    how |= {"shard": (int(first), int(count)), "device": device}
+    how |= {"alpha_over_length": 0.05 if alpha is None else _over_length(alpha)}
+    designs, how = _space_of(space, design, vary, changes), how | sampling.arguments
+    sr.build_atlas(designs, store, executor=_executor(scheduler, scheduler_file), **how)
     status(store, json=json)
 
 

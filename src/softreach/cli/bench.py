@@ -91,24 +91,15 @@ def calibrate(
     outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
     for path, formats in outputs or [(None, {})]:
         options.check_output(path, formats, output.overwrite)
+    known: Any = {"hold_out": hold_out, "hold_out_runs": hold_out_runs, "robust": robust}
+    known |= {"rivals": rivals, "run": run, "order": order, "seed": seed}
     with progress.bar("fitting", None) as step:
-        result = sr.calibrate(
-            arm,
-            data,
-            free=free_names(arm, free),
-            prior=priors(arm, prior or ()),
-            hold_out=hold_out,
-            hold_out_runs=hold_out_runs,
-            noise=None if noise is None else _noise(noise),
-            robust=robust,
-            rivals=rivals,
-            inputs=pairs_in("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"') or None,
-            markers=pairs_in("marker", markers, "NAME=START, such as tip=disk3") or None,
-            run=run,
-            order=order,
-            seed=seed,
-            progress=step,
-        )
+        known |= {"free": free_names(arm, free), "prior": priors(arm, prior or ())}
+        known |= {"noise": None if noise is None else _noise(noise)}
+        columns_of = pairs_in("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"')
+        starts_of = pairs_in("marker", markers, "NAME=START, such as tip=disk3")
+        known |= {"inputs": columns_of or None, "markers": starts_of or None}
+        result = sr.calibrate(arm, data, **known, progress=step)
     if output.json:
         console.json(_record(result))
     else:
@@ -129,27 +120,16 @@ def _noise(text: str) -> float:
 
 def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
-    fit, held = result.fit, result.held
-    return {
-        "samples": len(result.data),
-        "held_out": int(held.sum()),
-        "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
-        "numbers": _numbers(result.to_dataset()),
-        "errors": [
-            {"law": law, "samples": on, **_errors(errors)} for law, on, errors in result.errors
-        ],
-        "correlated": result.correlated,
-        "doubts": result.doubts,
-        "outlier_rows": result.outliers,
-        "repeatability_rms_m": result.repeatability.rms,
-        "repeated_samples": result.repeatability.pairs,
-        "limit": result.verdict.limit,
-        "verdict": result.verdict.sentence,
-        "converged": fit.converged,
-        "seconds": result.seconds,
-        "data": result.data.source,
-        "data_sha256": result.data.digest,
-    }
+    held, data, again = result.held, result.data, result.repeatability
+    errors = [{"law": law, "samples": on, **_errors(each)} for law, on, each in result.errors]
+    record = {"samples": len(data), "held_out": int(held.sum()), "errors": errors}
+    record |= {"markers": {name: _errors(each) for name, each in result.by_marker.items()}}
+    record |= {"numbers": _numbers(result.to_dataset()), "correlated": result.correlated}
+    record |= {"doubts": result.doubts, "outlier_rows": result.outliers}
+    record |= {"repeatability_rms_m": again.rms, "repeated_samples": again.pairs}
+    record |= {"limit": result.verdict.limit, "verdict": result.verdict.sentence}
+    record |= {"converged": result.fit.converged, "seconds": result.seconds}
+    return record | {"data": data.source, "data_sha256": data.digest}
 
 
 def _numbers(found: Dataset) -> list[dict[str, Any]]:
@@ -201,14 +181,10 @@ def plan_poses(
     arm = design_from(design, changes, output.unit)
     width = _noise(noise)
     options.check_output(out, TABLES, output.overwrite)
-    plan = sr.calibration.plan_poses(
-        arm,
-        free_names(arm, free),
-        n,
-        markers=None if markers is None else [name.strip() for name in markers.split(",")],
-        candidates=candidates,
-        seed=seed,
-    )
+    names = free_names(arm, free)
+    seen = None if markers is None else [name.strip() for name in markers.split(",")]
+    options_of = {"markers": seen, "candidates": candidates, "seed": seed}
+    plan = sr.calibration.plan_poses(arm, names, n, **options_of)
     found = plan.to_dataset(width)
     if output.json:
         poses = {"inputs": found["input"].values, "poses": found["activation"].values}

@@ -7,10 +7,9 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import console
+from softreach.cli.console import console, fields_of
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible
-from softreach.support.units import Rows
 
 Format = Annotated[
     str | None,
@@ -55,19 +54,17 @@ def export(
         write(source, out, overwrite, unit)
     elif format is not None and out.suffix != ".jl":
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
-    elif out.suffix == ".jl":
-        options.refuse("on a filament's definition, which has none", activation=activation)
+    elif out.suffix in (".jl", ".xml"):
+        known = (FILAMENT_SCRIPT, write_design, "a filament's definition, which has none", _OTHER)
+        if out.suffix == ".xml":
+            other = "a model, whose controls they are", "for MuJoCo, whose lengths are in m"
+            known = MODEL, write_mujoco, *other
+        formats, write, what, whose = known
+        options.refuse(f"on {what}", activation=activation)
         arm = design_from(source, changes)
-        options.refuse(_OTHER, unit=unit)
-        options.check_output(out, FILAMENT_SCRIPT, overwrite)
-        write_design(arm, out, overwrite=overwrite)
-        console.line(out)
-    elif out.suffix == ".xml":
-        options.refuse("on a model, whose controls they are", activation=activation)
-        arm = design_from(source, changes)
-        options.refuse("for MuJoCo, whose lengths are in m", unit=unit)
-        options.check_output(out, MODEL, overwrite)
-        write_mujoco(arm, out, overwrite=overwrite)
+        options.refuse(whose, unit=unit)
+        options.check_output(out, formats, overwrite)
+        write(arm, out, overwrite=overwrite)
         console.line(out)
     else:
         arm = design_from(source, changes, unit)
@@ -130,12 +127,8 @@ def import_file(
         options.check_output(out, DESIGN_FILE, output.overwrite)
         arm = shown_in(output.unit, read_design(source))
         arm.save(out, overwrite=output.overwrite)
-        rows: Rows = {
-            "length": (arm.length, "m"),
-            "rings": (len(arm.section.rings), ""),
-            "bundle names": (list(arm.bundle_names), ""),
-            "design": (str(out), ""),
-        }
+        rows = fields_of({"length": arm.length, "rings": len(arm.section.rings)}, "length")
+        rows |= fields_of({"bundle names": list(arm.bundle_names), "design": str(out)})
     elif source.suffix != ".csv":
         raise InvalidInput("source", source, "a file name ending in .json or .csv")
     elif design is None:
@@ -146,9 +139,7 @@ def import_file(
         options.check_output(out, CLOUD_STORE, output.overwrite)
         cloud = read_cloud(arm, source, tol=1e-6 if tol is None else tol)
         sr.save_cloud(cloud, out, overwrite=output.overwrite)
-        rows = {
-            "samples": (cloud.sizes["sample"], ""),
-            "largest difference of tips": (float(cloud.attrs["largest_tip_difference"]), "m"),
-            "cloud": (str(out), ""),
-        }
+        rows = fields_of({"samples": cloud.sizes["sample"]})
+        off = float(cloud.attrs["largest_tip_difference"])
+        rows |= {"largest difference of tips": (off, "m"), "cloud": (str(out), "")}
     console.rows(f"{kind} of {source}", rows, output.json, arm)

@@ -15,7 +15,7 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import as_read, console
+from softreach.cli.console import as_read, console, fields_of
 from softreach.cli.options import UNCHANGED, Changes, Whole, design_from
 from softreach.cli.reach import HULL_BYTES, volume_rows
 from softreach.support import parallel
@@ -366,17 +366,12 @@ def doctor(*, json: options.AsJson = False) -> None:
     names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
     has_screen = platform.system() in ("Windows", "Darwin")
     has_screen = has_screen or bool({"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ})
-    rows = {
-        "softreach": (sr.__version__, ""),
-        "installed in": (str(Path(sr.__file__).parent), ""),
-        "Python": (platform.python_version(), ""),
-        "system": (platform.platform(), ""),
-        "cores": (os.cpu_count(), ""),
-        "threads used": (parallel.thread_count(), ""),
-        "free memory": (round(free_memory() / 1e9, 1), "GB"),
-        "kernels are kept in": (kept, ""),
-        "screen": ("yes" if has_screen else "none: headless", ""),
-    }
+    named = {"softreach": sr.__version__, "installed in": str(Path(sr.__file__).parent)}
+    named |= {"Python": platform.python_version(), "system": platform.platform()}
+    named |= {"cores": os.cpu_count(), "threads used": parallel.thread_count()}
+    rows = fields_of(named) | {"free memory": (round(free_memory() / 1e9, 1), "GB")}
+    screen = "yes" if has_screen else "none: headless"
+    rows |= fields_of({"kernels are kept in": kept, "screen": screen})
     rows |= {name: (_version(name), "") for name in names if name != "softreach"}
     console.rows("this machine and this installation", rows, json)
 

@@ -187,10 +187,5 @@ def _design(result: sr.optimization.Search, each: sr.optimization.Candidate) -> 
         {"objective": goal.name, **value._asdict(), "unit": goal.objective.unit}
         for goal, value in zip(result.goals, each.objectives, strict=bool(each.objectives))
     ]
-    return {
-        "objectives": objectives,
-        "parameters": parameters,
-        "excess": each.excess,
-        "missed": dict(each.missed),
-        "fault": each.fault,
-    }
+    known = {"excess": each.excess, "missed": dict(each.missed), "fault": each.fault}
+    return {"objectives": objectives, "parameters": parameters, **known}

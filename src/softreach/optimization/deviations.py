@@ -122,16 +122,11 @@ class Spread:
         off = math.sqrt(self.level * (1.0 - self.level) / count)
         levels = np.clip([self.level - off, self.level, self.level + off], 0.0, 1.0)
         low, quantile, high = np.quantile(values, levels).tolist()
-        return replace(
-            self,
-            made=count,
-            made_mean=mean,
-            made_error=math.hypot(deviation / math.sqrt(count), error),
-            made_deviation=deviation,
-            deviation_error=math.sqrt(spread),
-            made_quantile=quantile,
-            quantile_error=math.hypot(0.5 * (high - low), error),
-        )
+        numbers = {"made_mean": mean, "made_deviation": deviation, "made_quantile": quantile}
+        errors = {"made_error": math.hypot(deviation / math.sqrt(count), error)}
+        errors |= {"deviation_error": math.sqrt(spread)}
+        errors |= {"quantile_error": math.hypot(0.5 * (high - low), error)}
+        return replace(self, made=count, **numbers, **errors)
 
     def __str__(self) -> str:
         scale, unit = (100.0, "%") if self.unit == "1" else (1.0, self.unit.replace("m3", "m³"))

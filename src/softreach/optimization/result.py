@@ -20,7 +20,7 @@ from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
 from softreach.support.arguments import as_flag, as_path
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, over
 from softreach.support.errors import SoftreachError, check_installed, counted
 from softreach.support.files.atomic import check_place
 from softreach.support.files.text import write_table, write_text
@@ -155,38 +155,34 @@ class Search(Reported):
         """
         import xarray as xr
 
-        every, free = self.every, self.problem.parameters.free
-        goals, arm, numbers = self.goals, self.shown, self._numbers(self.every)
-        shown = {"length": arm.length, "display_unit": arm.display_unit or ""}
+        every, free, goals = self.every, self.problem.parameters.free, self.goals
+        arm, numbers = self.shown, self._numbers(every)
+        about = {**provenance(arm), "length": arm.length, "display_unit": arm.display_unit or ""}
+        about |= {**self.provenance, "finalists": len(self.finalists)}
         places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
         coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
-        values = [[p.number(each.values[p.name]) for p in free] for each in every]
         looked_at = np.cumsum([each.designs for each in self.candidates], dtype=int)
-        return xr.Dataset(
-            {
-                "value": (("design", "parameter"), np.array(values)),
-                "objective_value": (("design", "objective"), numbers[..., 0]),
-                "objective_error": (("design", "objective"), numbers[..., 1]),
-                "excess": ("design", [each.excess for each in every], {"units": "1"}),
-                "feasible": ("design", [each.is_feasible for each in every]),
-                "front": ("design", [self._is_in_front(each) for each in every]),
-                "fidelity": ("design", np.array([each.fidelity for each in every], dtype=str)),
-                "looked_at": ("design", [*looked_at, *[self.designs] * len(self.finalists)]),
-                "coarse_design": ("design", [-1] * len(self.candidates) + coarse),
-                "fault": ("design", np.array([each.fault for each in every], dtype=str)),
-            },
-            {
-                "parameter": [p.name for p in free],
-                "parameter_unit": ("parameter", [p.unit for p in free]),
-                "low": ("parameter", [p.number(p.ends[0]) for p in free]),
-                "high": ("parameter", [p.number(p.ends[1]) for p in free]),
-                "choices": ("parameter", [", ".join(map(str, p.choices)) for p in free]),
-                "objective": np.array([goal.name for goal in goals], dtype=str),
-                "objective_unit": ("objective", [goal.objective.unit for goal in goals]),
-                "sense": ("objective", [goal.sense for goal in goals]),
-            },
-            {**provenance(arm), **shown, **self.provenance, "finalists": len(self.finalists)},
-        )
+        looked_at = [*looked_at, *[self.designs] * len(self.finalists)]
+        rows = np.array([[p.number(each.values[p.name]) for p in free] for each in every])
+        at = ("design", "objective")
+        values = over(("design", "parameter"), value=rows)
+        values |= over(at, objective_value=numbers[..., 0], objective_error=numbers[..., 1])
+        values |= over("design", "1", excess=[each.excess for each in every])
+        values |= over("design", feasible=[each.is_feasible for each in every])
+        values |= over("design", front=[self._is_in_front(each) for each in every])
+        values |= over("design", fidelity=np.array([each.fidelity for each in every], dtype=str))
+        values |= over("design", fault=np.array([each.fault for each in every], dtype=str))
+        coarse = [-1] * len(self.candidates) + coarse
+        values |= over("design", looked_at=looked_at, coarse_design=coarse)
+        low, high = ([p.number(p.ends[k]) for p in free] for k in range(2))
+        choices = [", ".join(map(str, p.choices)) for p in free]
+        names = {"parameter": [p.name for p in free]}
+        names |= over("parameter", parameter_unit=[p.unit for p in free], low=low, high=high)
+        names |= over("parameter", choices=choices)
+        names |= {"objective": np.array([goal.name for goal in goals], dtype=str)}
+        names |= over("objective", objective_unit=[goal.objective.unit for goal in goals])
+        names |= over("objective", sense=[goal.sense for goal in goals])
+        return xr.Dataset(values, names, about)
 
     @property
     def shown(self) -> Manipulator:

@@ -140,16 +140,11 @@ class _Run:
         others = study.others()
         every = [*study.candidates, *others]
         finalists = self._at_full_accuracy(every)
-        return Search(
-            problem=self.problem,
-            front=tuple(self.problem.front(finalists)),
-            finalists=tuple(finalists),
-            candidates=tuple(every),
-            designs=self._spent + sum(each.designs for each in others),
-            seconds=time.perf_counter() - self._begun,
-            seed=study.seed,
-            sampler=study.kind,
-        )
+        found: Any = {"front": tuple(self.problem.front(finalists)), "finalists": tuple(finalists)}
+        found |= {"candidates": tuple(every), "seed": study.seed, "sampler": study.kind}
+        spent, seconds = sum(each.designs for each in others), time.perf_counter() - self._begun
+        spent += self._spent
+        return Search(problem=self.problem, designs=spent, seconds=seconds, **found)
 
     @property
     def _left(self) -> int:

@@ -15,7 +15,7 @@ from softreach.optimization.program import Point, stacked_slopes
 from softreach.optimization.result import Search
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, over
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, no_warnings
 from softreach.support.lazy import Dataset
 from softreach.support.progress import Progress, as_progress
@@ -80,28 +80,20 @@ class Sensitivity:
         """Gradients, shares of variance and multipliers, labeled."""
         import xarray as xr
 
-        at, count = ("goal", "parameter"), len(self.parameters)
+        count = len(self.parameters)
         lacks = np.full((4, count), math.nan)
         each = [lacks if shares is None else shares for shares in self.variance]
         shares = np.array(each).reshape(-1, 4, count).swapaxes(0, 1)
-        variances = zip(VarianceShares._fields, shares, strict=True)
-        return xr.Dataset(
-            {
-                "gradient": (("goal", "real"), self.gradient),
-                "gradient_error": (("goal", "real"), self.gradient_error),
-                **{name: (at, values, {"units": "1"}) for name, values in variances},
-                "multiplier": ("requirement", [each.value for each in self.multipliers]),
-            },
-            {
-                "goal": list(self.goals),
-                "goal_unit": ("goal", list(self.goal_units)),
-                "real": list(self.reals),
-                "real_unit": ("real", list(self.units)),
-                "parameter": list(self.parameters),
-                "requirement": [each.name for each in self.multipliers],
-            },
-            {"residual": self.residual, "designs": self.designs},
-        )
+        variances = dict(zip(VarianceShares._fields, shares, strict=True))
+        at = ("goal", "real")
+        values = over(at, gradient=self.gradient, gradient_error=self.gradient_error)
+        values |= over(("goal", "parameter"), "1", **variances)
+        values |= over("requirement", multiplier=[each.value for each in self.multipliers])
+        names = {"goal": list(self.goals), "real": list(self.reals)}
+        names |= over("goal", goal_unit=list(self.goal_units))
+        names |= over("real", real_unit=list(self.units)) | {"parameter": list(self.parameters)}
+        names |= {"requirement": [each.name for each in self.multipliers]}
+        return xr.Dataset(values, names, {"residual": self.residual, "designs": self.designs})
 
     def __repr__(self) -> str:
         lines = [f"Sensitivity ({self.designs:,} designs):"]

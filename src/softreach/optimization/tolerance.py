@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support import errors, parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, over
 from softreach.support.errors import InvalidDesign, NotPossible, counted
 from softreach.support.lazy import Dataset
 from softreach.support.progress import Progress, as_progress
@@ -160,26 +160,19 @@ class Tolerance:
         fields = ("nominal", "mean", "deviation", "quantile", "level", "error", "agrees")
         fields += ("made_mean", "made_error", "made_deviation", "deviation_error")
         fields += ("made_quantile", "quantile_error")
-        numbers = {x: ("number", [getattr(each, x) for each in self.spreads]) for x in fields}
-        join = np.concatenate
+        numbers = {x: [getattr(each, x) for each in self.spreads] for x in fields}
         names = [target.name for target in self.targets for _ in target.probability]
-        return xr.Dataset(
-            {
-                **numbers,
-                "sigma": ("parameter", self.sigmas),
-                "cost": ("parameter", self.costs, {"units": "1"}),
-                "target": ("place", np.array(names, dtype=str)),
-                "probability": ("place", join([[], *(t.probability for t in self.targets)])),
-                "made_share": ("place", join([[], *(t.made for t in self.targets)])),
-            },
-            {
-                "number": [each.name for each in self.spreads],
-                "unit": ("number", [each.unit for each in self.spreads]),
-                "parameter": list(self.parameters),
-                "parameter_unit": ("parameter", list(self.units)),
-            },
-            {**provenance(self.arm), "arms_made": self.made, "arms_impossible": self.impossible},
-        )
+        shares = {"probability": [[], *(target.probability for target in self.targets)]}
+        shares |= {"made_share": [[], *(target.made for target in self.targets)]}
+        values = over("number", **numbers) | over("parameter", sigma=self.sigmas)
+        values |= over("parameter", "1", cost=self.costs)
+        values |= over("place", target=np.array(names, dtype=str))
+        values |= over("place", **{name: np.concatenate(x) for name, x in shares.items()})
+        labels = {"number": [x.name for x in self.spreads], "parameter": list(self.parameters)}
+        labels |= over("number", unit=[x.unit for x in self.spreads])
+        labels |= over("parameter", parameter_unit=list(self.units))
+        about = {"arms_made": self.made, "arms_impossible": self.impossible}
+        return xr.Dataset(values, labels, {**provenance(self.arm), **about})
 
     def __repr__(self) -> str:
         made = f"{counted(self.made, 'arm')} made"
@@ -223,20 +216,11 @@ def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -
         if made:
             share[_tried(target)] = np.mean([reached[k] for _, reached in made], axis=0)
         targets.append(TargetTolerance(target.name, first.probability(target), share, len(made)))
-    return Tolerance(
-        arm=first.deviations.arm,
-        parameters=first.deviations.names,
-        units=tuple(each.unit for each in first.deviations.parameters),
-        sigmas=first.deviations.sigmas,
-        kept=kept,
-        volume=volume,
-        unreachability=unreachability,
-        targets=tuple(targets),
-        regions=tuple(regions),
-        costs=first.costs(),
-        made=len(made),
-        impossible=checked - len(made),
-    )
+    own, units = first.deviations, tuple(each.unit for each in first.deviations.parameters)
+    of_arm: Any = {"arm": own.arm, "parameters": own.names, "units": units, "sigmas": own.sigmas}
+    of_sets: Any = {"kept": kept, "volume": volume, "unreachability": unreachability}
+    of_sets |= {"targets": tuple(targets), "regions": tuple(regions), "costs": first.costs()}
+    return Tolerance(made=len(made), impossible=checked - len(made), **of_arm, **of_sets)
 
 
 class _Followed(NamedTuple):

@@ -194,12 +194,8 @@ def plot_designs(
     least = _LEAST if all(plane_of(p.view) for p in panels) else _LEAST_OBLIQUE
     usual = max(_LEAST * len(panels), least)
     width = usual if width is None else as_number("width", width, style.WIDTH)
-    box = bounding_box(
-        *(
-            arm_points(p.arm, rest_configuration(p.arm), LengthUnit("L", p.arm.length))
-            for p in panels
-        )
-    )
+    rests = [(p.arm, rest_configuration(p.arm), LengthUnit("L", p.arm.length)) for p in panels]
+    box = bounding_box(*(arm_points(*each) for each in rests))
     places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
     with style.figure_style():

@@ -33,6 +33,9 @@ from softreach.support.files.text import read_text, write_text
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
 
+Raw = dict[str, Any]  # A table of a file
+Units = Mapping[str, str]  # Field -> unit of its numbers
+
 _KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
 """At the top, beside payloads; `search` is read by the search of designs."""
 _EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa", "rad": "5deg"}
@@ -44,9 +47,8 @@ _SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
     "mesh": (Mesh, {"vertices": "m", "faces": ""}),
 }
 """Regions, with their numbers and the units of these."""
-_LISTS = {"payloads", "places", "direction", *(n for _, own in _SHAPES.values() for n in own)} - {
-    "radius"
-}
+_LISTS = {"payloads", "places", "direction", *(n for _, own in _SHAPES.values() for n in own)}
+_LISTS -= {"radius"}
 _BALL = {"region": Sphere((0.0, 0.0, 0.0), 1.0)}
 _INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}
 """In place of faulty parts, so that the others can be judged."""
@@ -300,7 +302,7 @@ class _Reader(toml.FaultReader):
             "measures": self._measures(self._table(document, "measures")),
         }
 
-    def _target(self, raw: dict[str, Any], path: str) -> Any:
+    def _target(self, raw: Raw, path: str) -> Any:
         numbers = {"within": "m", "share": "", "places": "m", "direction": "", "cone": "rad"}
         values = self._part(raw, path, numbers, ("name", "file"))
         file = values.pop("file", None)
@@ -323,15 +325,13 @@ class _Reader(toml.FaultReader):
         allowed = f"part of the text: other files are not sent along; write {instead}"
         raise InvalidInput("file", repr(name), allowed)
 
-    def _keep(self, raw: dict[str, Any], path: str, inside: bool) -> Any:
+    def _keep(self, raw: Raw, path: str, inside: bool) -> Any:
         values = self._part(raw, path, {"clearance": "m"}, ("name", "of", "when"))
         if "region" not in values:
             return self._refuse(path, None, f"needs one of {', '.join(_SHAPES)}")
         return self._made(Keep, raw, path, values | {"inside": inside})
 
-    def _part(
-        self, raw: dict[str, Any], path: str, numbers: Mapping[str, str], words: tuple[str, ...]
-    ) -> dict[str, Any]:
+    def _part(self, raw: Raw, path: str, numbers: Units, words: tuple[str, ...]) -> dict[str, Any]:
         """Values of a table by field: numbers, words, and the region that it has."""
         values = self._numbers(raw, path, numbers, (*words, *_SHAPES, "mesh_unit"))
         values |= {name: raw[name] for name in words if name in raw}
@@ -344,7 +344,7 @@ class _Reader(toml.FaultReader):
             self._refuse(f"{path}.mesh_unit", raw["mesh_unit"], "needs a mesh")
         return values
 
-    def _region(self, raw: dict[str, Any], shape: str, path: str) -> Any:
+    def _region(self, raw: Raw, shape: str, path: str) -> Any:
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
@@ -366,7 +366,7 @@ class _Reader(toml.FaultReader):
                 return self._refuse(f"{path}.{key}", None, "required key is missing")
         return self._made(kind, table, path, values)
 
-    def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
+    def _measures(self, raw: Raw) -> dict[str, Any]:
         measures = {}
         for name, table in raw.items():
             path = f"measures.{toml.key_text(name)}"
@@ -382,13 +382,12 @@ class _Reader(toml.FaultReader):
                 measures[name] = tuple(map(values.get, ends))
         return measures
 
-    def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
+    def _made(self, kind: Any, raw: Raw, path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `WRONG` and a fault where it refuses them."""
         wrong = {name for name, value in values.items() if value is toml.WRONG}
         # Of directions nothing can be said without their places.
-        lost = wrong | (
-            {"direction", "cone"} if wrong & {"region", "places", "direction"} else set()
-        )
+        of_places = {"direction", "cone"} if wrong & {"region", "places", "direction"} else set()
+        lost = wrong | of_places
         right = {name: value for name, value in values.items() if name not in lost}
         if wrong and kind not in _INSTEAD:
             return toml.WRONG
@@ -409,9 +408,9 @@ class _Reader(toml.FaultReader):
 
     def _numbers(
         self,
-        raw: dict[str, Any],
+        raw: Raw,
         path: str,
-        numbers: Mapping[str, str],
+        numbers: Units,
         others: Sequence[str] = (),
         *,
         plain: bool = False,

@@ -6,14 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import (
-    columns,
-    five_digits,
-    quantity,
-    read_number,
-    read_quantity,
-    unit_names,
-)
+from softreach.support.quantity import columns, five_digits, quantity, read_quantity, unit_names
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -129,8 +122,8 @@ def read_length(text: str, length: float | None = None) -> float:
     """A length [m] typed as "80mm", "0.08" in m, or "0.1L" where L is known; or `ValueError`."""
     text = text.strip()
     if length is not None and text.endswith("L"):
-        return length * read_number(text[:-1])
-    return read_quantity(text, "m") if text[-1:].isalpha() else read_number(text)
+        return length * read_quantity(text[:-1], "1")
+    return read_quantity(text, "m") if text[-1:].isalpha() else read_quantity(text, "1")
 
 
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:

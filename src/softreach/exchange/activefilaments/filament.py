@@ -148,14 +148,10 @@ def filament_of(arm: Manipulator) -> Filament:
     if not right:
         allowed = f"{_THERE} such that the innermost one is not the outermost of several"
         raise InvalidInput("radii of the rings", [ring.radii for ring in rings], allowed)
-    return Filament(
-        length=arm.length,
-        taper=arm.profile.taper,
-        density=float(arm.section.mass_per_length(1.0)) / math.pi if is_dense else None,
-        rings=right[0],
-        core_modulus=_modulus(core),
-        core_poisson_ratio=core.poisson_ratio,
-    )
+    dense = float(arm.section.mass_per_length(1.0)) / math.pi if is_dense else None
+    inside = {"core_modulus": _modulus(core), "core_poisson_ratio": core.poisson_ratio}
+    outside = {"length": arm.length, "taper": arm.profile.taper}
+    return Filament(rings=right[0], density=dense, **outside, **inside)
 
 
 def is_from_inside_out(radii: Sequence[tuple[float, float]]) -> bool:

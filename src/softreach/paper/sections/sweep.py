@@ -49,18 +49,17 @@ def sweep(settings: Settings, notes: Notebook) -> dict[str, Any]:
     grid = atlas.transpose("revolution", "taper", ...)
     wound = turns[-1], tapers, settings.accuracy
     curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
-    return {
-        "designs": int(atlas["volume"].notnull().sum()),
-        "samples": settings.samples,
+    found = {"designs": int(atlas["volume"].notnull().sum()), "samples": settings.samples}
+    found |= {
         "revolution_deg": np.degrees(turns).round(6),
         "taper_deg": np.degrees(tapers).round(6),
-        "alpha": atlas["volume"].attrs["alpha_over_length"],
-        **shapes(turns, tapers, settings.accuracy),
-        "best_taper_deg": {ratio: _best_taper(ratio, *wound) for ratio in _RATIOS},
-        "quantiles": curvature["quantile"].values,
-        "curvature": curvature.transpose("taper", "station", "quantile").values,
-        **{name: grid[name].values for name in (*_SCALARS, "exact_volume_error")},
     }
+    found |= {"alpha": atlas["volume"].attrs["alpha_over_length"]}
+    found |= shapes(turns, tapers, settings.accuracy)
+    found |= {"best_taper_deg": {ratio: _best_taper(ratio, *wound) for ratio in _RATIOS}}
+    found |= {"quantiles": curvature["quantile"].values}
+    found |= {"curvature": curvature.transpose("taper", "station", "quantile").values}
+    return found | {name: grid[name].values for name in (*_SCALARS, "exact_volume_error")}
 
 
 def size(n: Numbers) -> Finding:
