@@ -76,9 +76,7 @@ def run_designs(
     _run_pool(pool, store, indices, on_outcome)
 
 
-def _run_pool(
-    pool: Executor, store: AtlasStore, indices: Sequence[int], on_outcome: OnOutcome
-) -> None:
+def _run_pool(pool: Executor, store: AtlasStore, indices: Sequence[int], report: OnOutcome) -> None:
     key = token, origin = secrets.token_hex(8), os.getpid()
     remote = _Remote(store.command, store.location, store.opened.durable, token, origin)
     _opened[key] = store  # for workers that are threads of this process
@@ -100,7 +98,7 @@ def _run_pool(
                         raise
                     outcome = index, "its worker died repeatedly"  # Dask has tried it again by then
                     store.write_status(*outcome)
-                on_outcome(outcome)
+                report(outcome)
     except BrokenExecutor as error:
         then = "finished designs are safe: the same call with a new executor continues"
         raise errors.NotPossible(f"a worker died and broke its executor; {then}") from error

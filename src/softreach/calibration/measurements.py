@@ -26,9 +26,7 @@ from softreach.support.files.text import MEGABYTE, text_of
 from softreach.support.lazy import DataFrame
 from softreach.support.quantity import sizes_in
 
-_SIZES = {
-    x.lower(): (unit, size) for unit in ("m", "N", "Pa") for x, size in sizes_in(unit).items()
-}
+_SIZES = {x.lower(): (u, s) for u in ("m", "N", "Pa") for x, s in sizes_in(u).items()}
 _SIZES |= {"gf": ("N", 9.80665e-3), "mbar": ("Pa", 1e2), "psi": ("Pa", 6894.757293168361)}
 _SIZES |= {"percent": ("1", 1e-2)}
 """Suffixes of columns, in small letters: unit and size in it."""
@@ -347,9 +345,8 @@ def _chosen_markers(
         return dict(zip(names, triples, strict=True))
     listed = ", ".join(start or "x, y, z" for start in triples)
     own = f"the arm has {counted(len(names), 'marker')} ({', '.join(names)})"
-    raise NotPossible(
-        f"{own}, the data has {len(triples)} ({listed}): name them by `markers` (--marker)"
-    )
+    given = f"the data has {len(triples)} ({listed})"
+    raise NotPossible(f"{own}, {given}: name them by `markers` (--marker)")
 
 
 def _matched(
@@ -379,11 +376,9 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
         fitting = {unit} if unit in ("m", "N", "Pa") else {unit, ""}  # a plain number has none
         free = [c for c in columns if c not in chosen.values() and _unit(c)[1] in fitting]
         if len(free) != len(wanting):
-            wanted = f"{counted(len(wanting), 'column')} in {_unit_text(unit)}"
-            wanted += f" for {', '.join(wanting)}, and has {', '.join(free) or 'none'}"
-            raise NotPossible(
-                f"the data must have {wanted}: name the columns by `inputs` (--input)"
-            )
+            want = f"{counted(len(wanting), 'column')} in {_unit_text(unit)}"
+            want += f" for {', '.join(wanting)}, and has {', '.join(free) or 'none'}"
+            raise NotPossible(f"the data must have {want}: name the columns by `inputs` (--input)")
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]
 

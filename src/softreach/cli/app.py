@@ -26,9 +26,7 @@ _GROUPS = (
     ("More", "demo:demo demo:example demo:doctor demo:paper demo:warmup"),
 )
 """Titles of the help, and commands behind the modules that they are in."""
-MODULES = {
-    name: module for _, words in _GROUPS for module, name in (w.split(":") for w in words.split())
-}
+MODULES = {x.split(":")[1]: x.split(":")[0] for _, words in _GROUPS for x in words.split()}
 _FUNCTIONS = {"import": "import_file", "list": "listing"}  # where Python needs the name itself
 
 
@@ -88,11 +86,8 @@ def _always(help: str, *names: str) -> Parameter:
 
 _QUIET = _always("Print results and errors only: no warnings, no progress.", "--quiet", "-q")
 _VERBOSE = _always("Print more: what is compiled, and where errors come from.", "--verbose", "-v")
-_IMPORT = _always(
-    "Module, or .py file, with actuators, profiles or metrics of your own, which is run. "
-    "May be repeated.",
-    "--import",
-)
+_MODULES = "Module, or .py file, with actuators, profiles or metrics of your own, which is run. "
+_IMPORT = _always(f"{_MODULES}May be repeated.", "--import")
 
 
 @app.meta.default

@@ -110,10 +110,8 @@ def verify(store: Store, /, *, json: options.AsJson = False) -> None:
     """
     _print(store, state := sr.atlas.verify_atlas(store), json)
     if state.damaged:
-        raise NotPossible(
-            f"{counted(state.damaged, 'design')} of {store} damaged: run the command that built "
-            "the atlas again"
-        )
+        many = f"{counted(state.damaged, 'design')} of {store} damaged"
+        raise NotPossible(f"{many}: run the command that built the atlas again")
 
 
 @atlas.command
@@ -161,7 +159,7 @@ def figures(
     /,
     *,
     panels: Whole = 7,
-    out: Annotated[Path, options.OUT] = Path("figures"),
+    out: options.Place = Path("figures"),
     overwrite: options.Overwrite = False,
 ) -> None:
     """Draw the atlas: sheets, corners, maps, curvature.

@@ -23,14 +23,10 @@ if TYPE_CHECKING:
     from softreach.arm.parameters import Written
 
 _COLUMNS = Group("Column names", sort_key=1)
-Free = Annotated[
-    list[str],
-    Parameter(
-        help="Numbers that may change, comma-separated: names of softreach list parameters DESIGN, "
-        "with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for "
-        "the base; scale for places without a unit of length. May be repeated.",
-    ),
-]
+_FREE = """Numbers that may change, comma-separated: names of softreach list parameters DESIGN, \
+with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for the base; \
+scale for places without a unit of length. May be repeated."""
+Free = Annotated[list[str], Parameter(help=_FREE)]
 
 
 def calibrate(

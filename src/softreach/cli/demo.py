@@ -4,6 +4,7 @@ import os
 import platform
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from itertools import chain
@@ -42,7 +43,7 @@ _FILES = {
 def demo(
     *,
     n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 400_000,
-    out: Annotated[Path, options.OUT] = Path("out"),
+    out: options.Place = Path("out"),
     output: options.Output = options.DEFAULT,
 ) -> None:
     """Start here: cloud, volumes and picture of the paper's design.
@@ -88,11 +89,7 @@ def demo(
 
 
 def example(
-    name: str,
-    /,
-    *,
-    out: Annotated[Path, options.OUT] = Path(),
-    overwrite: options.Overwrite = False,
+    name: str, /, *, out: options.Place = Path(), overwrite: options.Overwrite = False
 ) -> None:
     """Write an example here: a design and the data and scripts that go with it.
 
@@ -115,9 +112,7 @@ def example(
 
 def examples() -> dict[str, tuple[Path, ...]]:
     """The files of each example by its name."""
-    known = {
-        name: tuple(_folder("examples") / file for file in files) for name, files in _FILES.items()
-    }
+    known = {name: tuple(_folder("examples") / x for x in files) for name, files in _FILES.items()}
     return known | {file.stem: (file,) for file in sorted(_folder("designs").glob("*.toml"))}
 
 
@@ -231,10 +226,7 @@ _TABLES = {
 
 
 def paper(
-    *,
-    quick: bool = False,
-    out: Annotated[Path, options.OUT] = Path("paper"),
-    overwrite: options.Overwrite = False,
+    *, quick: bool = False, out: options.Place = Path("paper"), overwrite: options.Overwrite = False
 ) -> None:
     """Recompute the paper's figures and statements into a report.
 
@@ -372,12 +364,9 @@ def doctor(*, json: options.AsJson = False) -> None:
     rows = fields_of(named) | {"free memory": (round(free_memory() / 1e9, 1), "GB")}
     screen = "yes" if has_screen else "none: headless"
     rows |= fields_of({"kernels are kept in": kept, "screen": screen})
-    rows |= {name: (_version(name), "") for name in names if name != "softreach"}
+    for name in names:
+        if name != "softreach":
+            rows[name] = "not installed", ""
+            with suppress(PackageNotFoundError):
+                rows[name] = version(name), ""
     console.rows("this machine and this installation", rows, json)
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"

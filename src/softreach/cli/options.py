@@ -95,6 +95,7 @@ Device = Literal["cpu", "cuda"]
 Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
+Place = Annotated[Path, OUT]
 View = Annotated[str | None, _output("View: oblique (if left out), front, side, top.")]
 Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
 """Text that may begin with a minus."""

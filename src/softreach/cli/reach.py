@@ -303,7 +303,7 @@ def show(
     activation: options.Activation = None,
     sampling: options.Sampling = options.SAMPLING,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, options.OUT] = Path("cloud.png"),
+    out: options.Place = Path("cloud.png"),
     overwrite: options.Overwrite = False,
     unit: options.Unit = None,
 ) -> None:

@@ -89,7 +89,7 @@ def search(
     sampler: Annotated[str | None, Parameter(group=_ASKED)] = None,
     polish: Annotated[bool | None, Parameter(negative="--no-polish", group=_ASKED)] = None,
     storage: Path | None = None,
-    out: Annotated[Path, options.OUT] = Path("best"),
+    out: options.Place = Path("best"),
     output: options.Output = options.DEFAULT,
 ) -> int:
     """Search for the best designs that meet requirements.

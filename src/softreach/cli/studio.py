@@ -91,10 +91,8 @@ def _write_static(
         raise NotPossible("give a slider of the page with --vary, such as --vary taper_deg=0:3:8")
     space = grid_of(design_from(source), vary)
     with progress.bar("computing designs", space.size) as step:
-        title = Path(source).stem
-        written = write_static(
-            space, folder, unit=unit, title=title, overwrite=overwrite, progress=step
-        )
+        how = {"title": Path(source).stem, "overwrite": overwrite, "progress": step}
+        written = write_static(space, folder, unit=unit, **how)
     gaps = f", {counted(written.gaps, 'gap')}" if written.gaps else ""
     console.line(str(written.page))
     console.line(f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB")

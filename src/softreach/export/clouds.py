@@ -7,7 +7,6 @@ from importlib import import_module
 from importlib.util import find_spec
 from io import BufferedWriter
 from itertools import chain, count
-from os import PathLike
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from softreach.schema import a_cloud, activation_units
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.files.atomic import StrPath
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.palette import activation_colors
@@ -110,11 +110,7 @@ def column_names(bundles: Sequence[str]) -> list[str]:
 
 
 def export_cloud(
-    cloud: Dataset,
-    path: str | PathLike[str],
-    *,
-    unit: str | LengthUnit = "m",
-    overwrite: bool = False,
+    cloud: Dataset, path: StrPath, *, unit: str | LengthUnit = "m", overwrite: bool = False
 ) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat or .vtu, chosen by the suffix.
 
@@ -171,9 +167,8 @@ def _write_csv(table: CloudTable, file: BufferedWriter) -> None:
         return
     frame = import_module("pandas").DataFrame  # the same numbers, more slowly
     for rows in table.blocks():
-        frame(table.columns(rows, suffix)).to_csv(
-            file, index=False, header=not rows.start, na_rep="nan"
-        )
+        options = {"index": False, "header": not rows.start, "na_rep": "nan"}
+        frame(table.columns(rows, suffix)).to_csv(file, **options)
 
 
 def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:

@@ -4,21 +4,18 @@ import os
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from io import BufferedWriter
-from os import PathLike
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.support.files.atomic import writing
+from softreach.support.files.atomic import StrPath, writing
 from softreach.support.files.formats import Formats, format_of
 
 _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
 
-def write_by_suffix(
-    path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool
-) -> None:
+def write_by_suffix(path: StrPath, formats: Formats, content: Any, *, overwrite: bool) -> None:
     """Write the content whole, or leave what was there."""
     write = format_of(path, formats).write
     assert write is not None

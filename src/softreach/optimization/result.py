@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
 
@@ -22,7 +21,7 @@ from softreach.schema import provenance
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array, over
 from softreach.support.errors import SoftreachError, check_installed, counted
-from softreach.support.files.atomic import check_place
+from softreach.support.files.atomic import StrPath, check_place
 from softreach.support.files.text import write_table, write_text
 from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.report import Report, Reported, Section
@@ -192,9 +191,7 @@ class Search(Reported):
         except SoftreachError:
             return self.problem.parameters.base
 
-    def save(
-        self, folder: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
-    ) -> None:
+    def save(self, folder: StrPath, *, unit: str | None = None, overwrite: bool = False) -> None:
         """Write the best designs, tables of the front and of all candidates, and a report.
 
         `best.toml`, or `front_01.toml` and so on for several objectives, `front.csv`,

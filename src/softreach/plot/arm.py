@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
 
+Shapes = list[Dataset]  # Single configurations of an arm
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
@@ -113,11 +114,7 @@ def arm_points(arm: Manipulator, shape: Dataset, unit: LengthUnit) -> Array:
 
 
 def draw_arms(
-    panel: Panel,
-    arm: Manipulator,
-    shapes: list[Dataset],
-    bundles: Collection[int],
-    fade: float = 0.0,
+    panel: Panel, arm: Manipulator, shapes: Shapes, bundles: Collection[int], fade: float = 0.0
 ) -> None:
     """One image of all shapes, over what the axes hold, and their markers in front."""
     if shapes:
@@ -134,11 +131,7 @@ def draw_markers(panel: Panel, arm: Manipulator, shapes: list[Dataset], fade: fl
 
 
 def arm_images(
-    panel: Panel,
-    arm: Manipulator,
-    shapes: list[Dataset],
-    bundles: Collection[int],
-    fade: float = 0.0,
+    panel: Panel, arm: Manipulator, shapes: Shapes, bundles: Collection[int], fade: float = 0.0
 ) -> tuple[ZBuffer, ZBuffer | None]:
     """All shapes in a panel, and what shows through them; None for nothing."""
     buffer, within = panel.buffer(oversample=3), panel.buffer(oversample=3)

@@ -4,7 +4,6 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from softreach.picture.page import Figure3D
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
-from softreach.support.files.atomic import writing
+from softreach.support.files.atomic import StrPath, writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
 from softreach.support.lazy import Axes, DataArray, Dataset, Figure
 from softreach.support.units import METER, LengthUnit, as_unit
@@ -119,7 +118,7 @@ def place_panels(
 
 
 def save_figure(
-    figure: Figure | Axes | Figure3D, path: str | PathLike[str], *, overwrite: bool = False
+    figure: Figure | Axes | Figure3D, path: StrPath, *, overwrite: bool = False
 ) -> None:
     """Save as .png, .pdf, .svg or another format that matplotlib knows, whole or not at all.
 

@@ -378,7 +378,7 @@ class _Reader(toml.FaultReader):
             else:
                 unit = metric.unit if metric.unit in _EXAMPLES else ""
                 ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
-                values = self._numbers(table, path, ends, plain=True)
+                values = self._numbers(table, path, ends, bare=True)
                 measures[name] = tuple(map(values.get, ends))
         return measures
 
@@ -407,17 +407,11 @@ class _Reader(toml.FaultReader):
             return self._refuse(path, None, str(error))
 
     def _numbers(
-        self,
-        raw: Raw,
-        path: str,
-        numbers: Units,
-        others: Sequence[str] = (),
-        *,
-        plain: bool = False,
+        self, raw: Raw, path: str, numbers: Units, others: Sequence[str] = (), *, bare: bool = False
     ) -> dict[str, Any]:
         """Numbers of a table in SI units by field; keys beside these and `others` are refused.
 
-        `plain` ones may go without their unit.
+        `bare` ones may go without their unit.
         """
         known = {name: _keys(name, unit) for name, unit in numbers.items()}
         self._check_keys(raw, path, (*numbers, *others), set().union(*known.values()))
@@ -432,7 +426,7 @@ class _Reader(toml.FaultReader):
                 fits = name not in _LISTS or isinstance(value, list | str)
                 try:
                     own = value if fits else None
-                    values[name] = self._read(own, unit, symbol, plain or not unit)
+                    values[name] = self._read(own, unit, symbol, bare or not unit)
                 except ValueError:
                     allowed = self._allowed(unit, symbol, name) if fits else "must be a list"
                     values[name] = self._refuse(start + keys[0], value, allowed)

@@ -108,14 +108,11 @@ class Fault(NamedTuple):
     allowed: Range | str  # Values that are allowed, and what to do
 
     def __str__(self) -> str:
-        if self.value is None or isinstance(self.value, dict) or _is_tables(self.value):
+        many = isinstance(self.value, list) and any(isinstance(each, dict) for each in self.value)
+        if many or self.value is None or isinstance(self.value, dict):
             return f"{self.path}: {self.allowed}"  # a table takes more lines than its fault
         shown = f"{self.value:.6g}" if isinstance(self.value, float) else in_short(repr(self.value))
         return f"{self.path} = {shown}: {self.allowed}"
-
-
-def _is_tables(value: object) -> bool:
-    return isinstance(value, list) and any(isinstance(each, dict) for each in value)
 
 
 class InvalidDesign(SoftreachError, ValueError):

@@ -39,9 +39,8 @@ def sweep(settings: Settings, notes: Notebook) -> dict[str, Any]:
     tapers = np.radians(np.linspace(0, 3, settings.designs))
     space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
     sizes: dict[str, Any] = {"alpha_over_length": settings.alpha, "accuracy": settings.accuracy}
-    atlas = build_atlas(
-        space, notes.folder.parent / STORE, settings.samples, settings.seed, **sizes
-    )
+    store = notes.folder.parent / STORE
+    atlas = build_atlas(space, store, settings.samples, settings.seed, **sizes)
     for name, figure in atlas_figures(atlas, settings.panels):
         if name in _CAPTIONS:
             label, words = _CAPTIONS[name]
