@@ -291,11 +291,10 @@ def _attributes(command: Command) -> dict[str, Any]:
         group.create_array(name, **options)
         digests[name] = stores.sha256(memory[f"{name}/{stores.ROOT}"].to_bytes())
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
-    return {
-        "title": "reachability cloud atlas",
-        "design": command.space.base.to_toml(),
-        CUBE_DIGEST: drawn_cube(command)[1],
-        "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
+    about: dict[str, Any] = {"title": "reachability cloud atlas"}
+    about |= {"design": command.space.base.to_toml(), CUBE_DIGEST: drawn_cube(command)[1]}
+    about |= {"versions": ", ".join(f"{name} {number}" for name, number in versions.items())}
+    return about | {
         "command": command.to_json(),
         stores.ARRAYS: digests,
         stores.DIGEST: stores.BLANK,

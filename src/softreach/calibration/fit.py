@@ -159,10 +159,9 @@ def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> No
     if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):
         orders = _orders(model, model.free.start, predicted, places)
         if orders[0].miss < _FAR_BETTER * own:
-            raise NotPossible(
-                f"the columns of the data fit no arm with right-handed axes: {_said(orders)}; "
-                f"put right, they miss by {1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
-            )
+            less = f"{1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
+            fit = f"the columns of the data fit no arm with right-handed axes: {_said(orders)}"
+            raise NotPossible(f"{fit}; put right, they miss by {less}")
 
 
 def identifiable(free: FreeNumbers, slopes: Array) -> None:

@@ -293,16 +293,12 @@ class Calibration(Reported):
     @property
     def provenance(self) -> dict[str, str]:
         """Version, date and data behind the result."""
-        return {
-            "softreach_version": str(versions()["softreach_version"]),
-            "date": self.date,
-            "data": self.data.source,
-            "data_sha256": self.data.digest,
-            "samples": f"{len(self.data)}, of which {self._held_text}",
-            "free": ", ".join(self.names),
-            "error": misses(self.residuals[self._judged]).text(self.start.length),
-            "verdict": self.verdict.sentence,
-        }
+        about = {"softreach_version": str(versions()["softreach_version"]), "date": self.date}
+        about |= {"data": self.data.source, "data_sha256": self.data.digest}
+        about |= {"samples": f"{len(self.data)}, of which {self._held_text}"}
+        error = misses(self.residuals[self._judged]).text(self.start.length)
+        about |= {"free": ", ".join(self.names), "error": error}
+        return about | {"verdict": self.verdict.sentence}
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the calibrated arm as a design file whose first lines say where it comes from.
@@ -340,11 +336,8 @@ class Calibration(Reported):
         import pandas as pd
 
         data, arm, shown = self.data, self.arm, as_unit(unit, self.arm.length)
-        table: dict[str, Any] = {
-            "row": data.rows,
-            "run": np.array(data.run_names)[data.runs],
-            "held_out": self.held.astype(int),
-        }
+        runs = np.array(data.run_names)[data.runs]
+        table: Any = {"row": data.rows, "run": runs, "held_out": self.held.astype(int)}
         for k, (name, own) in enumerate(zip(arm.input_names, arm.input_units, strict=True)):
             table[f"{name}{unit_suffix(own)}"] = data.inputs[:, k]
         distance = np.linalg.norm(self.residuals, axis=2)

@@ -215,14 +215,8 @@ def _parameters(arm: "sr.Manipulator") -> Table:
         yield written_name(name, one.unit), value, unit, one.symbol, one.meaning
 
 
-_TABLES = {
-    "designs": _designs,
-    "examples": _examples,
-    "materials": _materials,
-    "actuators": _actuators,
-    "metrics": _metrics,
-    "objectives": _objectives,
-}
+_TABLES = {"designs": _designs, "examples": _examples, "materials": _materials}
+_TABLES |= {"actuators": _actuators, "metrics": _metrics, "objectives": _objectives}
 
 
 def paper(

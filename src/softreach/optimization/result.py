@@ -131,11 +131,11 @@ class Search(Reported):
         """Version, objectives and numbers of designs behind the result."""
         judged = ", ".join(f"{count} {word}" for word, count in self.judged.items())
         goals = [f"{'max' if goal.sense > 0 else 'min'}imize {goal.name}" for goal in self.goals]
-        return {
-            "softreach_version": str(versions()["softreach_version"]),
-            "objectives": ", ".join(goals) or "none",
-            "designs": f"{self.designs}, judged by {judged}",
-            "accuracy": f"{self.problem.accuracy:g}, on the way {self.problem.coarse:g}",
+        about = {"softreach_version": str(versions()["softreach_version"])}
+        about |= {"objectives": ", ".join(goals) or "none"}
+        about |= {"designs": f"{self.designs}, judged by {judged}"}
+        about |= {"accuracy": f"{self.problem.accuracy:g}, on the way {self.problem.coarse:g}"}
+        return about | {
             "sampler": self.sampler,
             "seed": str(self.seed),
             "digest": self.problem.digest,

@@ -166,20 +166,14 @@ def sensitivity(
         variance = (None,) * len(problem.goals)
         if n and variance:
             variance = _variances(problem, n, seed, progress)
-    parameters = problem.parameters
-    return Sensitivity(
-        goals=tuple(goal.name for goal in problem.goals),
-        goal_units=tuple(goal.objective.unit for goal in problem.goals),
-        reals=tuple(each.name for each in parameters.real),
-        units=tuple(each.unit for each in parameters.real),
-        parameters=parameters.names,
-        gradient=gradient,
-        gradient_error=error,
-        multipliers=multipliers,
-        residual=residual,
-        variance=variance,
-        designs=n * (len(parameters) + 2),
-    )
+    parameters, goals = problem.parameters, [goal.objective for goal in problem.goals]
+    found: Any = {"gradient": gradient, "gradient_error": error, "variance": variance}
+    found |= {"multipliers": multipliers, "residual": residual}
+    found |= {"goals": tuple(goal.name for goal in goals), "parameters": parameters.names}
+    found |= {"goal_units": tuple(goal.unit for goal in goals)}
+    found |= {"reals": tuple(each.name for each in parameters.real)}
+    units = tuple(each.unit for each in parameters.real)
+    return Sensitivity(units=units, designs=n * (len(parameters) + 2), **found)
 
 
 def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:

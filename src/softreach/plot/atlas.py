@@ -106,11 +106,8 @@ def plot_cloud_sheet(atlas: Dataset, *, panels: int = 7) -> Figure:
 def plot_hull_sheet(atlas: Dataset, *, panels: int = 7) -> Figure:
     """A sheet of the lit α-shapes of an atlas at one scale (figure 3a).
 
-    The radius is that of the metric `volume`, or 0.05 L; all else is as in `plot_cloud_sheet`.
-
-    Args:
-        atlas: As in `plot_cloud_sheet`.
-        panels: As in `plot_cloud_sheet`.
+    The radius is that of the metric `volume`, or 0.05 L. What is not described here is as in
+    `plot_cloud_sheet`.
 
     Raises:
         InvalidInput: As `plot_cloud_sheet`.

@@ -180,15 +180,11 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
             if place != k:
                 continue
             angle: Any = fiber.helical_angle_on(arm.profile, arm.section)
-            yield replace(
-                body,
-                angle=angle if isinstance(angle, Pieces) else float(angle),
-                extent=fiber.extent,
-                offset=fiber.offset,
-                bounds=tuple(map(tuple, (fiber.bounds * body.scale).tolist())),
-                bundles=tuple(range(first, first + fiber.bundles)),
-                name=fiber.name,
-            )
+            angle = angle if isinstance(angle, Pieces) else float(angle)
+            own: Any = {"angle": angle, "extent": fiber.extent, "offset": fiber.offset}
+            own |= {"bounds": tuple(map(tuple, (fiber.bounds * body.scale).tolist()))}
+            own |= {"bundles": tuple(range(first, first + fiber.bundles)), "name": fiber.name}
+            yield replace(body, **own)
 
 
 def _modulus(material: Material) -> float:
@@ -345,15 +341,11 @@ def _fibers(definition: _Value, rings: list[_Value], length: float) -> Iterator[
     activation = definition.of("activation").each(len(rings))
     bounds = _bounds(definition, activation)
     for k, (ring, sectors, own) in enumerate(zip(rings, activation, bounds, strict=True)):
-        yield FiberArchitecture(
-            name=f"ring {k + 1}",
-            ring=k,
-            bundles=len(own),
-            helical_angle=_read_angle(ring.of("fiberArchitecture", "α2"), length),
-            extent=sectors.of("σ").number(),
-            offset=sectors.of("θ0").number(),
-            activation_bounds=own,
-        )
+        angle = _read_angle(ring.of("fiberArchitecture", "α2"), length)
+        extent, offset = sectors.of("σ").number(), sectors.of("θ0").number()
+        known: Any = {"helical_angle": angle, "extent": extent, "offset": offset}
+        known |= {"name": f"ring {k + 1}", "ring": k}
+        yield FiberArchitecture(bundles=len(own), activation_bounds=own, **known)
 
 
 def _read_angle(angle: _Value, length: float) -> float | Pieces:

@@ -44,11 +44,9 @@ def redundancy(settings: Settings, notes: Notebook) -> dict[str, Any]:
     words = "Distribution of the mean activation-space distance in both clouds."
     notes.draw("", "distances", words, plot.plot_distance_histograms(distances))
     outline = arms["redundant"].outline(0.0)
-    return numbers | {
-        "samples": settings.redundant_samples,
-        "offsets_deg": np.degrees(outline.center[0][2:]).round(9),
-        "extent_deg": np.degrees(outline.extent[2]).round(9),
-    }
+    offsets, extent = (np.degrees(x).round(9) for x in (outline.center[0][2:], outline.extent[2]))
+    numbers |= {"samples": settings.redundant_samples}
+    return numbers | {"offsets_deg": offsets, "extent_deg": extent}
 
 
 def cost(n: Numbers) -> Finding:
