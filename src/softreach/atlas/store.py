@@ -18,7 +18,7 @@ import zarr  # noqa: TID253  (imported where stores are)
 from numpy.typing import ArrayLike, NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec  # noqa: TID253
 from zarr.errors import ContainsArrayError  # noqa: TID253
-from zarr.storage import LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
+from zarr.storage import LocalStore, MemoryStore, StoreLike, WrapperStore  # noqa: TID253
 
 from softreach.atlas.metrics import Metric
 from softreach.atlas.space import Command
@@ -249,7 +249,12 @@ def _with_command(
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
     place = stores.place_of(location, "r+")
-    lost = _holds_arrays_of(command, place)
+    lost = False  # of a store that this command began, whose root is damaged or gone
+    for name, _, _ in array_plans(command):
+        with suppress(Exception):  # each kind of store has its own for what is missing or damaged
+            array = zarr.open_array(place / name, mode="r", zarr_format=3)
+            lost = array.attrs[OF] == stores.sha256(command.to_json().encode())
+            break
 
     class Root(WrapperStore):
         """Zarr's groups have no exclusive mode, but its stores set a key only if it is missing."""
@@ -271,15 +276,6 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
     zarr.create_group(Root(place.store), path=place.path, zarr_format=3, attributes=attributes)
     if durable and isinstance(place.store, LocalStore):
         sync(place.store.root / place.path / stores.ROOT)
-
-
-def _holds_arrays_of(command: Command, place: StorePath) -> bool:
-    """True if a store whose root is damaged or lost was begun by this command."""
-    for name, _, _ in array_plans(command):
-        with suppress(Exception):  # each kind of store has its own for what is missing or damaged
-            array = zarr.open_array(place / name, mode="r", zarr_format=3)
-            return array.attrs[OF] == stores.sha256(command.to_json().encode())
-    return False
 
 
 def _attributes(command: Command) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _GROUPS = (
-    ("Design", "design:design search:check search:search demo:list studio:studio"),
+    ("Design", "convert:design search:check search:search demo:list studio:studio"),
     ("Bench", "bench:plan-poses bench:calibrate"),
     ("Reach", "reach:reach reach:cloud reach:volume reach:payload reach:gradient"),
     ("Places", "places:solve places:track places:equilibria"),
@@ -125,22 +125,17 @@ def run(arguments: list[str]) -> int:
     return code or 0
 
 
-def _unfit(error: MissingArgumentError | cyclopts.UnusedCliTokensError) -> str:
-    """Words that a command needs, or cannot use."""
-    command = " ".join(error.command_chain or ["softreach"])
-    if isinstance(error, cyclopts.UnusedCliTokensError):
-        return f"{command} takes no {', '.join(error.unused_tokens or ())}"
-    if error.keyword is None:
-        return f"{command} needs {error.argument.name if error.argument else 'more words'}"
-    dash = f"if it begins with a dash: {error.keyword}=VALUE"
-    return f"{command} {error.keyword} needs a value; {dash}"
-
-
 def _message(error: Exception) -> str:
     if isinstance(error, CycloptsError) and isinstance(error.__cause__, SoftreachError):
         error = error.__cause__
     if isinstance(error, MissingArgumentError | cyclopts.UnusedCliTokensError):
-        return _unfit(error)
+        command = " ".join(error.command_chain or ["softreach"])
+        if isinstance(error, cyclopts.UnusedCliTokensError):
+            return f"{command} takes no {', '.join(error.unused_tokens or ())}"
+        if error.keyword is None:
+            return f"{command} needs {error.argument.name if error.argument else 'more words'}"
+        dash = f"if it begins with a dash: {error.keyword}=VALUE"
+        return f"{command} {error.keyword} needs a value; {dash}"
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; ask for fewer samples or less accuracy"
     return str(error) or type(error).__name__

@@ -78,9 +78,13 @@ def build(
         options.refuse("without the metrics concave", alpha=alpha)
     how: Any = {"metrics": groups, "keep_clouds": keep_clouds, "durable": durable}
     how |= {"shard": (int(first), int(count)), "device": device}
-    how |= {"alpha_over_length": 0.05 if alpha is None else _over_length(alpha)}
+    alpha = "0.05L" if alpha is None else alpha  # in m it would not suit designs of every length
+    bare = alpha[:-1] if alpha.endswith("L") else ""
+    allowed = "a radius > 0 over the length of each design, like 0.05L"
+    radius = read_as("alpha", alpha, lambda _: read_number(bare), allowed, POSITIVE)
     designs, how = _space_of(space, design, vary, changes), how | sampling.arguments
-    sr.build_atlas(designs, store, executor=_executor(scheduler, scheduler_file), **how)
+    how["executor"] = _executor(scheduler, scheduler_file)
+    sr.build_atlas(designs, store, alpha_over_length=radius, **how)
     status(store, json=json)
 
 
@@ -215,10 +219,3 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
     from distributed import Client
 
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
-
-
-def _over_length(text: str) -> float:
-    """0.05 from `0.05L`: a length in m would not suit designs of every length."""
-    allowed = "a radius > 0 over the length of each design, like 0.05L"
-    bare = text[:-1] if text.endswith("L") else ""
-    return read_as("alpha", text, lambda _: read_number(bare), allowed, POSITIVE)

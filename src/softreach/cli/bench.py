@@ -1,6 +1,6 @@
 """`softreach calibrate` and `plan-poses`: the arm on the bench from measured poses."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +17,7 @@ from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_table
 from softreach.support.lazy import Dataset
 from softreach.support.quantity import columns
-from softreach.support.units import TYPED, LengthUnit, read_length, readable
+from softreach.support.units import TYPED, read_length, readable
 
 if TYPE_CHECKING:
     from softreach.arm.parameters import Written
@@ -187,18 +187,14 @@ def plan_poses(
         console.json({"noise_m": width, **poses, "numbers": _numbers(found)})
     else:
         seen, noise = ", ".join(plan.markers), arm.length_unit.rounded(width, digits=".5g")
-        lines = columns([("number", "expected", "share"), *_rows(found, arm.length_unit)])
+        rows, keys = [("number", "expected", "share")], ("number", "unit", "value", "sigma")
+        for name, own, value, sigma in zip(*(found[k].values.tolist() for k in keys), strict=True):
+            share = f"{100 * sigma / abs(value):.2g} %" if value else "-"
+            rows.append((name, readable(value, own, arm.length_unit, sigma, digits=2), share))
         title = f"{n} poses of {design} with {seen}, noise {noise}"
-        console.line("\n  ".join([title, *lines]))
+        console.line("\n  ".join([title, *columns(rows)]))
     if out is not None:
         plan.save(out, overwrite=output.overwrite)
-
-
-def _rows(found: Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
-    names = ("number", "unit", "value", "sigma")
-    for name, own, value, width in zip(*(found[k].values.tolist() for k in names), strict=True):
-        share = f"{100 * width / abs(value):.2g} %" if value else "-"
-        yield name, readable(value, own, unit, width, digits=2), share
 
 
 def free_names(arm: "sr.Manipulator", texts: Sequence[str]) -> list[str]:

@@ -166,26 +166,23 @@ class _Watch:
         return "searching" + f", best misses {self._excess:.3g}" * math.isfinite(self._excess)
 
 
-def _found(result: sr.optimization.Search, out: Path) -> dict[str, Any]:
+def _found(result: "sr.optimization.Search", out: Path) -> dict[str, Any]:
     """The result for machines: SI units, angles in degrees."""
+    front = []
+    for each in result.front:
+        known = {"excess": each.excess, "missed": dict(each.missed), "fault": each.fault}
+        pairs = zip(result.goals, each.objectives, strict=bool(each.objectives))
+        known["objectives"] = [
+            {"objective": goal.name, **value._asdict(), "unit": goal.objective.unit}
+            for goal, value in pairs
+        ]
+        known["parameters"] = []
+        for p in result.problem.parameters.free:
+            value = each.values[p.name]
+            read, unit = (value, "") if isinstance(value, str) else as_read(value, p.unit)
+            known["parameters"].append({"parameter": p.name, "value": read, "unit": unit})
+        front.append(known)
     names = ("met", "verdict", "restarts", "designs", "judged", "seconds", "at_ends")
-    return {
-        **{name: getattr(result, name) for name in names},
-        "front": [_design(result, each) for each in result.front],
-        "findings": [{**vars(each), "met": each.met} for each in result.findings],
-        "folder": str(out),
-    }
-
-
-def _design(result: sr.optimization.Search, each: sr.optimization.Candidate) -> dict[str, Any]:
-    parameters = []
-    for parameter in result.problem.parameters.free:
-        value = each.values[parameter.name]
-        read, unit = (value, "") if isinstance(value, str) else as_read(value, parameter.unit)
-        parameters.append({"parameter": parameter.name, "value": read, "unit": unit})
-    objectives = [
-        {"objective": goal.name, **value._asdict(), "unit": goal.objective.unit}
-        for goal, value in zip(result.goals, each.objectives, strict=bool(each.objectives))
-    ]
-    known = {"excess": each.excess, "missed": dict(each.missed), "fault": each.fault}
-    return {"objectives": objectives, "parameters": parameters, **known}
+    findings = [{**vars(each), "met": each.met} for each in result.findings]
+    named = {name: getattr(result, name) for name in names}
+    return {**named, "front": front, "findings": findings, "folder": str(out)}

@@ -52,7 +52,11 @@ def write_ply(
         if number == 0:
             header = ["ply", "format binary_little_endian 1.0"]
             for key, value in description.items():
-                header += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
+                for line in str(value).splitlines():  # in ASCII; TOML means the same by \\uXXXX
+                    own = [
+                        c if c.isascii() else f"\\u{ord(c):04x}" for c in line if c.isprintable()
+                    ]
+                    header.append(f"comment {key}: {''.join(own)}")
             header.append(f"element vertex {count}")
             header += [f"property {_TYPES[kind.str[1:]]} {name}" for name, kind in fields]
             if faces is not None:
@@ -63,8 +67,3 @@ def write_ply(
         triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
         triangles["count"], triangles["corners"] = 3, faces
         file.write(triangles.data)
-
-
-def _ascii(text: str) -> str:
-    r"""A PLY header is ASCII; a TOML string means the same with its letters as \\uXXXX."""
-    return "".join(c if c.isascii() else f"\\u{ord(c):04x}" for c in text if c.isprintable())
