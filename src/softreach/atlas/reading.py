@@ -380,10 +380,8 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     command, shape, dims = store.command, store.command.space.shape, store.command.space.dims
     texts = np.full(command.space.size, "", dtype=object)
     texts[[*content.messages]] = [*content.messages.values()]
-    variables: dict[str, Any] = {
-        "status": (dims, content.status.reshape(shape), ABOUT["status"]),
-        "message": (dims, texts.reshape(shape), ABOUT["message"]),
-    }
+    variables: dict[str, Any] = {"status": (dims, content.status.reshape(shape), ABOUT["status"])}
+    variables["message"] = dims, texts.reshape(shape), ABOUT["message"]
     done = np.isin(content.status, KNOWN).reshape(shape)
     for name, metrics in (("metrics", command.numbers), ("curvature", command.profiles)):
         for k, metric in enumerate(metrics if name in content.tables else ()):

@@ -42,14 +42,11 @@ _CHUNK = 1 << 20  # numbers of a chunk that all designs share
 _BOX = "place in the activation box of each design: 0 is its lower bound, 1 its upper"
 _STATION = {"units": "1", "long_name": "station Z before activation, over the design's length"}
 _NUMBERS = {"flag_values": [*range(6)], "flag_meanings": "to_do done failed gap unstable damaged"}
-ABOUT: dict[str, dict[str, Any]] = {
-    "status": {"long_name": "status of the design", **_NUMBERS},
-    "message": {"long_name": "why a design has no numbers"},
-}
+ABOUT: dict[str, dict[str, Any]] = {"message": {"long_name": "why a design has no numbers"}}
+ABOUT["status"] = {"long_name": "status of the design", **_NUMBERS}
 
 
-Plan = tuple[str, dict[str, Any], Any]
-"""Name of an array, options of Zarr's `create_array`, and values to write at once, if any."""
+Plan = tuple[str, dict[str, Any], Any]  # Array's name, options of `create_array`, values if any
 
 
 def array_plans(command: Command) -> Iterator[Plan]:

@@ -23,8 +23,7 @@ _FINE, _COARSE = 1e-7, 1e-3  # Least share by which a step improves: last round,
 _MOST = 60
 _SAMPLES = 100  # samples by which exchanges are compared
 _PROMISING, _BETTER = 0.8, 0.5  # Error over that of the columns as they are: before a fit, after it
-_ALIKE, _FAR_BETTER = 1.2, 0.35
-"""Factor between errors that nothing tells apart, and that with which a fit is not begun."""
+_ALIKE, _FAR_BETTER = 1.2, 0.35  # between errors that nothing tells apart, or refuse a fit
 _FAR = 1.0  # m, what a sample without equilibrium misses
 FEWEST_RUNS = 8  # Runs from which these share errors and are held out, not samples
 _SEEN = 0.1  # least share of a variance that the residuals would show if they were plain noise

@@ -28,8 +28,7 @@ from softreach.support.quantity import sizes_in
 
 _SIZES = {x.lower(): (u, s) for u in ("m", "N", "Pa") for x, s in sizes_in(u).items()}
 _SIZES |= {"gf": ("N", 9.80665e-3), "mbar": ("Pa", 1e2), "psi": ("Pa", 6894.757293168361)}
-_SIZES |= {"percent": ("1", 1e-2)}
-"""Suffixes of columns, in small letters: unit and size in it."""
+_SIZES |= {"percent": ("1", 1e-2)}  # suffixes in small letters: SI unit, size
 
 _RUNS = ("run", "pattern", "group", "trial", "cluster", "sequence")
 _ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")

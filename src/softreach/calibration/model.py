@@ -217,10 +217,8 @@ class MarkerModel:
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([other.table for other in each], factors)
-        others = (
-            np.tensordot(factors, np.stack(columns), axes=1)
-            for columns in zip(*(other[1:] for other in each), strict=True)
-        )
+        columns = zip(*(other[1:] for other in each), strict=True)
+        others = (np.tensordot(factors, np.stack(column), axes=1) for column in columns)
         return _Explicit._make([table, *others])
 
 

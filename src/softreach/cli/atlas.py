@@ -24,10 +24,8 @@ Example: softreach atlas build a.zarr --vary taper_deg=0:3:4
 )
 
 Store = Annotated[str, Parameter(help="The atlas: a folder (.zarr) or a URL.")]
-Shard = Annotated[
-    str,
-    Parameter(help="Compute one of k parts of the designs: 0/k to k-1/k; all may share the store."),
-]
+_SHARD = "Compute one of k parts of the designs: 0/k to k-1/k; all may share the store."
+Shard = Annotated[str, Parameter(help=_SHARD)]
 
 
 @atlas.command

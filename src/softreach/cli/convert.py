@@ -11,10 +11,8 @@ from softreach.cli.console import console, fields_of, for_machines
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 
-Format = Annotated[
-    str | None,
-    Parameter(help="activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."),
-]
+_PAIR = "activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."
+Format = Annotated[str | None, Parameter(help=_PAIR)]
 _OTHER = "for ActiveFilaments.jl, whose lengths are in m"
 
 

@@ -25,8 +25,7 @@ from softreach.support.lazy import Dataset
 from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
 _POSTURES = {"upright": "up", "hanging": "down"}  # words for the way that a base points
-_MATTER = {"young_modulus": "1MPa", "density": "1000kg/m3"}
-"""Examples of what loads need to know of a material."""
+_MATTER = {"young_modulus": "1MPa", "density": "1000kg/m3"}  # what loads need to know
 
 
 def read_as(
@@ -69,12 +68,10 @@ def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, 
 
 
 OUTPUT = Group("Output options", sort_key=3)
-OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
-"""The one name of the file or folder that a command writes."""
+OUT = Parameter(name=("--out", "-o"), group=OUTPUT)  # the file or folder that is written
 
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
-STORED = "on a stored cloud: give the design instead"
-"""Where changes of a design and options of sampling have no effect."""
+STORED = "on a stored cloud: give the design instead"  # no changes, no sampling there
 
 
 def _output(help: str, name: str | None = None) -> Parameter:
@@ -97,8 +94,7 @@ Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
 Place = Annotated[Path, OUT]
 View = Annotated[str | None, _output("View: oblique (if left out), front, side, top.")]
-Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
-"""Text that may begin with a minus."""
+Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]  # May begin with a minus
 
 
 @Parameter(name="*")

@@ -65,12 +65,10 @@ def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
     fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
     fields["direction_errors"] = to_degrees(result.direction_errors), "deg"
-    return {
-        **for_machines(fields, result.arm.length),
-        "findings": [{**vars(each), "met": each.met} for each in result.findings],
-        "payloads_kg": result.payloads,
-        "coverages": [coverage._asdict() for coverage in result.coverages],
-    }
+    known: Any = {"payloads_kg": result.payloads}
+    known |= {"findings": [{**vars(each), "met": each.met} for each in result.findings]}
+    known |= {"coverages": [coverage._asdict() for coverage in result.coverages]}
+    return for_machines(fields, result.arm.length) | known
 
 
 def search(
@@ -167,7 +165,6 @@ class _Watch:
 
 
 def _found(result: "sr.optimization.Search", out: Path) -> dict[str, Any]:
-    """The result for machines: SI units, angles in degrees."""
     front = []
     for each in result.front:
         known = {"excess": each.excess, "missed": dict(each.missed), "fault": each.fault}

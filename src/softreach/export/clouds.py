@@ -18,7 +18,7 @@ from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import StrPath
-from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.formats import FileFormat
 from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.palette import activation_colors
 from softreach.support.units import METER, LengthUnit, as_unit
@@ -217,11 +217,7 @@ def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
     write_vtu(file, table.tip, cells, compression=None, point_data=data)
 
 
-CLOUD_FILES: Formats = {
-    ".ply": FileFormat(write=_write_ply),
-    ".csv": FileFormat(write=_write_csv),
-    ".parquet": FileFormat(("pyarrow",), _write_parquet),
-    ".npz": FileFormat(write=_write_npz),
-    ".mat": FileFormat(write=_write_mat),
-    ".vtu": FileFormat(("meshio",), _write_vtu),
-}
+CLOUD_FILES = {".ply": FileFormat(write=_write_ply), ".csv": FileFormat(write=_write_csv)}
+CLOUD_FILES |= {".parquet": FileFormat(("pyarrow",), _write_parquet)}
+CLOUD_FILES |= {".npz": FileFormat(write=_write_npz), ".mat": FileFormat(write=_write_mat)}
+CLOUD_FILES |= {".vtu": FileFormat(("meshio",), _write_vtu)}

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
+from scipy.special import ndtr
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters, shifted
@@ -208,8 +209,6 @@ class FirstOrder:
 
     def probability(self, target: Target) -> Array:
         """Φ(depth / σ) of each place under the worst payload: 0 or 1 where nothing moves."""
-        from scipy.special import ndtr
-
         within, each = max(target.within, TOL * self.solid.arm.length), []
         for depth, speed in self.depths(target.points, within):
             sigma = np.linalg.norm(speed * self.deviations.sigmas, axis=1)

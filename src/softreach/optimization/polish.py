@@ -109,7 +109,6 @@ class _Program:
     _like: Sequence[TipMap] = ()
 
     def begin(self) -> Array:
-        """Unknowns of the start."""
         parameters = self.problem.parameters
         low, high = parameters.bounds.T
         reals = (parameters.reals(self.start.values) - low) / (high - low)

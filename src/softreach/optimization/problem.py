@@ -34,8 +34,7 @@ SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachab
 """Goals and measures of the reachable set, and what they are called there."""
 NEAR = 0.1  # Relative distance within which objectives at the ends of polishes agree
 Names = str | Metric | Sequence[str | Metric]
-Fidelity = Literal["bounds", "coarse", "full"]
-"""A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
+Fidelity = Literal["bounds", "coarse", "full"]  # By bounds alone, on coarse sets, as reported
 _COARSE, _FINE = 1 << 12, 1 << 15  # samples of the cloud of coarse and of fine cases
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
@@ -216,8 +215,7 @@ _OBJECTIVES = (
     Objective("mass", "kg", "mass of the arm", lambda case: Estimate(mass(case.arm), 0.0)),
     Objective("actuators", "1", "number of inputs", lambda case: Estimate(case.arm.inputs, 0.0)),
 )
-OBJECTIVES = {each.name: each for each in _OBJECTIVES}
-"""Objectives by name, beside the metrics of the atlas."""
+OBJECTIVES = {each.name: each for each in _OBJECTIVES}  # beside the metrics of the atlas
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -161,7 +161,6 @@ class _Reader(FaultReader):
     def _add_numbers(
         self, path: str, given: Any, table: dict[str, Any], names: Written, key: str, mark: str
     ) -> Any:
-        """Take the numbers of a parameter as written, in a list or divided by a mark."""
         if key not in names.by_key:
             hint = did_you_mean(key, names.by_key, 0.5)
             allowed = unknown_parameter(key, names.written).allowed

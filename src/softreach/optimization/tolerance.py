@@ -242,7 +242,6 @@ class _Followed(NamedTuple):
         return cls(pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED], float(near.mean()))
 
     def kept(self, solid: ReachableSet) -> float:
-        """Share of the volume that another set contains."""
         parts = ((self.near, self.share), (self.away, 1.0 - self.share))
         return sum(x * float(solid.contains(part).mean()) for part, x in parts if len(part))
 

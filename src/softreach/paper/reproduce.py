@@ -47,11 +47,8 @@ class Claim(NamedTuple):
 
 
 _CLAIMS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
-CLAIMS = tuple(
-    Claim(*name.split("."), section=section, **row)
-    for section, rows in _CLAIMS.items()
-    for name, row in rows.items()
-)
+_EACH = ((name, section, row) for section, rows in _CLAIMS.items() for name, row in rows.items())
+CLAIMS = tuple(Claim(*name.split("."), section=section, **row) for name, section, row in _EACH)
 """Every statement that is checked, in the paper's order."""
 
 

@@ -293,7 +293,12 @@ def plot_metric_map(atlas: Dataset, metric: str, *, ax: Axes | None = None) -> A
         raise InvalidInput("metric", metric, "a metric of the atlas")
     values = over_length(atlas, metric).values.T
     with style.styled_axes(ax) as ax:
-        filled = _fill(ax, across, up, np.ma.masked_invalid(values))
+        shown = np.ma.masked_invalid(values)
+        if min(values.shape) < 2 or not shown.count() or np.ptp(shown.compressed()) == 0:
+            filled = ax.pcolormesh(_edges(across), _edges(up), shown, cmap=coloring.COLORMAP)
+        else:
+            filled = ax.contourf(across.values, up.values, shown, 14, cmap=coloring.COLORMAP)
+            _contour(ax, across, up, shown, np.asarray(filled.levels))
         if np.isfinite(values).any():
             _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         relative = _RELATIVE.get(atlas[metric].attrs.get("units", "1"), "")
@@ -312,15 +317,6 @@ def _axis(values: DataArray) -> SheetAxis:
         name = _INDEXED.sub(lambda found: found[0].translate(_LOWERED), symbol)
         name += f" of {part}" if (part := values.attrs.get("part")) else ""
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
-
-
-def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
-    known = values.compressed()
-    if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
-        return ax.pcolormesh(_edges(across), _edges(up), values, cmap=coloring.COLORMAP)
-    filled = ax.contourf(across.values, up.values, values, 14, cmap=coloring.COLORMAP)
-    _contour(ax, across, up, values, np.asarray(filled.levels))
-    return filled
 
 
 def _edges(axis: SheetAxis) -> Array:

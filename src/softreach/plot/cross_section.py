@@ -229,7 +229,6 @@ class _Placed:
         return Wedge((0, 0), self.outer, *ends, width=width, **style)
 
     def overlaps(self, other: "_Placed") -> Iterator["_Placed"]:
-        """The parts of this sector that another shares."""
         inner, outer = max(self.inner, other.inner), min(self.outer, other.outer)
         apart = (other.center - self.center + np.pi) % (2 * np.pi) - np.pi
         for turn in (apart - 2 * np.pi, apart, apart + 2 * np.pi):
@@ -259,20 +258,16 @@ def _placed(arm: Manipulator, z: float, outer: float, bundles: Collection[int]) 
     ratios = outline.inner_ratio[0], outline.outer_ratio[0], outline.held_ratio[0]
     sizes = outline.center[0], outline.extent, *(outer * ratio for ratio in ratios)
     ways = [actuator.fiber_direction for actuator in arm.bundle_actuators]
-    return [
-        _Placed(k, outline.shape[k], ways[k], *(float(size[k]) for size in sizes))
-        for k in bundles
-        if outline.acts[0, k]
-    ]
+    acting = [k for k in bundles if outline.acts[0, k]]
+    each = ([float(size[k]) for size in sizes] for k in acting)
+    return [_Placed(k, outline.shape[k], ways[k], *x) for k, x in zip(acting, each, strict=True)]
 
 
 def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
     from matplotlib.patches import Circle
 
-    sectors, lumens, lines = (
-        [bundle for bundle in placed if bundle.shape == shape]
-        for shape in ("sector", "lumen", "line")
-    )
+    kinds = ("sector", "lumen", "line")
+    sectors, lumens, lines = ([x for x in placed if x.shape == kind] for kind in kinds)
     for bundle in sectors:
         ax.add_patch(bundle.sector(linewidth=0, **bundle.style))
     for below, above in combinations(sectors, 2):

@@ -16,6 +16,7 @@ from softreach.picture.zbuffer import ZBuffer, draw_mesh
 from softreach.plot import coloring, style
 from softreach.plot.arm import arm_images, arm_points, draw_markers, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
+from softreach.plot.style import Unit
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
@@ -48,7 +49,7 @@ def plot_cloud(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw a cloud in one view.
 
@@ -108,7 +109,7 @@ def plot_slab(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the tips in a slab across the line of sight; a note in the axes says which.
 
@@ -163,7 +164,7 @@ def plot_views(
     configuration: Dataset | None = None,
     *,
     color: str | int | ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Figure:
     """Draw a cloud in three orthogonal views at one scale and an oblique one.
 
@@ -225,7 +226,7 @@ def plot_opposite_sides(
     *,
     view: View = "oblique",
     box_over_length: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Figure:
     """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
 
@@ -277,7 +278,7 @@ def plot_hull(
     view: View = "front",
     length: float | None = None,
     box: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the boundary of a hull in one view.
 
@@ -312,7 +313,7 @@ def plot_volume_curve(
     length: float | None = None,
     exact: float | None = None,
     convex: float | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw V(α) of clouds.
 
@@ -361,7 +362,7 @@ def plot_slice(
     view: View = "front",
     at: float | None = None,
     key: bool = True,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw one plane of a reachable set: the number of activations that reach each place.
 
@@ -398,9 +399,7 @@ def plot_slice(
     return ax
 
 
-def plot_slices(
-    grid: Dataset, *, at: Sequence[float] | None = None, unit: style.Unit = None
-) -> Figure:
+def plot_slices(grid: Dataset, *, at: Sequence[float] | None = None, unit: Unit = None) -> Figure:
     """Draw the three planes of a reachable set that meet at a point: from the side, front and top.
 
     Args:

@@ -304,7 +304,6 @@ def _covered(rules: PoseRules, target: Target, places: Array, sets: Sets, step: 
 
 
 def _largest(values: Array) -> tuple[int, int]:
-    """Payload and place of the largest value, by their numbers."""
     return divmod(int(values.argmax()), values.shape[1])
 
 

@@ -35,8 +35,7 @@ _MOST_TRIED = 4_096  # places for which they are
 _SAME = 1e-4  # of the ranges, by which poses are told apart
 _WEIGHT = 0.1  # of an angle [rad] against a distance in L, where not both can be met
 _PLACE_FIRST = 1e-5  # weight with which the tip is at the place but for some 1e-10 L
-_SEEDS, _NEIGHBORS = 256, 5
-"""Samples that quick descents start from, and how many of them for each place."""
+_SEEDS, _NEIGHBORS = 256, 5  # samples that quick descents start from; of them for each place
 _CELLS = 16  # along each axis of three bundles: as many solutions as with 32, in half the time
 _LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""

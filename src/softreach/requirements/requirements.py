@@ -50,8 +50,7 @@ _SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
 _LISTS = {"payloads", "places", "direction", *(n for _, own in _SHAPES.values() for n in own)}
 _LISTS -= {"radius"}
 _BALL = {"region": Sphere((0.0, 0.0, 0.0), 1.0)}
-_INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}
-"""In place of faulty parts, so that the others can be judged."""
+_INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}  # for faulty parts: others are judged too
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -291,16 +290,13 @@ class _Reader(toml.FaultReader):
         raw = self._table(document, "limits")
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
-        return payloads | {
-            "targets": [self._target(*each) for each in self._tables(document, "reach")],
-            "keeps": [
-                self._keep(*each, kind == "stay_inside")
-                for kind in ("stay_inside", "avoid")
-                for each in self._tables(document, kind)
-            ],
-            "limits": self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS)),
-            "measures": self._measures(self._table(document, "measures")),
-        }
+        targets = [self._target(*each) for each in self._tables(document, "reach")]
+        keeps = [self._keep(*each, True) for each in self._tables(document, "stay_inside")]
+        keeps += [self._keep(*each, False) for each in self._tables(document, "avoid")]
+        limits = self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS))
+        measures = self._measures(self._table(document, "measures"))
+        made = {"targets": targets, "keeps": keeps, "limits": limits, "measures": measures}
+        return payloads | made
 
     def _target(self, raw: Raw, path: str) -> Any:
         numbers = {"within": "m", "share": "", "places": "m", "direction": "", "cone": "rad"}

@@ -130,8 +130,7 @@ class InvalidDesign(SoftreachError, ValueError):
 
 _EXTRAS = {"matplotlib": "plot", "skimage": "surface", "distributed": "cluster", "viser": "studio"}
 _EXTRAS |= {"numba_cuda": "cuda", "jinja2": "report", "optuna": "search", "cmaes": "search"}
-_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")
-"""Module -> extra of softreach that brings it."""
+_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")  # module -> extra with it
 
 
 class MissingExtra(SoftreachError, ImportError):

@@ -155,7 +155,6 @@ def lines_of(rows: Rows, unit: LengthUnit) -> Iterator[str]:
 
 
 def _shown_in(value: Any, error: Any, size: float) -> str:
-    """Numbers in a unit of this size, each to the first digit of its error if that is known."""
     if isinstance(value, list):
         errors = error if isinstance(error, list) else [error] * len(value)
         return ", ".join(_shown_in(*pair, size) for pair in zip(value, errors, strict=True))

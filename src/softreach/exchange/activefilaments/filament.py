@@ -167,13 +167,10 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
     shared = Counter(places)
     for k, ring in enumerate(section.rings):
         share = max(shared[k], 1)
-        body = FilamentRing(
-            young_modulus=_modulus(ring.material) / share,
-            poisson_ratio=ring.material.poisson_ratio,
-            radii=(ring.inner_ratio * base, ring.outer_ratio * base),
-            scale=float(share),
-            name=ring.name,
-        )
+        known: Any = {"young_modulus": _modulus(ring.material) / share, "scale": float(share)}
+        known |= {"poisson_ratio": ring.material.poisson_ratio, "name": ring.name}
+        radii = ring.inner_ratio * base, ring.outer_ratio * base
+        body = FilamentRing(radii=radii, **known)
         if not shared[k]:
             yield body
         for place, first, fiber in zip(places, firsts, arm.fibers, strict=False):

@@ -191,7 +191,6 @@ def _place_of_max(n: Numbers, values: Array) -> str:
 
 
 def _curvatures(n: Numbers, quantile: float) -> Array:
-    """Without and with taper, at each station."""
     return n.curvature[..., n.quantiles.tolist().index(quantile)]
 
 
