@@ -46,10 +46,8 @@ _MOST_ROWS = 10
 _ERRORS = ("rms", "median", "95 % below", "rms / L")
 _PICTURE = "Measured places and the lines to the predicted ones; errors by marker, in the order in "
 _PICTURE += "which samples were taken, and against each input."
-_DISTANCES = (
-    "Distances between measured and predicted places of the markers. Samples that are held "
-)
-_DISTANCES += "out were not seen by any fit."
+_DISTANCES = "Distances between measured and predicted places of the markers. Samples that are "
+_DISTANCES += "held out were not seen by any fit."
 _WORDS = {"softreach_version": "softreach", "data_sha256": "SHA-256 of the data"}
 
 

@@ -17,7 +17,7 @@ from cyclopts import Parameter
 import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import as_read, console, fields_of
-from softreach.cli.options import UNCHANGED, Changes, Whole, design_from
+from softreach.cli.options import UNCHANGED, Changes, Overwrite, Place, Whole, design_from
 from softreach.cli.reach import HULL_BYTES, volume_rows
 from softreach.support import parallel
 from softreach.support.arguments import as_one_of
@@ -43,7 +43,7 @@ _FILES = {
 def demo(
     *,
     n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 400_000,
-    out: options.Place = Path("out"),
+    out: Place = Path("out"),
     output: options.Output = options.DEFAULT,
 ) -> None:
     """Start here: cloud, volumes and picture of the paper's design.
@@ -88,9 +88,7 @@ def demo(
     console.rows("minimal trunk, revolution 108°, taper 2°", rows, output.json, arm)
 
 
-def example(
-    name: str, /, *, out: options.Place = Path(), overwrite: options.Overwrite = False
-) -> None:
+def example(name: str, /, *, out: Place = Path(), overwrite: Overwrite = False) -> None:
     """Write an example here: a design and the data and scripts that go with it.
 
     softreach list examples prints their names, designs of the gallery among them.
@@ -219,9 +217,7 @@ _TABLES = {"designs": _designs, "examples": _examples, "materials": _materials}
 _TABLES |= {"actuators": _actuators, "metrics": _metrics, "objectives": _objectives}
 
 
-def paper(
-    *, quick: bool = False, out: options.Place = Path("paper"), overwrite: options.Overwrite = False
-) -> None:
+def paper(*, quick: bool = False, out: Place = Path("paper"), overwrite: Overwrite = False) -> None:
     """Recompute the paper's figures and statements into a report.
 
     The same command continues after an interruption.

@@ -52,10 +52,8 @@ def write_ply(
         if number == 0:
             header = ["ply", "format binary_little_endian 1.0"]
             for key, value in description.items():
-                for line in str(value).splitlines():  # in ASCII; TOML means the same by \\uXXXX
-                    own = [
-                        c if c.isascii() else f"\\u{ord(c):04x}" for c in line if c.isprintable()
-                    ]
+                for x in str(value).splitlines():  # in ASCII; TOML means the same by \\uXXXX
+                    own = [c if c.isascii() else f"\\u{ord(c):04x}" for c in x if c.isprintable()]
                     header.append(f"comment {key}: {''.join(own)}")
             header.append(f"element vertex {count}")
             header += [f"property {_TYPES[kind.str[1:]]} {name}" for name, kind in fields]

@@ -184,14 +184,12 @@ def key_height(key: Key | None) -> float:
     return _AROUND + _ROW * (bool(title) + math.ceil(len(entries) / columns))
 
 
-def _draw_legend(
-    owner: Axes | Figure, key: Key | None, room: int, columns: int, **place: Any
-) -> None:
+def _draw_legend(owner: Axes | Figure, key: Key | None, room: int, columns: int, **at: Any) -> None:
     entries, title, columns = _arranged(key, room, columns)
     if entries:
         above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "columnspacing": 1.2}
         look = above | {"title": title or None, "ncols": columns, "handlelength": 1.0}
-        draw_entries(owner, entries, **look | place)
+        draw_entries(owner, entries, **look | at)
 
 
 def _arranged(key: Key | None, room: int, columns: int) -> tuple[list[tuple[str, Any]], str, int]:
