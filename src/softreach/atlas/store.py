@@ -45,7 +45,6 @@ _NUMBERS = {"flag_values": [*range(6)], "flag_meanings": "to_do done failed gap 
 ABOUT: dict[str, dict[str, Any]] = {"message": {"long_name": "why a design has no numbers"}}
 ABOUT["status"] = {"long_name": "status of the design", **_NUMBERS}
 
-
 Plan = tuple[str, dict[str, Any], Any]  # Array's name, options of `create_array`, values if any
 
 

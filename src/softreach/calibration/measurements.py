@@ -242,12 +242,8 @@ def read_table(file: Path | IO[bytes], name: str) -> DataFrame:
         raise InvalidInput("data", name, f"a table in CSV or Parquet: {reason}") from None
 
 
-_UNPACKED: Mapping[str, Any] = {
-    ".gz": gzip.open,
-    ".bz2": bz2.open,
-    ".xz": lzma.open,
-    ".zip": lambda file: (packed := zipfile.ZipFile(file)).open(packed.namelist()[0]),
-}
+_UNPACKED: dict[str, Any] = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
+_UNPACKED[".zip"] = lambda file: (packed := zipfile.ZipFile(file)).open(packed.namelist()[0])
 
 
 def _refuse_short(text: str) -> None:
@@ -344,8 +340,8 @@ def _chosen_markers(
         return dict(zip(names, triples, strict=True))
     listed = ", ".join(start or "x, y, z" for start in triples)
     own = f"the arm has {counted(len(names), 'marker')} ({', '.join(names)})"
-    given = f"the data has {len(triples)} ({listed})"
-    raise NotPossible(f"{own}, {given}: name them by `markers` (--marker)")
+    seen = f"the data has {len(triples)} ({listed})"
+    raise NotPossible(f"{own}, {seen}: name them by `markers` (--marker)")
 
 
 def _matched(

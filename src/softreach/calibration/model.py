@@ -243,10 +243,9 @@ def _slopes(
     response = linear_response(at.table, state, tables, at.measures)
     if by_length and at.measures.shape[-1]:
         driven = _with_tensions(arm, at, state, changes, driven, response.works)
-    moves, turns = (
-        each[..., bundles:] + np.einsum("nmaj,njk->nmak", each[..., :bundles], driven)
-        for each in (response.moves, response.turns)
-    )
+    rule, parts = "nmaj,njk->nmak", (response.moves, response.turns)
+    by_inputs = (np.einsum(rule, each[..., :bundles], driven) for each in parts)
+    moves, turns = (x[..., bundles:] + y for x, y in zip(parts, by_inputs, strict=True))
     offset, place = _beyond(at, state)
     slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
     for k, change in enumerate(changes):

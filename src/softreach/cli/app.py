@@ -46,6 +46,7 @@ class _Flowing:
         return getattr(DefaultFormatter(), name)
 
 
+_OPTION = Parameter(negative=(), show_default=lambda x: None if x is None or x is False else str(x))
 app = App(
     name="softreach",
     help="""Where a soft slender robot can go: from a design to its cloud and volumes.
@@ -63,9 +64,7 @@ Start with
     help_format="plaintext",
     help_formatter=_Flowing(),
     console=cast(Any, HelpConsole()),
-    default_parameter=Parameter(
-        negative=(), show_default=lambda x: None if x is None or x is False else str(x)
-    ),
+    default_parameter=_OPTION,
 )
 _groups = [Group(_title, sort_key=_rank - 9) for _rank, (_title, _) in enumerate(_GROUPS)]
 for _group, (_, _words) in zip(_groups, _GROUPS, strict=True):

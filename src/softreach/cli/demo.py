@@ -32,12 +32,10 @@ Kind = Literal[
     "designs", "examples", "materials", "actuators", "metrics", "objectives", "parameters"
 ]
 Table = Iterator[tuple[Any, ...]]  # names of the columns, then rows
-_FILES = {
-    "tentacle": ("tentacle.toml", "tentacle.csv"),
-    "three_fibers": ("three_fibers.toml", "five_places.toml"),
-    "tendon_arm": ("tendon_arm.toml", "tendon_arm.sh", "requirement_check.py"),
-    "spine": ("spine.toml", "magnets.py", "own_actuator.sh"),
-}
+_FILES = {"tentacle": ("tentacle.toml", "tentacle.csv")}
+_FILES |= {"three_fibers": ("three_fibers.toml", "five_places.toml")}
+_FILES |= {"tendon_arm": ("tendon_arm.toml", "tendon_arm.sh", "requirement_check.py")}
+_FILES |= {"spine": ("spine.toml", "magnets.py", "own_actuator.sh")}
 
 
 def demo(

@@ -203,11 +203,9 @@ class Changes:
         loads = (arm.loads or sr.Loads()).replace(**new)
         if not keep and loads == sr.Loads(gravity=GRAVITIES["none"]):
             return arm.replace(loads=None)
-        lacking = {
-            fault.path: _MATTER[field]
-            for fault in loads.section_faults(arm.section, arm.length)
-            if (field := fault.path.rpartition(".")[2]) in _MATTER
-        }
+        faults = loads.section_faults(arm.section, arm.length)
+        named = ((fault.path, fault.path.rpartition(".")[2]) for fault in faults)
+        lacking = {path: _MATTER[field] for path, field in named if field in _MATTER}
         if lacking:
             options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
             needed = " and ".join(lacking)

@@ -178,10 +178,9 @@ def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
 
 def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str = "") -> None:
     pa, units = import_module("pyarrow"), [table.unit.name] * 3 + [*table.units, "1"]
-    kinds = zip(table.columns(slice(0), suffix).items(), units, strict=False)
+    own = zip(table.columns(slice(0), suffix).items(), units, strict=False)
     fields = [
-        pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"units": unit})
-        for (name, values), unit in kinds
+        pa.field(x, pa.from_numpy_dtype(v.dtype), metadata={"units": u}) for (x, v), u in kinds
     ]
     schema = pa.schema(fields, metadata={key: str(v) for key, v in table.metadata.items()})
     with writer_of(schema=schema) as writer:

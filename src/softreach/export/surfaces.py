@@ -19,7 +19,7 @@ from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
-from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.formats import FileFormat
 from softreach.support.lazy import Dataset
 from softreach.support.palette import BODY, Color, bundle_color
 from softreach.support.units import LengthUnit, as_unit
@@ -236,11 +236,7 @@ def _colors(part: Part) -> NDArray[np.uint8]:
     return np.tile(color, (len(part.vertices), 1))
 
 
-SURFACE_FILES: Formats = {
-    ".ply": FileFormat(write=_write_ply),
-    ".stl": FileFormat(("trimesh",), _write_stl),
-    ".obj": FileFormat(("trimesh",), _write_obj),
-    ".glb": FileFormat(("trimesh",), _write_glb),
-    ".3mf": FileFormat(write=_write_3mf),
-    ".vtu": FileFormat(("meshio",), _write_vtu),
-}
+_BY_TRIMESH = {".stl": _write_stl, ".obj": _write_obj, ".glb": _write_glb}
+SURFACE_FILES = {".ply": FileFormat(write=_write_ply)}
+SURFACE_FILES |= {x: FileFormat(("trimesh",), write) for x, write in _BY_TRIMESH.items()}
+SURFACE_FILES |= {".3mf": FileFormat(write=_write_3mf), ".vtu": FileFormat(("meshio",), _write_vtu)}

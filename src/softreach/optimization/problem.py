@@ -269,14 +269,11 @@ class Problem:
     @cached_property
     def digest(self) -> str:
         """Fingerprint of all that decides what a design is worth."""
-        parameters = self.parameters
-        record = {
-            "bases": {name: arm.to_toml() for name, arm in parameters.bases.items()},
-            "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
-            "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
-            "requirements": self.requirements.to_toml(),
-            "goals": [[goal.name, goal.sense] for goal in self.goals],
-        }
+        parameters, goals = self.parameters, [[goal.name, goal.sense] for goal in self.goals]
+        record: Any = {"bases": {name: arm.to_toml() for name, arm in parameters.bases.items()}}
+        record["free"] = [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free]
+        record["ties"] = [[t.name, t.of, t.factor, t.constant] for t in parameters.ties]
+        record |= {"requirements": self.requirements.to_toml(), "goals": goals}
         text = json.dumps(record, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -245,13 +245,11 @@ class Search(Reported):
 
         length = as_unit(unit, self.shown.length)
         designs = self.every if as_flag("every", every) else self.front
-        columns: dict[str, Any] = {
-            "design": range(1, len(designs) + 1),
-            "front": [int(self._is_in_front(each)) for each in designs],
-            "fidelity": [each.fidelity for each in designs],
-            "feasible": [int(each.is_feasible) for each in designs],
-            "excess": [each.excess for each in designs],
-        }
+        columns: dict[str, Any] = {"design": range(1, len(designs) + 1)}
+        columns["front"] = [int(self._is_in_front(each)) for each in designs]
+        columns["fidelity"] = [each.fidelity for each in designs]
+        columns["feasible"] = [int(each.is_feasible) for each in designs]
+        columns["excess"] = [each.excess for each in designs]
         numbers = self._numbers(designs)
         for k, goal in enumerate(self.goals):
             suffix, size = _written_unit(goal.objective.unit, length)

@@ -202,11 +202,8 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     point = point_of(problem, candidate, problem.accuracy)
     slope, equations = point.cost_slope, _equations(point)
     size = float(np.linalg.norm(slope))
-    bounds = [
-        (-part.slope()[k], Multiplier(part.name, 1.0 / part.scale, part.unit))
-        for part in point.inequalities
-        for k in np.flatnonzero(part.value <= _ACTIVE)
-    ]
+    rows = ((p, k) for p in point.inequalities for k in np.flatnonzero(p.value <= _ACTIVE))
+    bounds = [(-p.slope()[k], Multiplier(p.name, 1.0 / p.scale, p.unit)) for p, k in rows]
     bounds += _ends(problem, point)
     columns = [*equations, *-equations, *(slope for slope, _ in bounds)]
     if not size or not columns:
@@ -254,10 +251,9 @@ def _variances(
     cube = qmc.Sobol(2 * len(free), rng=rng, bits=64).random(n)
     first, second = np.split(cube, 2, axis=1)
     mixed = np.where(np.eye(len(free), dtype=bool)[:, None], second, first)
-    tasks = (
-        partial(_values, problem, {p.name: p.at(x) for p, x in zip(free, place, strict=True)})
-        for place in np.concatenate([first, second, *mixed]).tolist()
-    )
+    places = np.concatenate([first, second, *mixed]).tolist()
+    designs = ({p.name: p.at(x) for p, x in zip(free, each, strict=True)} for each in places)
+    tasks = (partial(_values, problem, design) for design in designs)
     for row in parallel.in_order(tasks):
         known.append(row)
         progress(1)

@@ -40,10 +40,8 @@ _MARKER = 1 / 60  # diameter of the dot of a marker, in L
 _UNSTABLE: Color = (0.45, 0.45, 0.45)
 _SIZES = "", "curve_length", "area", "volume"  # of a reachable set, by its dimension
 _SURFACES: tuple[Color, ...] = (STEEL, (0.88, 0.66, 0.42), (0.62, 0.76, 0.55))
-HELP = (
-    "Drag to turn, wheel or pinch to zoom, Shift-drag or two fingers to move, "
-    "double-click for the first view."
-)
+HELP = "Drag to turn, wheel or pinch to zoom, Shift-drag or two fingers to move, "
+HELP += "double-click for the first view."
 
 
 def plot_3d(

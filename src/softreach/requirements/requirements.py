@@ -15,24 +15,17 @@ from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
 from softreach.inverse.request import positions_in
-from softreach.requirements.parts import (
-    LIMIT_UNITS,
-    LONGEST,
-    MOST_PLACES,
-    Goals,
-    Keep,
-    Limits,
-    Target,
-)
+from softreach.requirements.parts import LIMIT_UNITS, MOST_PLACES, Goals, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats, joined
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.files import toml
-from softreach.support.files.text import read_text, write_text
+from softreach.support.files.text import MEGABYTE, read_text, write_text
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
 
+LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
 Raw = dict[str, Any]  # A table of a file
 Units = Mapping[str, str]  # Field -> unit of its numbers
 
@@ -219,11 +212,9 @@ class Requirements:
 
     def __repr__(self) -> str:
         payloads = ", ".join(f"{x:g}" for x in self.payloads) or "none"
-        return (
-            f"Requirements: {len(self.targets)} targets with {len(self.places):,} places; "
-            f"{len(self.keeps)} regions to keep to; {len(self.limits.given)} limits; "
-            f"payloads {payloads} kg; {len(self.measures)} measures"
-        )
+        counts = f"{len(self.targets)} targets with {len(self.places):,} places; "
+        counts += f"{len(self.keeps)} regions to keep to; {len(self.limits.given)} limits"
+        return f"Requirements: {counts}; payloads {payloads} kg; {len(self.measures)} measures"
 
 
 def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:

@@ -310,10 +310,8 @@ def _arm(definition: _Value) -> Manipulator:
     density = density / layers if abs(layers - 1.0) > 1e-9 else density
     *materials, core = (_material(part, density) for part in (*rings, tube))
     default = materials[min(range(len(spans)), key=lambda k: spans[k][0])]
-    layered = (
-        Ring(inner_ratio=inner, outer_ratio=outer, material=material)
-        for (inner, outer), material in zip(spans, materials, strict=True)
-    )
+    each = zip(spans, materials, strict=True)
+    layered = (Ring(inner_ratio=a, outer_ratio=b, material=x) for (a, b), x in each)
     taper = definition.of("phi2").number()
     return Manipulator(
         profile=LinearTaper(length=length, outer_radius=base, taper=taper),

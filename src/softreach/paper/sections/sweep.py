@@ -48,11 +48,12 @@ def sweep(settings: Settings, notes: Notebook) -> dict[str, Any]:
     grid = atlas.transpose("revolution", "taper", ...)
     wound = turns[-1], tapers, settings.accuracy
     curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
-    found = {"designs": int(atlas["volume"].notnull().sum()), "samples": settings.samples}
-    found |= {
-        "revolution_deg": np.degrees(turns).round(6),
-        "taper_deg": np.degrees(tapers).round(6),
+    found: dict[str, Any] = {
+        "designs": int(atlas["volume"].notnull().sum()),
+        "samples": settings.samples,
     }
+    found["revolution_deg"] = np.degrees(turns).round(6)
+    found["taper_deg"] = np.degrees(tapers).round(6)
     found |= {"alpha": atlas["volume"].attrs["alpha_over_length"]}
     found |= shapes(turns, tapers, settings.accuracy)
     found |= {"best_taper_deg": {ratio: _best_taper(ratio, *wound) for ratio in _RATIOS}}
