@@ -179,9 +179,7 @@ def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
 def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str = "") -> None:
     pa, units = import_module("pyarrow"), [table.unit.name] * 3 + [*table.units, "1"]
     own = zip(table.columns(slice(0), suffix).items(), units, strict=False)
-    fields = [
-        pa.field(x, pa.from_numpy_dtype(v.dtype), metadata={"units": u}) for (x, v), u in kinds
-    ]
+    fields = [pa.field(x, pa.from_numpy_dtype(v.dtype), metadata={"units": u}) for (x, v), u in own]
     schema = pa.schema(fields, metadata={key: str(v) for key, v in table.metadata.items()})
     with writer_of(schema=schema) as writer:
         for rows in table.blocks():
