@@ -15,21 +15,6 @@ from softreach.atlas.reading import (
 from softreach.atlas.space import DesignSpace
 from softreach.support.files.stores import DamagedStore, StoreFailed
 
-__all__ = [
-    "METRIC_GROUPS",
-    "AtlasStatus",
-    "DamagedStore",
-    "DesignSpace",
-    "Metric",
-    "MetricFailed",
-    "Need",
-    "StoreFailed",
-    "atlas_cloud",
-    "atlas_design",
-    "atlas_status",
-    "best_designs",
-    "build_atlas",
-    "open_atlas",
-    "over_length",
-    "verify_atlas",
-]
+__all__ = ["METRIC_GROUPS", "AtlasStatus", "DamagedStore", "DesignSpace", "Metric", "MetricFailed"]
+__all__ += ["Need", "StoreFailed", "atlas_cloud", "atlas_design", "atlas_status", "best_designs"]
+__all__ += ["build_atlas", "open_atlas", "over_length", "verify_atlas"]

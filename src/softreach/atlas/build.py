@@ -1,7 +1,5 @@
 """Building an atlas: every design of a space, stored as it comes, resumed where it stopped."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import secrets
@@ -11,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
 from threading import Lock
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from zarr.storage import MemoryStore, StoreLike  # noqa: TID253  (imported where stores are)
@@ -28,12 +26,10 @@ from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance
 from softreach.support.arrays import Array
 from softreach.support.files.stores import StoreFailed
 from softreach.support.interruption import check_stopped
+from softreach.support.lazy import Dataset
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, as_progress, bar
 from softreach.workspace.reach import ACCURACIES
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Values = dict[str, Array]
 Outcome = tuple[int, str]  # Number of a design, and why it failed; empty if it did not
@@ -80,9 +76,7 @@ def run_designs(
     _run_pool(pool, store, indices, on_outcome)
 
 
-def _run_pool(
-    pool: Executor, store: AtlasStore, indices: Sequence[int], on_outcome: OnOutcome
-) -> None:
+def _run_pool(pool: Executor, store: AtlasStore, indices: Sequence[int], report: OnOutcome) -> None:
     key = token, origin = secrets.token_hex(8), os.getpid()
     remote = _Remote(store.command, store.location, store.opened.durable, token, origin)
     _opened[key] = store  # for workers that are threads of this process
@@ -104,7 +98,7 @@ def _run_pool(
                         raise
                     outcome = index, "its worker died repeatedly"  # Dask has tried it again by then
                     store.write_status(*outcome)
-                on_outcome(outcome)
+                report(outcome)
     except BrokenExecutor as error:
         then = "finished designs are safe: the same call with a new executor continues"
         raise errors.NotPossible(f"a worker died and broke its executor; {then}") from error
@@ -212,7 +206,7 @@ def build_atlas(
     durable: bool = False,
     device: Device = "cpu",
     progress: Progress | None = None,
-) -> xr.Dataset:
+) -> Dataset:
     """Compute the cloud and the metrics of every design (sections 3 and 4), or what is missing.
 
     All designs share one set of unit activations, scaled to each one's bounds. Every design is
@@ -275,18 +269,12 @@ def build_atlas(
     progress = None if progress is None else as_progress(progress)
     check_sampler(sampler, n, 0, seed)
     check_memory("n", n, _SAMPLE_MEMORY * n)
-    command = Command(
-        space=space,
-        n=n,
-        seed=seed,
-        sampler=sampler,
-        tol=check_tol(tol),
-        alpha_over_length=as_number("alpha_over_length", alpha_over_length, POSITIVE),
-        accuracy=as_number("accuracy", accuracy, ACCURACIES),
-        metrics=chosen_metrics(metrics),
-        keep_clouds=as_flag("keep_clouds", keep_clouds),
-        device=device,
-    )
+    known: Any = {"tol": check_tol(tol), "device": device}
+    known |= {"alpha_over_length": as_number("alpha_over_length", alpha_over_length, POSITIVE)}
+    known |= {"accuracy": as_number("accuracy", accuracy, ACCURACIES)}
+    known |= {"metrics": chosen_metrics(metrics)}
+    known |= {"keep_clouds": as_flag("keep_clouds", keep_clouds)}
+    command = Command(space=space, n=n, seed=seed, sampler=sampler, **known)
     if space.gaps:
         index, reason = next(iter(space.gaps.items()))
         stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
@@ -311,7 +299,7 @@ def _shard_of(name: str, value: Any) -> tuple[int, int]:
     raise errors.InvalidInput(name, shown, "(i, k), or i/k on the command line, with 0 <= i < k")
 
 
-def _warn_of_metrics(built: xr.Dataset) -> None:
+def _warn_of_metrics(built: Dataset) -> None:
     if len(unstable := np.flatnonzero(built["status"].values == UNSTABLE)):
         number, message = (built[x].values.flat[unstable[0]] for x in ("number", "message"))
         without = f"{errors.counted(len(unstable), 'design')} without metrics"

@@ -1,13 +1,11 @@
 """Reading an atlas, also while it is being written: a dataset, and questions about its designs."""
 
-from __future__ import annotations
-
 import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,12 +22,10 @@ from softreach.schema import cloud_dataset, stored_names, with_status
 from softreach.support import arguments
 from softreach.support.errors import InvalidInput, counted, did_you_mean, warn
 from softreach.support.files.stores import ARRAYS, DIGEST, READING, Chunk, storage_errors
+from softreach.support.lazy import DataArray, Dataset
 from softreach.support.quantity import columns, numbers_in
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-    AtlasLike = StoreLike | xr.Dataset
+AtlasLike = StoreLike | Dataset
 
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
@@ -37,7 +33,7 @@ _QUICK = 3e8  # bytes of tips
 _MOST_MESSAGES = 10
 
 
-def open_atlas(store: StoreLike) -> xr.Dataset:
+def open_atlas(store: StoreLike) -> Dataset:
     """An atlas with a dimension for each parameter, so that ``atlas.volume.sel(taper=...)`` works.
 
     Clouds are read when they are used. Designs that are not done are NaN, and so are those of which
@@ -62,7 +58,7 @@ def open_atlas(store: StoreLike) -> xr.Dataset:
     return _opened(a_store("store", store), metrics=True)
 
 
-def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
+def over_length(atlas: Dataset, metric: str) -> DataArray:
     """A metric relative to each design's own length: V / L³, heights over L, curvatures times L.
 
     Args:
@@ -170,7 +166,7 @@ def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
     return command_of(opened).space.design(int(_nearest(opened[["number"]], at)["number"]))
 
 
-def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
+def atlas_cloud(atlas: AtlasLike, **at: float) -> Dataset:
     """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
 
     Stored tips are rounded to 1e-5 of the shortest length; without them, and of loaded designs,
@@ -207,7 +203,7 @@ def best_designs(
     smallest: bool = False,
     where: str | Sequence[str] = (),
     count: int = 1,
-) -> xr.Dataset:
+) -> Dataset:
     """The designs with the largest or smallest metric among those that meet the constraints.
 
     Args:
@@ -308,7 +304,7 @@ def a_store(name: str, value: Any, allowed: str = "a path, a URL or a Zarr store
     return arguments.as_instance(name, value, (Store, StorePath), allowed)
 
 
-def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
+def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> Dataset:
     """The dataset that answers questions; reading all metrics of a large store takes time."""
     import xarray as xr
 
@@ -320,12 +316,12 @@ def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
     return atlas
 
 
-def command_of(atlas: xr.Dataset) -> Command:
+def command_of(atlas: Dataset) -> Command:
     """Command that built the atlas."""
     return Command.from_json(atlas.attrs["command"])
 
 
-def _limits(where: Sequence[str], atlas: xr.Dataset) -> Iterator[tuple[str, float, float]]:
+def _limits(where: Sequence[str], atlas: Dataset) -> Iterator[tuple[str, float, float]]:
     """Variable, lowest and highest value allowed, in SI units."""
     units = {str(name): x.attrs.get("units", "1") for name, x in atlas.variables.items()}
     written = {written_name(name, unit): (name, unit) for name, unit in units.items() if unit}
@@ -352,7 +348,7 @@ def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) 
     return AtlasStatus(designs=status.size, **dict(counts), **known)
 
 
-def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
+def _nearest(atlas: Dataset, at: Mapping[str, float]) -> Dataset:
     dims = [str(dim) for dim in atlas["number"].dims]
     if set(at) != set(dims):
         raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
@@ -369,7 +365,7 @@ def _check_known(name: str, known: list[str]) -> None:
         raise InvalidInput("metric", name, f"one of {', '.join(dict.fromkeys(known))}", hint)
 
 
-def _opened(location: StoreLike, *, metrics: bool) -> xr.Dataset:
+def _opened(location: StoreLike, *, metrics: bool) -> Dataset:
     import xarray as xr
 
     store = AtlasStore.open(location, "r")
@@ -395,10 +391,8 @@ def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     command, shape, dims = store.command, store.command.space.shape, store.command.space.dims
     texts = np.full(command.space.size, "", dtype=object)
     texts[[*content.messages]] = [*content.messages.values()]
-    variables: dict[str, Any] = {
-        "status": (dims, content.status.reshape(shape), ABOUT["status"]),
-        "message": (dims, texts.reshape(shape), ABOUT["message"]),
-    }
+    variables: dict[str, Any] = {"status": (dims, content.status.reshape(shape), ABOUT["status"])}
+    variables["message"] = dims, texts.reshape(shape), ABOUT["message"]
     done = np.isin(content.status, KNOWN).reshape(shape)
     for name, metrics in (("metrics", command.numbers), ("curvature", command.profiles)):
         for k, metric in enumerate(metrics if name in content.tables else ()):

@@ -402,21 +402,10 @@ def _shown(value: Any, other: Any) -> str:
 
 
 def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignSpace:
-    """A design space from the text of a file.
+    """A design space from the text of a file, whose keys docs/atlas.md explains.
 
-    ```toml
-    design = "minimal_trunk"     # or a design file
-    layout = "grid"              # grid, list, sobol or latin
-    [parameters]
-    revolution_deg = "0:108:16"  # 16 values, ends included; or a list: [0, 54, 108]
-    taper_deg = "0:3:16"         # for sobol and latin the two ends: [0, 3]
-    left.offset_deg = [60, 70]   # of the fiber "left"
-    "fiber 2".extent_deg = [48]  # other names are quoted
-    "rings[0].material.young_modulus_pa" = [1e5, 1e6]
-    ```
-
-    With `sobol` and `latin` the keys `designs` (their number) and `seed` apply too; `design_from`
-    makes a design of its name or path.
+    With `sobol` and `latin` each parameter has two ends, and the keys `designs` (their number) and
+    `seed` apply too; `design_from` makes a design of its name or path.
     """
     try:
         document = document_of(text, "space", float)

@@ -18,7 +18,7 @@ import zarr  # noqa: TID253  (imported where stores are)
 from numpy.typing import ArrayLike, NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec  # noqa: TID253
 from zarr.errors import ContainsArrayError  # noqa: TID253
-from zarr.storage import LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
+from zarr.storage import LocalStore, MemoryStore, StoreLike, WrapperStore  # noqa: TID253
 
 from softreach.atlas.metrics import Metric
 from softreach.atlas.space import Command
@@ -42,14 +42,10 @@ _CHUNK = 1 << 20  # numbers of a chunk that all designs share
 _BOX = "place in the activation box of each design: 0 is its lower bound, 1 its upper"
 _STATION = {"units": "1", "long_name": "station Z before activation, over the design's length"}
 _NUMBERS = {"flag_values": [*range(6)], "flag_meanings": "to_do done failed gap unstable damaged"}
-ABOUT: dict[str, dict[str, Any]] = {
-    "status": {"long_name": "status of the design", **_NUMBERS},
-    "message": {"long_name": "why a design has no numbers"},
-}
+ABOUT: dict[str, dict[str, Any]] = {"message": {"long_name": "why a design has no numbers"}}
+ABOUT["status"] = {"long_name": "status of the design", **_NUMBERS}
 
-
-Plan = tuple[str, dict[str, Any], Any]
-"""Name of an array, options of Zarr's `create_array`, and values to write at once, if any."""
+Plan = tuple[str, dict[str, Any], Any]  # Array's name, options of `create_array`, values if any
 
 
 def array_plans(command: Command) -> Iterator[Plan]:
@@ -108,15 +104,10 @@ def _plan(
         chunks = [1 if dim in command.space.dims else size for dim, size in sizes.items()]
     else:
         chunks = [min(size, _CHUNK) for size in sizes.values()]
-    options = {
-        "shape": tuple(sizes.values()),
-        "dtype": dtype,
-        "chunks": tuple(max(size, 1) for size in chunks),
-        "fill_value": fill,
-        "compressors": (Crc32cCodec(),),
-        "dimension_names": tuple(sizes),
-        "attributes": attrs | {OF: stores.sha256(command.to_json().encode())},
-    }
+    options = {"shape": tuple(sizes.values()), "dtype": dtype, "fill_value": fill}
+    options |= {"chunks": tuple(max(size, 1) for size in chunks)}
+    options |= {"compressors": (Crc32cCodec(),), "dimension_names": tuple(sizes)}
+    options |= {"attributes": attrs | {OF: stores.sha256(command.to_json().encode())}}
     if name == "tip":  # activations are random bits, and the same bytes anywhere
         blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
         options["compressors"] = blosc, Crc32cCodec()
@@ -254,7 +245,12 @@ def _with_command(
 
 def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
     place = stores.place_of(location, "r+")
-    lost = _holds_arrays_of(command, place)
+    lost = False  # of a store that this command began, whose root is damaged or gone
+    for name, _, _ in array_plans(command):
+        with suppress(Exception):  # each kind of store has its own for what is missing or damaged
+            array = zarr.open_array(place / name, mode="r", zarr_format=3)
+            lost = array.attrs[OF] == stores.sha256(command.to_json().encode())
+            break
 
     class Root(WrapperStore):
         """Zarr's groups have no exclusive mode, but its stores set a key only if it is missing."""
@@ -278,15 +274,6 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
         sync(place.store.root / place.path / stores.ROOT)
 
 
-def _holds_arrays_of(command: Command, place: StorePath) -> bool:
-    """True if a store whose root is damaged or lost was begun by this command."""
-    for name, _, _ in array_plans(command):
-        with suppress(Exception):  # each kind of store has its own for what is missing or damaged
-            array = zarr.open_array(place / name, mode="r", zarr_format=3)
-            return array.attrs[OF] == stores.sha256(command.to_json().encode())
-    return False
-
-
 def _attributes(command: Command) -> dict[str, Any]:
     """Attributes of the root, in which what describes the arrays is listed before it is written."""
     memory: dict[str, Any] = {}
@@ -296,11 +283,10 @@ def _attributes(command: Command) -> dict[str, Any]:
         group.create_array(name, **options)
         digests[name] = stores.sha256(memory[f"{name}/{stores.ROOT}"].to_bytes())
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
-    return {
-        "title": "reachability cloud atlas",
-        "design": command.space.base.to_toml(),
-        CUBE_DIGEST: drawn_cube(command)[1],
-        "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
+    about: dict[str, Any] = {"title": "reachability cloud atlas"}
+    about |= {"design": command.space.base.to_toml(), CUBE_DIGEST: drawn_cube(command)[1]}
+    about |= {"versions": ", ".join(f"{name} {number}" for name, number in versions.items())}
+    return about | {
         "command": command.to_json(),
         stores.ARRAYS: digests,
         stores.DIGEST: stores.BLANK,

@@ -8,18 +8,6 @@ from softreach.calibration.plan import PosePlan, plan_poses
 from softreach.calibration.result import Calibration, Rival
 from softreach.support.report import Report
 
-__all__ = [
-    "Calibration",
-    "Measurements",
-    "PlacementErrors",
-    "PosePlan",
-    "Repeatability",
-    "Report",
-    "Rival",
-    "Uncertainty",
-    "Verdict",
-    "calibrate",
-    "leave_one_run_out",
-    "plan_poses",
-    "read_measurements",
-]
+__all__ = ["Calibration", "Measurements", "PlacementErrors", "PosePlan", "Repeatability", "Report"]
+__all__ += ["Rival", "Uncertainty", "Verdict", "calibrate", "leave_one_run_out", "plan_poses"]
+__all__ += ["read_measurements"]

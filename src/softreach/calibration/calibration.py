@@ -110,15 +110,8 @@ def calibrate(
     model = MarkerModel.of(free_numbers(arm, free, prior), train)
     fit_to = partial(fitted, robust=robust, noise=noise, progress=progress)
     fit = fit_to(model, train.places)
-    result = Calibration(
-        arm=fit.free.made(fit.values),
-        start=arm,
-        data=table,
-        held=held,
-        fit=fit,
-        uncertainty=uncertainty(fit, train, noise),
-        date=dt.datetime.now(dt.UTC).date().isoformat(),
-    )
+    sure, date = uncertainty(fit, train, noise), dt.datetime.now(dt.UTC).date().isoformat()
+    result = Calibration(fit.free.made(fit.values), arm, table, held, fit, sure, date)
     _warn_of_numbers(result)
     spread = misses(train.places - np.nanmean(train.places, axis=0)).rms
     if any(map(_left, result.ratios.values())) or result.train.rms > _POOR * spread:
@@ -126,10 +119,8 @@ def calibrate(
     result = replace(result, seconds=perf_counter() - begin)
     if not rivals:
         return result
-    laws = {
-        "constant curvature": constant_curvature(arm, train, table, progress),
-        "quadratic ridge": quadratic(train, table),
-    }
+    laws = {"constant curvature": constant_curvature(arm, train, table, progress)}
+    laws["quadratic ridge"] = quadratic(train, table)
     off = [(name, count, places - table.places) for name, (places, count) in laws.items()]
     others = (Rival(name, n, misses(x[~held]), misses(x[held])) for name, n, x in off)
     return replace(result, rivals=tuple(others))

@@ -23,8 +23,7 @@ _FINE, _COARSE = 1e-7, 1e-3  # Least share by which a step improves: last round,
 _MOST = 60
 _SAMPLES = 100  # samples by which exchanges are compared
 _PROMISING, _BETTER = 0.8, 0.5  # Error over that of the columns as they are: before a fit, after it
-_ALIKE, _FAR_BETTER = 1.2, 0.35
-"""Factor between errors that nothing tells apart, and that with which a fit is not begun."""
+_ALIKE, _FAR_BETTER = 1.2, 0.35  # between errors that nothing tells apart, or refuse a fit
 _FAR = 1.0  # m, what a sample without equilibrium misses
 FEWEST_RUNS = 8  # Runs from which these share errors and are held out, not samples
 _SEEN = 0.1  # least share of a variance that the residuals would show if they were plain noise
@@ -159,10 +158,9 @@ def _refuse_exchanged(model: MarkerModel, predicted: Array, places: Array) -> No
     if own > 0.1 * np.nanmedian(np.linalg.norm(places - middle, axis=2)):
         orders = _orders(model, model.free.start, predicted, places)
         if orders[0].miss < _FAR_BETTER * own:
-            raise NotPossible(
-                f"the columns of the data fit no arm with right-handed axes: {_said(orders)}; "
-                f"put right, they miss by {1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
-            )
+            less = f"{1e3 * orders[0].miss:.3g} mm, not {1e3 * own:.3g} mm"
+            fit = f"the columns of the data fit no arm with right-handed axes: {_said(orders)}"
+            raise NotPossible(f"{fit}; put right, they miss by {less}")
 
 
 def identifiable(free: FreeNumbers, slopes: Array) -> None:

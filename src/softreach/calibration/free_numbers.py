@@ -31,7 +31,6 @@ _STEP = 1e-3  # of the scale of a number, for derivatives of tables of fourth or
 _CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 _FORWARD = ((0, -25 / 12), (1, 48 / 12), (2, -36 / 12), (3, 16 / 12), (4, -3 / 12))
 
-
 Neighbors = list[tuple[float, Manipulator | Base | float]]
 """Arms around one, their bases or scales of data alone, with the factors of a derivative."""
 

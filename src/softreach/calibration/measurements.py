@@ -1,7 +1,5 @@
 """Measured poses of an arm: a table of inputs and of the places of markers, with units in names."""
 
-from __future__ import annotations
-
 import bz2
 import csv
 import gzip
@@ -15,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,29 +21,14 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_one_of, as_text
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import (
-    InvalidInput,
-    NotPossible,
-    counted,
-    did_you_mean,
-    in_short,
-    warn,
-)
+from softreach.support.errors import InvalidInput, NotPossible, counted, did_you_mean, warn
 from softreach.support.files.text import MEGABYTE, text_of
+from softreach.support.lazy import DataFrame
 from softreach.support.quantity import sizes_in
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-_SIZES = {
-    name.lower(): (unit, size) for unit in ("m", "N", "Pa") for name, size in sizes_in(unit).items()
-} | {
-    "gf": ("N", 9.80665e-3),
-    "mbar": ("Pa", 1e2),
-    "psi": ("Pa", 6894.757293168361),
-    "percent": ("1", 1e-2),
-}
-"""Suffixes of columns, in small letters: unit and size in it."""
+_SIZES = {x.lower(): (u, s) for u in ("m", "N", "Pa") for x, s in sizes_in(u).items()}
+_SIZES |= {"gf": ("N", 9.80665e-3), "mbar": ("Pa", 1e2), "psi": ("Pa", 6894.757293168361)}
+_SIZES |= {"percent": ("1", 1e-2)}  # suffixes in small letters: SI unit, size
 
 _RUNS = ("run", "pattern", "group", "trial", "cluster", "sequence")
 _ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")
@@ -90,18 +73,12 @@ class Measurements:
         """Number of markers."""
         return self.places.shape[1]
 
-    def of(self, rows: NDArray[np.intp] | Mask) -> Measurements:
+    def of(self, rows: NDArray[np.intp] | Mask) -> "Measurements":
         """Some of them, in the order in which they were taken."""
         rows = np.arange(len(self))[rows]
         rank = np.argsort(self.order)
-        return replace(
-            self,
-            inputs=self.inputs[rows],
-            places=self.places[rows],
-            runs=self.runs[rows],
-            order=np.argsort(rank[rows], kind="stable"),
-            rows=self.rows[rows],
-        )
+        kept = {name: getattr(self, name)[rows] for name in ("inputs", "places", "runs", "rows")}
+        return replace(self, order=np.argsort(rank[rows], kind="stable"), **kept)
 
 
 def marker_names(arm: Manipulator) -> tuple[str, ...]:
@@ -165,19 +142,13 @@ def read_measurements(
     _refuse_far(arm, places, [triples[start] for start in chosen.values()])
     _refuse_inputs(arm, values, sources)
     numbers = np.concatenate([values, places.reshape(len(values), -1)], axis=1)
-    return Measurements(
-        inputs=values,
-        places=places,
-        input_names=tuple(sources),
-        marker_names=tuple(chosen),
-        rows=np.arange(len(values)),
-        source=source,
-        digest=hashlib.sha256(numbers.tobytes()).hexdigest(),
-        **_runs_and_order(table, run, order),
-    )
+    known: dict[str, Any] = _runs_and_order(table, run, order) | {"rows": np.arange(len(values))}
+    known |= {"input_names": tuple(sources), "marker_names": tuple(chosen), "source": source}
+    digest = hashlib.sha256(numbers.tobytes()).hexdigest()
+    return Measurements(inputs=values, places=places, digest=digest, **known)
 
 
-def _runs_and_order(table: pd.DataFrame, run: str | None, order: str | None) -> dict[str, Any]:
+def _runs_and_order(table: DataFrame, run: str | None, order: str | None) -> dict[str, Any]:
     """Names of runs, the run of each sample, and samples run by run in the order of each."""
     every = np.full(len(table), "all") if run is None else table[run].to_numpy(object)
     names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
@@ -187,7 +158,7 @@ def _runs_and_order(table: pd.DataFrame, run: str | None, order: str | None) -> 
     return {"run_names": tuple(names.tolist()), "runs": runs, "order": taken}
 
 
-def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
+def _places(table: DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
     """Places of markers from their columns [m], NaN where one was not seen."""
     each = [[_numbers(table, x, gaps=True) * _unit(x)[2] for x in y] for y in columns.values()]
     places = np.moveaxis(np.array(each), 2, 0)
@@ -198,7 +169,7 @@ def _places(table: pd.DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
     return places
 
 
-def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
+def _inputs(table: DataFrame, sources: Sequence[str], units: Sequence[str]) -> Array:
     """Inputs in their units from their columns, 0 without one, shape (n, input)."""
     values = np.zeros((len(table), len(sources)))
     for k, (name, unit) in enumerate(zip(sources, units, strict=True)):
@@ -214,7 +185,7 @@ def _inputs(table: pd.DataFrame, sources: Sequence[str], units: Sequence[str]) -
     return values
 
 
-def _table(data: Any) -> tuple[pd.DataFrame, str]:
+def _table(data: Any) -> tuple[DataFrame, str]:
     """A table of one row at least, no two columns of which have one name, and its own name."""
     table, source = _opened(data)
     if not len(table):
@@ -229,7 +200,7 @@ def _table(data: Any) -> tuple[pd.DataFrame, str]:
     return table.set_axis(columns, axis=1), source
 
 
-def _opened(data: Any) -> tuple[pd.DataFrame, str]:
+def _opened(data: Any) -> tuple[DataFrame, str]:
     import pandas as pd
 
     if isinstance(data, pd.DataFrame):
@@ -249,7 +220,7 @@ def _opened(data: Any) -> tuple[pd.DataFrame, str]:
     return read_table(path, str(path)), path.name
 
 
-def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
+def read_table(file: Path | IO[bytes], name: str) -> DataFrame:
     """The table of a file whose name says Parquet, else CSV, packed if it says .gz or .zip."""
     import pandas as pd
 
@@ -271,12 +242,8 @@ def read_table(file: Path | IO[bytes], name: str) -> pd.DataFrame:
         raise InvalidInput("data", name, f"a table in CSV or Parquet: {reason}") from None
 
 
-_UNPACKED: Mapping[str, Any] = {
-    ".gz": gzip.open,
-    ".bz2": bz2.open,
-    ".xz": lzma.open,
-    ".zip": lambda file: (packed := zipfile.ZipFile(file)).open(packed.namelist()[0]),
-}
+_UNPACKED: dict[str, Any] = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
+_UNPACKED[".zip"] = lambda file: (packed := zipfile.ZipFile(file)).open(packed.namelist()[0])
 
 
 def _refuse_short(text: str) -> None:
@@ -373,9 +340,8 @@ def _chosen_markers(
         return dict(zip(names, triples, strict=True))
     listed = ", ".join(start or "x, y, z" for start in triples)
     own = f"the arm has {counted(len(names), 'marker')} ({', '.join(names)})"
-    raise NotPossible(
-        f"{own}, the data has {len(triples)} ({listed}): name them by `markers` (--marker)"
-    )
+    seen = f"the data has {len(triples)} ({listed})"
+    raise NotPossible(f"{own}, {seen}: name them by `markers` (--marker)")
 
 
 def _matched(
@@ -405,11 +371,9 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
         fitting = {unit} if unit in ("m", "N", "Pa") else {unit, ""}  # a plain number has none
         free = [c for c in columns if c not in chosen.values() and _unit(c)[1] in fitting]
         if len(free) != len(wanting):
-            wanted = f"{counted(len(wanting), 'column')} in {_unit_text(unit)}"
-            wanted += f" for {', '.join(wanting)}, and has {', '.join(free) or 'none'}"
-            raise NotPossible(
-                f"the data must have {wanted}: name the columns by `inputs` (--input)"
-            )
+            want = f"{counted(len(wanting), 'column')} in {_unit_text(unit)}"
+            want += f" for {', '.join(wanting)}, and has {', '.join(free) or 'none'}"
+            raise NotPossible(f"the data must have {want}: name the columns by `inputs` (--input)")
         chosen |= dict(zip(wanting, free, strict=True))
     return [chosen[name] for name in arm.input_names]
 
@@ -418,12 +382,12 @@ def _unit_text(unit: str) -> str:
     return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
 
 
-def _numbers(table: pd.DataFrame, column: str, *, gaps: bool = False) -> Array:
+def _numbers(table: DataFrame, column: str, *, gaps: bool = False) -> Array:
     """Finite numbers of a column; NaN where there is none, if it may have gaps."""
     try:
         values = table[column].to_numpy(float)
     except (ValueError, TypeError) as error:
-        raise InvalidInput(f"column {column}", in_short(str(error)), "numbers") from None
+        raise InvalidInput(f"column {column}", str(error), "numbers") from None
     wrong = np.isinf(values) if gaps else ~np.isfinite(values)
     if wrong.any():
         row = int(wrong.argmax())

@@ -34,8 +34,7 @@ from softreach.rod.response import (
 )
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Mask, joined
-from softreach.support.arrays import rows as table_rows
+from softreach.support.arrays import Array, Mask, joined, rows
 
 _BLOCK = 1024  # samples at once: their shapes at all nodes are kept
 _TOL = 1e-6
@@ -68,6 +67,10 @@ class _Explicit(NamedTuple):
     rest: Array  # û at rest at the nodes, (step, 3, 3)
 
 
+_Around = list[Neighbors]  # Of each number
+_Changes = list[_Explicit]  # By each number
+
+
 def marker_stations(arm: Manipulator, names: Iterable[str]) -> tuple[Array, Array]:
     """Z [m] of some markers, or of the tip without any, and offsets in the directors [m]."""
     if not arm.markers:
@@ -95,9 +98,7 @@ class MarkerModel:
         arm, scale = self.free.made(values), self.free.scaled(values)
         return self.of_arm(arm, scale, values if slopes else None)
 
-    def of_arm(
-        self, arm: Manipulator, scale: float = 1.0, values: Array | None = None
-    ) -> Prediction:
+    def of_arm(self, arm: Manipulator, scale: float = 1, values: Array | None = None) -> Prediction:
         """Places of the markers of an arm, in data of a scale; derivatives where it has values."""
         free, (stations, _) = self.free, marker_stations(arm, self.names)
         moving = any(word in name for name in free.names for word in _ENDS)
@@ -107,12 +108,10 @@ class MarkerModel:
             near = [x for each in neighbors for _, x in each if isinstance(x, Manipulator)]
             if any(body_of(x).bundles != body_of(arm).bundles for x in near):  # of other arcs
                 return self._by_differences(arm, scale, neighbors)
-        blocks = (self.inputs[rows] for rows in parallel.blocks(len(self.inputs), _BLOCK))
+        blocks = (self.inputs[block] for block in parallel.blocks(len(self.inputs), _BLOCK))
         return joined([self._block(arm, scale, neighbors, grid, inputs) for inputs in blocks])
 
-    def _by_differences(
-        self, arm: Manipulator, scale: float, neighbors: list[Neighbors]
-    ) -> Prediction:
+    def _by_differences(self, arm: Manipulator, scale: float, neighbors: _Around) -> Prediction:
         slopes = np.zeros((len(self.inputs), len(self.names), 3, len(neighbors)))
         for k, each in enumerate(neighbors):
             for factor, other in each:
@@ -133,26 +132,12 @@ class MarkerModel:
             moment = turned(bend, -angle) * arm.section.resistance(own)[..., None]
             force = rise * own.axial[..., None, None]
             measures = np.concatenate([turned(moment, angle), force], axis=-2)
-        return _Explicit(
-            table,
-            arm.base.rotation,
-            np.array(arm.base.position),
-            scale,
-            offsets,
-            Driving(arm).bundles(inputs),
-            law.taut_from,
-            law.compliance,
-            measures=measures,
-            rest=table.curvature @ law.rest[0],
-        )
+        own, place = Driving(arm).bundles(inputs), np.array(arm.base.position)
+        tendons = law.taut_from, law.compliance, measures, table.curvature @ law.rest[0]
+        return _Explicit(table, arm.base.rotation, place, scale, offsets, own, *tendons)
 
     def _block(
-        self,
-        arm: Manipulator,
-        scale: float,
-        neighbors: list[Neighbors],
-        grid: StepGrid,
-        inputs: Array,
+        self, arm: Manipulator, scale: float, neighbors: _Around, grid: StepGrid, inputs: Array
     ) -> Prediction:
         at = self._explicit(arm, scale, grid, inputs)
         rod, tendons = self._rod(arm, grid)
@@ -168,7 +153,7 @@ class MarkerModel:
         slopes = np.full((*places.shape, len(neighbors)), np.nan)
         if neighbors:
             known = np.asarray(np.isfinite(places).all(axis=(1, 2)))
-            some = table_rows(state, known)
+            some = rows(state, known)
             changes = [self._change(arm, at, each, grid, inputs) for each in neighbors]
             driven = np.stack([change.bundles[known] for change in changes], axis=-1)
             if isinstance(tendons, PulledTendons) and tendons.guides is not None:
@@ -195,7 +180,7 @@ class MarkerModel:
         gamma: Array,
         is_taut: Mask,
         pulled: Array,
-        near: tuple[list[_Explicit], list[Neighbors]],
+        near: tuple[_Changes, _Around],
     ) -> Array:
         """Derivatives of the rod's activations with guides, by those with displacements."""
         columns, on_arcs = tendons.law.columns, np.zeros_like(pulled)
@@ -232,10 +217,8 @@ class MarkerModel:
             else:  # the same body, and so the same tables
                 each.append(at._replace(bundles=Driving(other).bundles(inputs)))
         table = each[0].table.combined([other.table for other in each], factors)
-        others = (
-            np.tensordot(factors, np.stack(columns), axes=1)
-            for columns in zip(*(other[1:] for other in each), strict=True)
-        )
+        columns = zip(*(other[1:] for other in each), strict=True)
+        others = (np.tensordot(factors, np.stack(column), axes=1) for column in columns)
         return _Explicit._make([table, *others])
 
 
@@ -249,7 +232,7 @@ def _slopes(
     arm: Manipulator,
     at: _Explicit,
     state: RodState,
-    changes: list[_Explicit],
+    changes: _Changes,
     driven: Array,
     *,
     by_length: bool = False,
@@ -260,10 +243,9 @@ def _slopes(
     response = linear_response(at.table, state, tables, at.measures)
     if by_length and at.measures.shape[-1]:
         driven = _with_tensions(arm, at, state, changes, driven, response.works)
-    moves, turns = (
-        each[..., bundles:] + np.einsum("nmaj,njk->nmak", each[..., :bundles], driven)
-        for each in (response.moves, response.turns)
-    )
+    rule, parts = "nmaj,njk->nmak", (response.moves, response.turns)
+    by_inputs = (np.einsum(rule, each[..., :bundles], driven) for each in parts)
+    moves, turns = (x[..., bundles:] + y for x, y in zip(parts, by_inputs, strict=True))
     offset, place = _beyond(at, state)
     slopes = moves + np.cross(turns, offset[..., None], axisa=2, axisb=2, axisc=2)
     for k, change in enumerate(changes):
@@ -276,12 +258,7 @@ def _slopes(
 
 
 def _with_tensions(
-    arm: Manipulator,
-    at: _Explicit,
-    state: RodState,
-    changes: list[_Explicit],
-    driven: Array,
-    works: Array,
+    arm: Manipulator, at: _Explicit, state: RodState, changes: _Changes, driven: Array, works: Array
 ) -> Array:
     """Derivatives of activations with those of tensions in place of displacements.
 

@@ -1,11 +1,9 @@
 """Poses worth measuring: those that tell most about the free numbers of an arm."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +17,10 @@ from softreach.rod.tip_map import TipStatus
 from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support.arguments import as_integer, as_names, as_number
-from softreach.support.arrays import Array, Mask
+from softreach.support.arrays import Array, Mask, over
 from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.files.text import write_table
-
-if TYPE_CHECKING:
-    import xarray as xr
+from softreach.support.lazy import Dataset
 
 _CORNERS = 10  # free inputs up to which all corners of their box are candidates
 _APART = 0.5  # distance of two poses in the box at least, over the mean distance of so many points
@@ -74,7 +70,7 @@ class PosePlan:
         widths = noise * scale * np.sqrt(np.diag(inverse))
         return dict(zip(self.names, widths.tolist(), strict=True))
 
-    def to_dataset(self, noise: float = 1e-3) -> xr.Dataset:
+    def to_dataset(self, noise: float = 1e-3) -> Dataset:
         """Activations over `pose`; values, standard deviations to expect and JᵀJ over `number`.
 
         Args:
@@ -83,19 +79,12 @@ class PosePlan:
         import xarray as xr
 
         arm, numbers = self.free.arm, self.free.numbers
-        values = {
-            "activation": (("pose", "input"), self.activations),
-            "value": ("number", self.free.start),
-            "sigma": ("number", list(self.sigma(noise).values())),
-            "information": (("number", "other"), self.information),
-        }
-        names = {
-            "number": list(self.names),
-            "other": list(self.names),
-            "unit": ("number", [number.unit for number in numbers]),
-            "input": list(arm.input_names),
-            "input_unit": ("input", list(arm.input_units)),
-        }
+        values = over(("pose", "input"), activation=self.activations)
+        values |= over("number", value=self.free.start, sigma=list(self.sigma(noise).values()))
+        values |= over(("number", "other"), information=self.information)
+        names = {"number": list(self.names), "other": list(self.names)}
+        names |= {"input": list(arm.input_names)} | over("number", unit=[n.unit for n in numbers])
+        names |= over("input", input_unit=list(arm.input_units))
         about = {**provenance(arm), "noise": noise, "markers": ", ".join(self.markers)}
         return xr.Dataset(values, names, about)
 
@@ -161,9 +150,8 @@ def plan_poses(
     known, (low, high) = marker_names(arm), arm.input_bounds.T
     names = known if markers is None else as_names("markers", markers)
     if not names or {*names} - {*known} or len({*names}) < len(names):
-        raise InvalidInput(
-            "markers", ", ".join(names) or "none", f"of {', '.join(known)}, each once"
-        )
+        allowed = f"of {', '.join(known)}, each once"
+        raise InvalidInput("markers", ", ".join(names) or "none", allowed)
     moving = low < high
     cube = _candidates(int(moving.sum()), candidates, seed)
     inputs = np.tile(low, (len(cube), 1))

@@ -1,13 +1,11 @@
 """Result of a calibration: numbers with their errors, beside those of other laws."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,17 +25,14 @@ from softreach.calibration.free_numbers import POSE, SCALE, free_numbers
 from softreach.calibration.measurements import Measurements, read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.support.arguments import as_flag, as_integer
-from softreach.support.arrays import Array, Index, Mask, as_rows
+from softreach.support.arrays import Array, Index, Mask, as_rows, over
 from softreach.support.errors import counted
 from softreach.support.files.text import write_text
+from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.quantity import quantity
 from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit, as_unit, readable_unit
 from softreach.support.versions import versions
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 _OUTLIER = 5.0  # robust widths from which a sample is listed
 _CORRELATED = 0.95
@@ -49,10 +44,10 @@ _FAR_FROM_PRIOR = 2.0  # widths
 _BETTER = 0.9  # error of a rival over that of the arm
 _MOST_ROWS = 10
 _ERRORS = ("rms", "median", "95 % below", "rms / L")
-_PICTURE = (
-    "Measured places and the lines to the predicted ones; errors by marker, in the order in which "
-    "samples were taken, and against each input."
-)
+_PICTURE = "Measured places and the lines to the predicted ones; errors by marker, in the order in "
+_PICTURE += "which samples were taken, and against each input."
+_DISTANCES = "Distances between measured and predicted places of the markers. Samples that are "
+_DISTANCES += "held out were not seen by any fit."
 _WORDS = {"softreach_version": "softreach", "data_sha256": "SHA-256 of the data"}
 
 
@@ -282,48 +277,33 @@ class Calibration(Reported):
     def _held_text(self) -> str:
         return f"{int(self.held.sum())} {'in held-out runs' if self.held_runs else 'held out'}"
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """Numbers with their errors over `number`, residuals over `sample`, `marker`, `axis`."""
         import xarray as xr
 
-        numbers, place = self.fit.free.numbers, ("sample", "marker", "axis")
-        values = {
-            "value": ("number", self.fit.values),
-            "sigma": ("number", self.uncertainty.sigma),
-            "start": ("number", np.array([number.start for number in numbers])),
-            "at_bound": ("number", self.fit.at_bound),
-            "correlation": (("number", "other"), self.uncertainty.correlation),
-            "measured": (place, self.data.places, {"units": "m"}),
-            "residual": (place, self.residuals, {"units": "m"}),
-            "held_out": ("sample", self.held),
-            "run": ("sample", self.data.runs),
-            "rank": ("sample", np.argsort(self.data.order)),
-            "input_value": (("sample", "input"), self.data.inputs),
-        }
-        names = {
-            "number": list(self.names),
-            "other": list(self.names),
-            "unit": ("number", [number.unit for number in numbers]),
-            "marker": list(self.data.marker_names),
-            "axis": ["x", "y", "z"],
-            "input": list(self.arm.input_names),
-            "input_unit": ("input", list(self.arm.input_units)),
-        }
+        free, data, place = self.fit.free, self.data, ("sample", "marker", "axis")
+        sigma = self.uncertainty.sigma
+        values = over("number", value=self.fit.values, sigma=sigma, start=free.start)
+        values |= over("number", at_bound=self.fit.at_bound)
+        values |= over(("number", "other"), correlation=self.uncertainty.correlation)
+        values |= over(place, "m", measured=data.places, residual=self.residuals)
+        values |= over("sample", held_out=self.held, run=data.runs, rank=np.argsort(data.order))
+        values |= over(("sample", "input"), input_value=data.inputs)
+        names = {"number": list(self.names), "other": list(self.names), "axis": ["x", "y", "z"]}
+        names |= {"marker": list(data.marker_names), "input": list(self.arm.input_names)}
+        names |= over("input", input_unit=list(self.arm.input_units))
+        names |= over("number", unit=[number.unit for number in free.numbers])
         return xr.Dataset(values, names, {**self.provenance, "length": self.arm.length})
 
     @property
     def provenance(self) -> dict[str, str]:
         """Version, date and data behind the result."""
-        return {
-            "softreach_version": str(versions()["softreach_version"]),
-            "date": self.date,
-            "data": self.data.source,
-            "data_sha256": self.data.digest,
-            "samples": f"{len(self.data)}, of which {self._held_text}",
-            "free": ", ".join(self.names),
-            "error": misses(self.residuals[self._judged]).text(self.start.length),
-            "verdict": self.verdict.sentence,
-        }
+        about = {"softreach_version": str(versions()["softreach_version"]), "date": self.date}
+        about |= {"data": self.data.source, "data_sha256": self.data.digest}
+        about |= {"samples": f"{len(self.data)}, of which {self._held_text}"}
+        error = misses(self.residuals[self._judged]).text(self.start.length)
+        about |= {"free": ", ".join(self.names), "error": error}
+        return about | {"verdict": self.verdict.sentence}
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the calibrated arm as a design file whose first lines say where it comes from.
@@ -352,7 +332,7 @@ class Calibration(Reported):
             rows.append((f"{name}, {counted(numbers, 'number')}", on, errors[held > 0]))
         return rows
 
-    def table(self, unit: str = "m") -> pd.DataFrame:
+    def table(self, unit: str = "m") -> DataFrame:
         """Inputs, measured and predicted places and their distances, a row for each sample.
 
         Args:
@@ -361,11 +341,8 @@ class Calibration(Reported):
         import pandas as pd
 
         data, arm, shown = self.data, self.arm, as_unit(unit, self.arm.length)
-        table: dict[str, Any] = {
-            "row": data.rows,
-            "run": np.array(data.run_names)[data.runs],
-            "held_out": self.held.astype(int),
-        }
+        runs = np.array(data.run_names)[data.runs]
+        table: Any = {"row": data.rows, "run": runs, "held_out": self.held.astype(int)}
         for k, (name, own) in enumerate(zip(arm.input_names, arm.input_units, strict=True)):
             table[f"{name}{unit_suffix(own)}"] = data.inputs[:, k]
         distance = np.linalg.norm(self.residuals, axis=2)
@@ -391,30 +368,20 @@ class Calibration(Reported):
         origin = [(_WORDS.get(key, key), text) for key, text in self.provenance.items()]
         for name, column in zip(arm.input_names, data.input_names, strict=True):
             origin.append((f"input {name}", f"column {column}" if column else "stays at 0"))
+        rows, head = list(_number_rows(self, shown)), ("number", "calibrated", "design")
+        fits = Section(title="Numbers", head=head, rows=rows, note="Each ± its standard deviation.")
+        head = (shown.label("error of places"), "samples", *_ERRORS)
+        rows, points = list(_error_rows(self, shown)), [*_remarks(self, shown), *self.doubts]
+        draw = partial(plot_calibration, self, unit=shown)
         return Report(
             title=f"Calibration from {data.source}",
             verdict=self.verdict.sentence,
             state=self.verdict.limit,
             facts=[f"{numbers} from {fitted} of {seen}, {self.seconds:.1f} s"],
             sections=[
-                Section(
-                    title="Numbers",
-                    head=("number", "calibrated", "design"),
-                    rows=list(_number_rows(self, shown)),
-                    note="Each ± its standard deviation.",
-                ),
-                Section(
-                    title="Errors",
-                    head=(shown.label("error of places"), "samples", *_ERRORS),
-                    rows=list(_error_rows(self, shown)),
-                    note="Distances between measured and predicted places of the markers. Samples "
-                    "that are held out were not seen by any fit.",
-                    points=[*_remarks(self, shown), *self.doubts],
-                ),
-                Section(
-                    title="Pictures",
-                    figures=lambda: [(plot_calibration(self, unit=shown), _PICTURE)],
-                ),
+                fits,
+                Section(title="Errors", head=head, rows=rows, note=_DISTANCES, points=points),
+                Section(title="Pictures", figures=lambda: [(draw(), _PICTURE)]),
                 Section(title="Provenance", rows=origin, printed=0),
                 Section(title="The calibrated design", text=arm.to_toml()),
             ],

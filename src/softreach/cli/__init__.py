@@ -1,7 +1,5 @@
 """The command line: parse, call, print; no logic of its own."""
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -4,20 +4,12 @@
 nowhere to write, 141 standard output was closed, 128 + signal.
 """
 
-from __future__ import annotations
-
 import traceback
 from contextlib import suppress
 from typing import Annotated, Any, cast
 
-from cyclopts import (
-    App,
-    CycloptsError,
-    Group,
-    MissingArgumentError,
-    Parameter,
-    UnusedCliTokensError,
-)
+import cyclopts
+from cyclopts import App, CycloptsError, Group, MissingArgumentError, Parameter
 
 import softreach as sr
 from softreach.cli.console import HelpConsole, console
@@ -25,7 +17,7 @@ from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _GROUPS = (
-    ("Design", "design:design search:check search:search demo:list studio:studio"),
+    ("Design", "convert:design search:check search:search demo:list studio:studio"),
     ("Bench", "bench:plan-poses bench:calibrate"),
     ("Reach", "reach:reach reach:cloud reach:volume reach:payload reach:gradient"),
     ("Places", "places:solve places:track places:equilibria"),
@@ -34,9 +26,7 @@ _GROUPS = (
     ("More", "demo:demo demo:example demo:doctor demo:paper demo:warmup"),
 )
 """Titles of the help, and commands behind the modules that they are in."""
-MODULES = {
-    name: module for _, words in _GROUPS for module, name in (w.split(":") for w in words.split())
-}
+MODULES = {x.split(":")[1]: x.split(":")[0] for _, words in _GROUPS for x in words.split()}
 _FUNCTIONS = {"import": "import_file", "list": "listing"}  # where Python needs the name itself
 
 
@@ -56,6 +46,7 @@ class _Flowing:
         return getattr(DefaultFormatter(), name)
 
 
+_OPTION = Parameter(negative=(), show_default=lambda x: None if x is None or x is False else str(x))
 app = App(
     name="softreach",
     help="""Where a soft slender robot can go: from a design to its cloud and volumes.
@@ -73,9 +64,7 @@ Start with
     help_format="plaintext",
     help_formatter=_Flowing(),
     console=cast(Any, HelpConsole()),
-    default_parameter=Parameter(
-        negative=(), show_default=lambda x: None if x is None or x is False else str(x)
-    ),
+    default_parameter=_OPTION,
 )
 _groups = [Group(_title, sort_key=_rank - 9) for _rank, (_title, _) in enumerate(_GROUPS)]
 for _group, (_, _words) in zip(_groups, _GROUPS, strict=True):
@@ -96,11 +85,8 @@ def _always(help: str, *names: str) -> Parameter:
 
 _QUIET = _always("Print results and errors only: no warnings, no progress.", "--quiet", "-q")
 _VERBOSE = _always("Print more: what is compiled, and where errors come from.", "--verbose", "-v")
-_IMPORT = _always(
-    "Module, or .py file, with actuators, profiles or metrics of your own, which is run. "
-    "May be repeated.",
-    "--import",
-)
+_MODULES = "Module, or .py file, with actuators, profiles or metrics of your own, which is run. "
+_IMPORT = _always(f"{_MODULES}May be repeated.", "--import")
 
 
 @app.meta.default
@@ -138,22 +124,17 @@ def run(arguments: list[str]) -> int:
     return code or 0
 
 
-def _unfit(error: MissingArgumentError | UnusedCliTokensError) -> str:
-    """Words that a command needs, or cannot use."""
-    command = " ".join(error.command_chain or ["softreach"])
-    if isinstance(error, UnusedCliTokensError):
-        return f"{command} takes no {', '.join(error.unused_tokens or ())}"
-    if error.keyword is None:
-        return f"{command} needs {error.argument.name if error.argument else 'more words'}"
-    dash = f"if it begins with a dash: {error.keyword}=VALUE"
-    return f"{command} {error.keyword} needs a value; {dash}"
-
-
 def _message(error: Exception) -> str:
     if isinstance(error, CycloptsError) and isinstance(error.__cause__, SoftreachError):
         error = error.__cause__
-    if isinstance(error, MissingArgumentError | UnusedCliTokensError):
-        return _unfit(error)
+    if isinstance(error, MissingArgumentError | cyclopts.UnusedCliTokensError):
+        command = " ".join(error.command_chain or ["softreach"])
+        if isinstance(error, cyclopts.UnusedCliTokensError):
+            return f"{command} takes no {', '.join(error.unused_tokens or ())}"
+        if error.keyword is None:
+            return f"{command} needs {error.argument.name if error.argument else 'more words'}"
+        dash = f"if it begins with a dash: {error.keyword}=VALUE"
+        return f"{command} {error.keyword} needs a value; {dash}"
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; ask for fewer samples or less accuracy"
     return str(error) or type(error).__name__

@@ -1,7 +1,5 @@
 """`softreach atlas`: sweeps over designs; build, status, verify, best, figures."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,10 +24,8 @@ Example: softreach atlas build a.zarr --vary taper_deg=0:3:4
 )
 
 Store = Annotated[str, Parameter(help="The atlas: a folder (.zarr) or a URL.")]
-Shard = Annotated[
-    str,
-    Parameter(help="Compute one of k parts of the designs: 0/k to k-1/k; all may share the store."),
-]
+_SHARD = "Compute one of k parts of the designs: 0/k to k-1/k; all may share the store."
+Shard = Annotated[str, Parameter(help=_SHARD)]
 
 
 @atlas.command
@@ -78,18 +74,15 @@ def build(
     groups = tuple(sr.atlas.METRIC_GROUPS if metrics is None else metrics.split(","))
     if "concave" not in groups:
         options.refuse("without the metrics concave", alpha=alpha)
-    sr.build_atlas(
-        _space_of(space, design, vary, changes),
-        store,
-        **sampling.arguments,
-        alpha_over_length=0.05 if alpha is None else _over_length(alpha),
-        metrics=groups,
-        keep_clouds=keep_clouds,
-        executor=_executor(scheduler, scheduler_file),
-        shard=(int(first), int(count)),
-        durable=durable,
-        device=device,
-    )
+    how: Any = {"metrics": groups, "keep_clouds": keep_clouds, "durable": durable}
+    how |= {"shard": (int(first), int(count)), "device": device}
+    alpha = "0.05L" if alpha is None else alpha  # in m it would not suit designs of every length
+    bare = alpha[:-1] if alpha.endswith("L") else ""
+    allowed = "a radius > 0 over the length of each design, like 0.05L"
+    radius = read_as("alpha", alpha, lambda _: read_number(bare), allowed, POSITIVE)
+    designs, how = _space_of(space, design, vary, changes), how | sampling.arguments
+    how["executor"] = _executor(scheduler, scheduler_file)
+    sr.build_atlas(designs, store, alpha_over_length=radius, **how)
     status(store, json=json)
 
 
@@ -119,10 +112,8 @@ def verify(store: Store, /, *, json: options.AsJson = False) -> None:
     """
     _print(store, state := sr.atlas.verify_atlas(store), json)
     if state.damaged:
-        raise NotPossible(
-            f"{counted(state.damaged, 'design')} of {store} damaged: run the command that built "
-            "the atlas again"
-        )
+        many = f"{counted(state.damaged, 'design')} of {store} damaged"
+        raise NotPossible(f"{many}: run the command that built the atlas again")
 
 
 @atlas.command
@@ -170,7 +161,7 @@ def figures(
     /,
     *,
     panels: Whole = 7,
-    out: Annotated[Path, options.OUT] = Path("figures"),
+    out: options.Place = Path("figures"),
     overwrite: options.Overwrite = False,
 ) -> None:
     """Draw the atlas: sheets, corners, maps, curvature.
@@ -197,7 +188,7 @@ def figures(
 
 def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
-) -> sr.DesignSpace:
+) -> "sr.DesignSpace":
     from softreach.arm.design_reader import LONGEST
     from softreach.atlas.space import parse_space
 
@@ -209,7 +200,7 @@ def _space_of(
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
 
-def grid_of(base: sr.Manipulator, vary: list[str]) -> sr.DesignSpace:
+def grid_of(base: "sr.Manipulator", vary: list[str]) -> "sr.DesignSpace":
     """The grid that `--vary` asks for."""
     from softreach.atlas.space import parse_parameter
 
@@ -226,10 +217,3 @@ def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
     from distributed import Client
 
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
-
-
-def _over_length(text: str) -> float:
-    """0.05 from `0.05L`: a length in m would not suit designs of every length."""
-    allowed = "a radius > 0 over the length of each design, like 0.05L"
-    bare = text[:-1] if text.endswith("L") else ""
-    return read_as("alpha", text, lambda _: read_number(bare), allowed, POSITIVE)

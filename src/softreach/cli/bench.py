@@ -1,8 +1,6 @@
 """`softreach calibrate` and `plan-poses`: the arm on the bench from measured poses."""
 
-from __future__ import annotations
-
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,23 +15,18 @@ from softreach.support.arguments import POSITIVE
 from softreach.support.errors import InvalidInput
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_table
+from softreach.support.lazy import Dataset
 from softreach.support.quantity import columns
-from softreach.support.units import TYPED, LengthUnit, read_length, readable
+from softreach.support.units import TYPED, read_length, readable
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from softreach.arm.parameters import Written
 
 _COLUMNS = Group("Column names", sort_key=1)
-Free = Annotated[
-    list[str],
-    Parameter(
-        help="Numbers that may change, comma-separated: names of softreach list parameters DESIGN, "
-        "with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for "
-        "the base; scale for places without a unit of length. May be repeated.",
-    ),
-]
+_FREE = """Numbers that may change, comma-separated: names of softreach list parameters DESIGN, \
+with * for any text; a=b=c to share one value; pose, pose.position or pose.rotation for the base; \
+scale for places without a unit of length. May be repeated."""
+Free = Annotated[list[str], Parameter(help=_FREE)]
 
 
 def calibrate(
@@ -94,24 +87,15 @@ def calibrate(
     outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
     for path, formats in outputs or [(None, {})]:
         options.check_output(path, formats, output.overwrite)
+    known: Any = {"hold_out": hold_out, "hold_out_runs": hold_out_runs, "robust": robust}
+    known |= {"rivals": rivals, "run": run, "order": order, "seed": seed}
     with progress.bar("fitting", None) as step:
-        result = sr.calibrate(
-            arm,
-            data,
-            free=free_names(arm, free),
-            prior=priors(arm, prior or ()),
-            hold_out=hold_out,
-            hold_out_runs=hold_out_runs,
-            noise=None if noise is None else _noise(noise),
-            robust=robust,
-            rivals=rivals,
-            inputs=pairs_in("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"') or None,
-            markers=pairs_in("marker", markers, "NAME=START, such as tip=disk3") or None,
-            run=run,
-            order=order,
-            seed=seed,
-            progress=step,
-        )
+        known |= {"free": free_names(arm, free), "prior": priors(arm, prior or ())}
+        known |= {"noise": None if noise is None else _noise(noise)}
+        columns_of = pairs_in("input", inputs, 'NAME=COLUMN, such as "tendon 1=tension1_N"')
+        starts_of = pairs_in("marker", markers, "NAME=START, such as tip=disk3")
+        known |= {"inputs": columns_of or None, "markers": starts_of or None}
+        result = sr.calibrate(arm, data, **known, progress=step)
     if output.json:
         console.json(_record(result))
     else:
@@ -132,30 +116,19 @@ def _noise(text: str) -> float:
 
 def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
-    fit, held = result.fit, result.held
-    return {
-        "samples": len(result.data),
-        "held_out": int(held.sum()),
-        "markers": {name: _errors(errors) for name, errors in result.by_marker.items()},
-        "numbers": _numbers(result.to_dataset()),
-        "errors": [
-            {"law": law, "samples": on, **_errors(errors)} for law, on, errors in result.errors
-        ],
-        "correlated": result.correlated,
-        "doubts": result.doubts,
-        "outlier_rows": result.outliers,
-        "repeatability_rms_m": result.repeatability.rms,
-        "repeated_samples": result.repeatability.pairs,
-        "limit": result.verdict.limit,
-        "verdict": result.verdict.sentence,
-        "converged": fit.converged,
-        "seconds": result.seconds,
-        "data": result.data.source,
-        "data_sha256": result.data.digest,
-    }
+    held, data, again = result.held, result.data, result.repeatability
+    errors = [{"law": law, "samples": on, **_errors(each)} for law, on, each in result.errors]
+    record = {"samples": len(data), "held_out": int(held.sum()), "errors": errors}
+    record |= {"markers": {name: _errors(each) for name, each in result.by_marker.items()}}
+    record |= {"numbers": _numbers(result.to_dataset()), "correlated": result.correlated}
+    record |= {"doubts": result.doubts, "outlier_rows": result.outliers}
+    record |= {"repeatability_rms_m": again.rms, "repeated_samples": again.pairs}
+    record |= {"limit": result.verdict.limit, "verdict": result.verdict.sentence}
+    record |= {"converged": result.fit.converged, "seconds": result.seconds}
+    return record | {"data": data.source, "data_sha256": data.digest}
 
 
-def _numbers(found: xr.Dataset) -> list[dict[str, Any]]:
+def _numbers(found: Dataset) -> list[dict[str, Any]]:
     records = []
     for number in (found.isel(number=k) for k in range(found.sizes["number"])):
         names, unit = ("value", "sigma", "start"), str(number["unit"].item())
@@ -204,35 +177,27 @@ def plan_poses(
     arm = design_from(design, changes, output.unit)
     width = _noise(noise)
     options.check_output(out, TABLES, output.overwrite)
-    plan = sr.calibration.plan_poses(
-        arm,
-        free_names(arm, free),
-        n,
-        markers=None if markers is None else [name.strip() for name in markers.split(",")],
-        candidates=candidates,
-        seed=seed,
-    )
+    names = free_names(arm, free)
+    seen = None if markers is None else [name.strip() for name in markers.split(",")]
+    options_of = {"markers": seen, "candidates": candidates, "seed": seed}
+    plan = sr.calibration.plan_poses(arm, names, n, **options_of)
     found = plan.to_dataset(width)
     if output.json:
         poses = {"inputs": found["input"].values, "poses": found["activation"].values}
         console.json({"noise_m": width, **poses, "numbers": _numbers(found)})
     else:
         seen, noise = ", ".join(plan.markers), arm.length_unit.rounded(width, digits=".5g")
-        lines = columns([("number", "expected", "share"), *_rows(found, arm.length_unit)])
+        rows, keys = [("number", "expected", "share")], ("number", "unit", "value", "sigma")
+        for name, own, value, sigma in zip(*(found[k].values.tolist() for k in keys), strict=True):
+            share = f"{100 * sigma / abs(value):.2g} %" if value else "-"
+            rows.append((name, readable(value, own, arm.length_unit, sigma, digits=2), share))
         title = f"{n} poses of {design} with {seen}, noise {noise}"
-        console.line("\n  ".join([title, *lines]))
+        console.line("\n  ".join([title, *columns(rows)]))
     if out is not None:
         plan.save(out, overwrite=output.overwrite)
 
 
-def _rows(found: xr.Dataset, unit: LengthUnit) -> Iterator[tuple[str, str, str]]:
-    names = ("number", "unit", "value", "sigma")
-    for name, own, value, width in zip(*(found[k].values.tolist() for k in names), strict=True):
-        share = f"{100 * width / abs(value):.2g} %" if value else "-"
-        yield name, readable(value, own, unit, width, digits=2), share
-
-
-def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
+def free_names(arm: "sr.Manipulator", texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
     from softreach.arm.parameters import Written
 
@@ -241,7 +206,7 @@ def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
     return [_tied(names, name) for name in given if name]
 
 
-def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def priors(arm: "sr.Manipulator", texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Width, or mean and width, of numbers in their units by name, from NAME=MEAN:WIDTH.
 
     Raises:
@@ -267,6 +232,6 @@ def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, 
     return result
 
 
-def _tied(names: Written, name: str) -> str:
+def _tied(names: "Written", name: str) -> str:
     parts = (part.strip() for part in name.split("="))
     return " = ".join(names.by_key[x].name if x in names.by_key else x for x in parts)

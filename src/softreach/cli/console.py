@@ -3,8 +3,6 @@
 Errors, warnings and progress are printed on standard error.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 import math
@@ -17,18 +15,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from enum import Enum
 from io import TextIOWrapper
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import softreach as sr
 from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
+from softreach.support.lazy import Dataset
 from softreach.support.quantity import columns
 from softreach.support.units import METER, POWERS, LengthUnit, Rows, lines_of, shown, to_degrees
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import xarray as xr
 
 _READ_AS = {"m2": "m²", "m3": "m³", "1": ""}
 _PLAIN = str.maketrans({"³": "3", "²": "2", "/": "_per_", " ": "_", "(": "", ")": ""})
@@ -65,7 +60,7 @@ class Console:
         title: str,
         rows: Rows,
         as_json: bool,
-        arm: sr.Manipulator | None = None,
+        arm: "sr.Manipulator | None" = None,
         unit: LengthUnit = METER,
     ) -> None:
         """Named values in SI units below a title; in JSON, names with their units are the keys.
@@ -182,7 +177,7 @@ def as_read(values: Any, unit: str) -> tuple[Any, str]:
     return plain(values), _READ_AS.get(unit, unit)
 
 
-def rows_of(dataset: xr.Dataset) -> Rows:
+def rows_of(dataset: Dataset) -> Rows:
     """The numbers of a result, by the names and units that its dataset has."""
     rows: Rows = {}
     for name, column in dataset.variables.items():

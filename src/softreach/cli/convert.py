@@ -1,24 +1,80 @@
-"""`softreach export` and `import`: clouds, arms and designs of other programs."""
-
-from __future__ import annotations
+"""`softreach design`, `export`, `import`: a design described, and files of other programs."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import console
+from softreach.cli.console import console, fields_of, for_machines
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
-from softreach.support.errors import InvalidInput, NotPossible
-from softreach.support.units import Rows
+from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 
-Format = Annotated[
-    str | None,
-    Parameter(help="activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."),
-]
+_PAIR = "activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."
+Format = Annotated[str | None, Parameter(help=_PAIR)]
 _OTHER = "for ActiveFilaments.jl, whose lengths are in m"
+
+
+def design(
+    design: options.Design | None = None,
+    /,
+    *,
+    schema: bool = False,
+    changes: Changes = UNCHANGED,
+    out: options.Out = None,
+    output: options.Output = options.DEFAULT,
+) -> None:
+    """Describe a design: angles, radii, stiffness, weight, warnings.
+
+    --verbose adds where the linear law of each kind of actuator ends. With --out,
+    --unit is written into the design file.
+
+    Example: softreach design minimal_trunk --taper-deg 3
+
+    Args:
+        schema: Print the JSON schema of design files for editors, nothing else.
+        out: Write the design to this TOML file.
+    """
+    from softreach.arm.design_file import DESIGN_FILE
+
+    if schema:
+        given = {"out": out, "overwrite": output.overwrite, "unit": output.unit}
+        options.refuse("with --schema", **given, **changes.given)
+        from softreach.arm.design_reader import json_schema
+
+        console.json(json_schema(), indent=2)
+        return
+    if design is None:
+        raise NotPossible("give a design file or a built-in design, or use --schema")
+    with no_warnings():  # the report has them all
+        arm = design_from(design, changes, output.unit)
+    options.check_output(out, DESIGN_FILE, output.overwrite)
+    facts = sr.describe(arm)
+    if out is not None:
+        arm.save(out, overwrite=output.overwrite)
+    if output.json:
+        console.json(for_machines(facts.rows, arm.length) | _for_machines(facts))
+        return
+    laws = facts.validity if console.verbose else ()
+    console.line("\n  ".join([f"design {design}", *facts.table.splitlines(), *laws]))
+    for warning in facts.warnings:
+        console.note(f"warning: {warning}")
+
+
+def _for_machines(facts: "sr.rod.DesignSummary") -> dict[str, Any]:
+    arm = facts.arm
+    bundles: Any = {"name": arm.bundle_names, "unit": arm.bundle_units, "bounds": arm.bounds}
+    bundles |= {"strain": facts.bundle_strain, "extension": facts.bundle_extension}
+    bundles |= {"bending_times_R2": facts.bundle_bending}
+    drives = {"name": arm.input_names, "unit": arm.input_units, "bounds": arm.input_bounds}
+    texts = {name: getattr(facts, name) for name in ("lacking", "validity", "warnings")}
+    inputs = {"inputs": _records(drives)} if arm.drives else {}
+    return {**inputs, "activations": _records(bundles), **texts}
+
+
+def _records(columns: dict[str, Any]) -> list[dict[str, Any]]:
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def export(
@@ -57,19 +113,17 @@ def export(
         write(source, out, overwrite, unit)
     elif format is not None and out.suffix != ".jl":
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
-    elif out.suffix == ".jl":
-        options.refuse("on a filament's definition, which has none", activation=activation)
+    elif out.suffix in (".jl", ".xml"):
+        known = (FILAMENT_SCRIPT, write_design, "a filament's definition, which has none", _OTHER)
+        if out.suffix == ".xml":
+            other = "a model, whose controls they are", "for MuJoCo, whose lengths are in m"
+            known = MODEL, write_mujoco, *other
+        formats, write, what, whose = known
+        options.refuse(f"on {what}", activation=activation)
         arm = design_from(source, changes)
-        options.refuse(_OTHER, unit=unit)
-        options.check_output(out, FILAMENT_SCRIPT, overwrite)
-        write_design(arm, out, overwrite=overwrite)
-        console.line(out)
-    elif out.suffix == ".xml":
-        options.refuse("on a model, whose controls they are", activation=activation)
-        arm = design_from(source, changes)
-        options.refuse("for MuJoCo, whose lengths are in m", unit=unit)
-        options.check_output(out, MODEL, overwrite)
-        write_mujoco(arm, out, overwrite=overwrite)
+        options.refuse(whose, unit=unit)
+        options.check_output(out, formats, overwrite)
+        write(arm, out, overwrite=overwrite)
         console.line(out)
     else:
         arm = design_from(source, changes, unit)
@@ -132,12 +186,8 @@ def import_file(
         options.check_output(out, DESIGN_FILE, output.overwrite)
         arm = shown_in(output.unit, read_design(source))
         arm.save(out, overwrite=output.overwrite)
-        rows: Rows = {
-            "length": (arm.length, "m"),
-            "rings": (len(arm.section.rings), ""),
-            "bundle names": (list(arm.bundle_names), ""),
-            "design": (str(out), ""),
-        }
+        rows = fields_of({"length": arm.length, "rings": len(arm.section.rings)}, "length")
+        rows |= fields_of({"bundle names": list(arm.bundle_names), "design": str(out)})
     elif source.suffix != ".csv":
         raise InvalidInput("source", source, "a file name ending in .json or .csv")
     elif design is None:
@@ -148,9 +198,7 @@ def import_file(
         options.check_output(out, CLOUD_STORE, output.overwrite)
         cloud = read_cloud(arm, source, tol=1e-6 if tol is None else tol)
         sr.save_cloud(cloud, out, overwrite=output.overwrite)
-        rows = {
-            "samples": (cloud.sizes["sample"], ""),
-            "largest difference of tips": (float(cloud.attrs["largest_tip_difference"]), "m"),
-            "cloud": (str(out), ""),
-        }
+        rows = fields_of({"samples": cloud.sizes["sample"]})
+        off = float(cloud.attrs["largest_tip_difference"])
+        rows |= {"largest difference of tips": (off, "m"), "cloud": (str(out), "")}
     console.rows(f"{kind} of {source}", rows, output.json, arm)

@@ -1,11 +1,10 @@
 """`softreach demo`, `example`, `list`, `paper`, `doctor`, `warmup`: what to begin with."""
 
-from __future__ import annotations
-
 import os
 import platform
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from itertools import chain
@@ -17,8 +16,8 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import as_read, console
-from softreach.cli.options import UNCHANGED, Changes, Whole, design_from
+from softreach.cli.console import as_read, console, fields_of
+from softreach.cli.options import UNCHANGED, Changes, Overwrite, Place, Whole, design_from
 from softreach.cli.reach import HULL_BYTES, volume_rows
 from softreach.support import parallel
 from softreach.support.arguments import as_one_of
@@ -33,18 +32,16 @@ Kind = Literal[
     "designs", "examples", "materials", "actuators", "metrics", "objectives", "parameters"
 ]
 Table = Iterator[tuple[Any, ...]]  # names of the columns, then rows
-_FILES = {
-    "tentacle": ("tentacle.toml", "tentacle.csv"),
-    "three_fibers": ("three_fibers.toml", "five_places.toml"),
-    "tendon_arm": ("tendon_arm.toml", "tendon_arm.sh", "requirement_check.py"),
-    "spine": ("spine.toml", "magnets.py", "own_actuator.sh"),
-}
+_FILES = {"tentacle": ("tentacle.toml", "tentacle.csv")}
+_FILES |= {"three_fibers": ("three_fibers.toml", "five_places.toml")}
+_FILES |= {"tendon_arm": ("tendon_arm.toml", "tendon_arm.sh", "requirement_check.py")}
+_FILES |= {"spine": ("spine.toml", "magnets.py", "own_actuator.sh")}
 
 
 def demo(
     *,
     n: Annotated[Whole, Parameter(name=("--n", "-n"))] = 400_000,
-    out: Annotated[Path, options.OUT] = Path("out"),
+    out: Place = Path("out"),
     output: options.Output = options.DEFAULT,
 ) -> None:
     """Start here: cloud, volumes and picture of the paper's design.
@@ -89,13 +86,7 @@ def demo(
     console.rows("minimal trunk, revolution 108°, taper 2°", rows, output.json, arm)
 
 
-def example(
-    name: str,
-    /,
-    *,
-    out: Annotated[Path, options.OUT] = Path(),
-    overwrite: options.Overwrite = False,
-) -> None:
+def example(name: str, /, *, out: Place = Path(), overwrite: Overwrite = False) -> None:
     """Write an example here: a design and the data and scripts that go with it.
 
     softreach list examples prints their names, designs of the gallery among them.
@@ -117,9 +108,7 @@ def example(
 
 def examples() -> dict[str, tuple[Path, ...]]:
     """The files of each example by its name."""
-    known = {
-        name: tuple(_folder("examples") / file for file in files) for name, files in _FILES.items()
-    }
+    known = {name: tuple(_folder("examples") / x for x in files) for name, files in _FILES.items()}
     return known | {file.stem: (file,) for file in sorted(_folder("designs").glob("*.toml"))}
 
 
@@ -213,7 +202,7 @@ def _objectives() -> Table:
         yield one.name, one.unit, one.asks, "yes" if one.smooth else "no", one.meaning
 
 
-def _parameters(arm: sr.Manipulator) -> Table:
+def _parameters(arm: "sr.Manipulator") -> Table:
     from softreach.arm.parameters import parameters, written_name
 
     yield "parameter", "value", "unit", "symbol", "meaning"
@@ -222,22 +211,11 @@ def _parameters(arm: sr.Manipulator) -> Table:
         yield written_name(name, one.unit), value, unit, one.symbol, one.meaning
 
 
-_TABLES = {
-    "designs": _designs,
-    "examples": _examples,
-    "materials": _materials,
-    "actuators": _actuators,
-    "metrics": _metrics,
-    "objectives": _objectives,
-}
+_TABLES = {"designs": _designs, "examples": _examples, "materials": _materials}
+_TABLES |= {"actuators": _actuators, "metrics": _metrics, "objectives": _objectives}
 
 
-def paper(
-    *,
-    quick: bool = False,
-    out: Annotated[Path, options.OUT] = Path("paper"),
-    overwrite: options.Overwrite = False,
-) -> None:
+def paper(*, quick: bool = False, out: Place = Path("paper"), overwrite: Overwrite = False) -> None:
     """Recompute the paper's figures and statements into a report.
 
     The same command continues after an interruption.
@@ -368,23 +346,15 @@ def doctor(*, json: options.AsJson = False) -> None:
     names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
     has_screen = platform.system() in ("Windows", "Darwin")
     has_screen = has_screen or bool({"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ})
-    rows = {
-        "softreach": (sr.__version__, ""),
-        "installed in": (str(Path(sr.__file__).parent), ""),
-        "Python": (platform.python_version(), ""),
-        "system": (platform.platform(), ""),
-        "cores": (os.cpu_count(), ""),
-        "threads used": (parallel.thread_count(), ""),
-        "free memory": (round(free_memory() / 1e9, 1), "GB"),
-        "kernels are kept in": (kept, ""),
-        "screen": ("yes" if has_screen else "none: headless", ""),
-    }
-    rows |= {name: (_version(name), "") for name in names if name != "softreach"}
+    named = {"softreach": sr.__version__, "installed in": str(Path(sr.__file__).parent)}
+    named |= {"Python": platform.python_version(), "system": platform.platform()}
+    named |= {"cores": os.cpu_count(), "threads used": parallel.thread_count()}
+    rows = fields_of(named) | {"free memory": (round(free_memory() / 1e9, 1), "GB")}
+    screen = "yes" if has_screen else "none: headless"
+    rows |= fields_of({"kernels are kept in": kept, "screen": screen})
+    for name in names:
+        if name != "softreach":
+            rows[name] = "not installed", ""
+            with suppress(PackageNotFoundError):
+                rows[name] = version(name), ""
     console.rows("this machine and this installation", rows, json)
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"

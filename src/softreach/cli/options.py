@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Group, Parameter, Token
 
@@ -21,14 +21,11 @@ from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, R
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
 from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.lazy import Dataset
 from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 _POSTURES = {"upright": "up", "hanging": "down"}  # words for the way that a base points
-_MATTER = {"young_modulus": "1MPa", "density": "1000kg/m3"}
-"""Examples of what loads need to know of a material."""
+_MATTER = {"young_modulus": "1MPa", "density": "1000kg/m3"}  # what loads need to know
 
 
 def read_as(
@@ -71,12 +68,10 @@ def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, 
 
 
 OUTPUT = Group("Output options", sort_key=3)
-OUT = Parameter(name=("--out", "-o"), group=OUTPUT)
-"""The one name of the file or folder that a command writes."""
+OUT = Parameter(name=("--out", "-o"), group=OUTPUT)  # the file or folder that is written
 
 _MOST_TARGETS = 64 * MEGABYTE  # a million targets
-STORED = "on a stored cloud: give the design instead"
-"""Where changes of a design and options of sampling have no effect."""
+STORED = "on a stored cloud: give the design instead"  # no changes, no sampling there
 
 
 def _output(help: str, name: str | None = None) -> Parameter:
@@ -97,9 +92,9 @@ Device = Literal["cpu", "cuda"]
 Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
+Place = Annotated[Path, OUT]
 View = Annotated[str | None, _output("View: oblique (if left out), front, side, top.")]
-Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]
-"""Text that may begin with a minus."""
+Signed = Annotated[str | None, Parameter(allow_leading_hyphen=True)]  # May begin with a minus
 
 
 @Parameter(name="*")
@@ -208,11 +203,9 @@ class Changes:
         loads = (arm.loads or sr.Loads()).replace(**new)
         if not keep and loads == sr.Loads(gravity=GRAVITIES["none"]):
             return arm.replace(loads=None)
-        lacking = {
-            fault.path: _MATTER[field]
-            for fault in loads.section_faults(arm.section, arm.length)
-            if (field := fault.path.rpartition(".")[2]) in _MATTER
-        }
+        faults = loads.section_faults(arm.section, arm.length)
+        named = ((fault.path, fault.path.rpartition(".")[2]) for fault in faults)
+        lacking = {path: _MATTER[field] for path, field in named if field in _MATTER}
         if lacking:
             options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
             needed = " and ".join(lacking)
@@ -321,7 +314,7 @@ def is_stored(source: str) -> bool:
 
 def cloud_of(
     source: str, sampling: Sampling, changes: Changes, unit: str | None
-) -> tuple[xr.Dataset, sr.Manipulator]:
+) -> tuple[Dataset, sr.Manipulator]:
     """The stored cloud, or one of the design; its design."""
     if is_stored(source):
         refuse(STORED, **changes.given, **vars(sampling))
@@ -334,7 +327,7 @@ def cloud_of(
 
 def points_of(
     source: str, sampling: Sampling, changes: Changes, unit: str | None
-) -> tuple[xr.Dataset, LengthUnit]:
+) -> tuple[Dataset, LengthUnit]:
     """The points of a file, which have no design, and the unit to print them in."""
     refuse("on points, which have no design", **changes.given, **vars(sampling))
     points = sr.exchange.read_points(source, unit=unit)
@@ -363,7 +356,7 @@ def activation_of(text: str | None, arm: sr.Manipulator, name: str = "activation
     raise InvalidInput(name, text, allowed)
 
 
-def shape_of(text: str | None, arm: sr.Manipulator) -> xr.Dataset:
+def shape_of(text: str | None, arm: sr.Manipulator) -> Dataset:
     """The arm as activations bend it, which must leave it a shape."""
     import numpy as np
 

@@ -1,9 +1,6 @@
 """`softreach solve`, `track` and `equilibria`: activations that lead to places, and back."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Annotated
 
 import softreach as sr
 from softreach.cli import options
@@ -82,7 +79,7 @@ def track(
     *,
     start: Signed = None,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, options.OUT] = Path("activations.csv"),
+    out: options.Place = Path("activations.csv"),
     overwrite: options.Overwrite = False,
     unit: options.Unit = None,
 ) -> None:

@@ -1,7 +1,5 @@
 """`softreach reach`, `payload`, `gradient`; `cloud`, `volume`, `show`: exact sets, and samples."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -10,7 +8,7 @@ from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
-from softreach.cli.console import as_read, console, rows_of
+from softreach.cli.console import as_read, console, fields_of, rows_of
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, read_mass
 from softreach.support import progress
 from softreach.support.arguments import as_number
@@ -88,7 +86,7 @@ def _is_drawn(path: Path) -> bool:
 
 def _write(
     reached: sr.workspace.ReachableSet,
-    arm: sr.Manipulator,
+    arm: "sr.Manipulator",
     path: Path,
     at: list[float] | None,
     overwrite: bool,
@@ -143,11 +141,8 @@ def payload(
         curve = sr.payload_curve(arm, masses, accuracy=accuracy, progress=step)
         largest = curve.largest_payload(share)
     rows = rows_of(curve.to_dataset())
-    rows |= {
-        "share to keep": (share, ""),
-        "largest payload": (largest.payload, "kg"),
-        f"largest payload{ERROR}": (largest.payload_error, "kg"),
-    }
+    rows |= {"share to keep": (share, ""), "largest payload": (largest.payload, "kg")}
+    rows[f"largest payload{ERROR}"] = largest.payload_error, "kg"
     console.rows(f"payload of {design}", rows, output.json, arm)
     if arm.loads.payload and not output.json:
         console.line(f"  they take the place of the design's own payload, {arm.loads.payload:g} kg")
@@ -225,22 +220,16 @@ def cloud(
     dataset = sr.compute_cloud(arm, **arguments, tol=tol, device=device)
     seconds = perf_counter() - start
     sr.save_cloud(dataset, out, overwrite=output.overwrite)
-    rows: Rows = {
-        "samples": (arguments["n"], ""),
-        "sampler": (arguments["sampler"], ""),
-        "seed": (arguments["seed"], ""),
-        "steps per arm": (sr.rod.as_tip_map(arm, tol).steps, ""),
-        "device": (dataset.attrs["device"], ""),
-        "time to compute": (round(seconds, 3), "s"),
-        **load_rows(arm),
-        **{
-            status.name.lower().replace("_", " "): (int((dataset.status == status).sum()), "")
-            for status in (sr.rod.TipStatus if "status" in dataset else ())
-        },
-        "highest tip": (float(dataset.tip[:, 2].max()), "m"),
-        "lowest tip": (float(dataset.tip[:, 2].min()), "m"),
-        "cloud": (str(out), ""),
-    }
+    named = {"samples": arguments["n"], "sampler": arguments["sampler"], "seed": arguments["seed"]}
+    named |= {"steps per arm": sr.rod.as_tip_map(arm, tol).steps}
+    rows = fields_of(named | {"device": dataset.attrs["device"]})
+    rows |= {"time to compute": (round(seconds, 3), "s"), **load_rows(arm)}
+    for status in sr.rod.TipStatus if "status" in dataset else ():
+        count = int((dataset.status == status).sum())
+        rows[status.name.lower().replace("_", " ")] = count, ""
+    heights = dataset.tip[:, 2]
+    rows |= {"highest tip": (float(heights.max()), "m"), "lowest tip": (float(heights.min()), "m")}
+    rows["cloud"] = str(out), ""
     console.rows(f"cloud of {design}", rows, output.json, arm)
 
 
@@ -299,16 +288,11 @@ def volume(
 def volume_rows(concave: sr.volume.Hull, convex: sr.volume.Hull) -> Rows:
     """The size of a cloud and the trust that it deserves."""
     share = 1 - concave.volume / convex.volume if convex.volume else None
-    return {
-        "points": (concave.n, ""),
-        "alpha": (concave.alpha, "m"),
-        "mean spacing": (concave.spacing, "m"),
-        "regions": (concave.regions, ""),
-        "volume": (concave.volume, "m³"),
-        "volume without sampling bias (estimate)": (concave.volume_corrected, "m³"),
-        "convex volume": (convex.volume, "m³"),
-        "unreachability": (share, ""),
-    }
+    rows: Rows = {"points": (concave.n, ""), "alpha": (concave.alpha, "m")}
+    rows |= {"mean spacing": (concave.spacing, "m"), "regions": (concave.regions, "")}
+    rows["volume"] = concave.volume, "m³"
+    rows["volume without sampling bias (estimate)"] = concave.volume_corrected, "m³"
+    return rows | {"convex volume": (convex.volume, "m³"), "unreachability": (share, "")}
 
 
 def show(
@@ -319,7 +303,7 @@ def show(
     activation: options.Activation = None,
     sampling: options.Sampling = options.SAMPLING,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, options.OUT] = Path("cloud.png"),
+    out: options.Place = Path("cloud.png"),
     overwrite: options.Overwrite = False,
     unit: options.Unit = None,
 ) -> None:

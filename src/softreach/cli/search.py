@@ -1,7 +1,5 @@
 """`softreach check` and `search`: a design against what it is for, and designs that meet it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import partial
@@ -67,12 +65,10 @@ def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
     fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
     fields["direction_errors"] = to_degrees(result.direction_errors), "deg"
-    return {
-        **for_machines(fields, result.arm.length),
-        "findings": [{**vars(each), "met": each.met} for each in result.findings],
-        "payloads_kg": result.payloads,
-        "coverages": [coverage._asdict() for coverage in result.coverages],
-    }
+    known: Any = {"payloads_kg": result.payloads}
+    known |= {"findings": [{**vars(each), "met": each.met} for each in result.findings]}
+    known |= {"coverages": [coverage._asdict() for coverage in result.coverages]}
+    return for_machines(fields, result.arm.length) | known
 
 
 def search(
@@ -91,7 +87,7 @@ def search(
     sampler: Annotated[str | None, Parameter(group=_ASKED)] = None,
     polish: Annotated[bool | None, Parameter(negative="--no-polish", group=_ASKED)] = None,
     storage: Path | None = None,
-    out: Annotated[Path, options.OUT] = Path("best"),
+    out: options.Place = Path("best"),
     output: options.Output = options.DEFAULT,
 ) -> int:
     """Search for the best designs that meet requirements.
@@ -168,31 +164,22 @@ class _Watch:
         return "searching" + f", best misses {self._excess:.3g}" * math.isfinite(self._excess)
 
 
-def _found(result: sr.optimization.Search, out: Path) -> dict[str, Any]:
-    """The result for machines: SI units, angles in degrees."""
+def _found(result: "sr.optimization.Search", out: Path) -> dict[str, Any]:
+    front = []
+    for each in result.front:
+        known = {"excess": each.excess, "missed": dict(each.missed), "fault": each.fault}
+        pairs = zip(result.goals, each.objectives, strict=bool(each.objectives))
+        known["objectives"] = [
+            {"objective": goal.name, **value._asdict(), "unit": goal.objective.unit}
+            for goal, value in pairs
+        ]
+        known["parameters"] = []
+        for p in result.problem.parameters.free:
+            value = each.values[p.name]
+            read, unit = (value, "") if isinstance(value, str) else as_read(value, p.unit)
+            known["parameters"].append({"parameter": p.name, "value": read, "unit": unit})
+        front.append(known)
     names = ("met", "verdict", "restarts", "designs", "judged", "seconds", "at_ends")
-    return {
-        **{name: getattr(result, name) for name in names},
-        "front": [_design(result, each) for each in result.front],
-        "findings": [{**vars(each), "met": each.met} for each in result.findings],
-        "folder": str(out),
-    }
-
-
-def _design(result: sr.optimization.Search, each: sr.optimization.Candidate) -> dict[str, Any]:
-    parameters = []
-    for parameter in result.problem.parameters.free:
-        value = each.values[parameter.name]
-        read, unit = (value, "") if isinstance(value, str) else as_read(value, parameter.unit)
-        parameters.append({"parameter": parameter.name, "value": read, "unit": unit})
-    objectives = [
-        {"objective": goal.name, **value._asdict(), "unit": goal.objective.unit}
-        for goal, value in zip(result.goals, each.objectives, strict=bool(each.objectives))
-    ]
-    return {
-        "objectives": objectives,
-        "parameters": parameters,
-        "excess": each.excess,
-        "missed": dict(each.missed),
-        "fault": each.fault,
-    }
+    findings = [{**vars(each), "met": each.met} for each in result.findings]
+    named = {name: getattr(result, name) for name in names}
+    return {**named, "front": front, "findings": findings, "folder": str(out)}

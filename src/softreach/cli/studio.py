@@ -1,7 +1,5 @@
 """`softreach studio`: the design desk in the browser."""
 
-from __future__ import annotations
-
 import secrets
 import warnings
 import webbrowser
@@ -93,16 +91,14 @@ def _write_static(
         raise NotPossible("give a slider of the page with --vary, such as --vary taper_deg=0:3:8")
     space = grid_of(design_from(source), vary)
     with progress.bar("computing designs", space.size) as step:
-        title = Path(source).stem
-        written = write_static(
-            space, folder, unit=unit, title=title, overwrite=overwrite, progress=step
-        )
+        how = {"title": Path(source).stem, "overwrite": overwrite, "progress": step}
+        written = write_static(space, folder, unit=unit, **how)
     gaps = f", {counted(written.gaps, 'gap')}" if written.gaps else ""
     console.line(str(written.page))
     console.line(f"{counted(written.designs, 'design')}{gaps}, {written.size / 1e6:.1f} MB")
 
 
-def begun(source: str, *, fresh: bool) -> tuple[Start, KeptWork]:
+def begun(source: str, *, fresh: bool) -> "tuple[Start, KeptWork]":
     """What is shown first, and the work that is kept; a state or a cloud is shown as it is."""
     from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 

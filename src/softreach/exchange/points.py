@@ -1,12 +1,10 @@
 """Points of other programs and of measurements: places, without a design."""
 
-from __future__ import annotations
-
 import io
 import re
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +13,8 @@ from softreach.support.arguments import as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, MissingExtra, check_installed
 from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.lazy import Dataset
 from softreach.support.units import as_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["read_points"]
 
@@ -29,7 +25,7 @@ _COLUMN = re.compile(r"(?:tip|position|point)?[ _]*([xyz])(?:[ _]*[\[(]?(m|cm|mm
 """Column of a table with its unit: x, x_mm, x [mm], tip_x (mm)."""
 
 
-def read_points(path: str | PathLike[str], *, unit: str | None = None) -> xr.Dataset:
+def read_points(path: str | PathLike[str], *, unit: str | None = None) -> Dataset:
     """Read points as a cloud that has no activations, for hulls, volumes and figures.
 
     CSV may have a header, whose columns x, y and z may name their unit (x_mm, "x [mm]"), or three

@@ -1,7 +1,5 @@
 """Clouds, hulls and arms in other programs' file formats; the suffix of the path chooses."""
 
-from __future__ import annotations
-
 from softreach.export.clouds import cloud_table, export_cloud
 from softreach.export.surfaces import export_arm, export_mesh
 

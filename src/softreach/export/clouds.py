@@ -1,7 +1,5 @@
 """Clouds for other programs: tips and activations of all samples, in every format."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -9,8 +7,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from io import BufferedWriter
 from itertools import chain, count
-from os import PathLike
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +17,11 @@ from softreach.schema import a_cloud, activation_units
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.atomic import StrPath
+from softreach.support.files.formats import FileFormat
+from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.palette import activation_colors
 from softreach.support.units import METER, LengthUnit, as_unit
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 _BLOCK = 1 << 18
 _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
@@ -58,7 +53,7 @@ class CloudTable(NamedTuple):
             yield slice(start, start + _BLOCK)
 
 
-def cloud_table(cloud: xr.Dataset) -> pd.DataFrame:
+def cloud_table(cloud: Dataset) -> DataFrame:
     """A cloud as a tidy table of pandas: one row a sample, as in the files of `export_cloud`.
 
     The columns are x, y, z [m], one activation per bundle such as ``gamma_left``, and of arms under
@@ -79,7 +74,7 @@ def cloud_table(cloud: xr.Dataset) -> pd.DataFrame:
     return table
 
 
-def arrays_of(cloud: xr.Dataset, unit: LengthUnit = METER) -> CloudTable:
+def arrays_of(cloud: Dataset, unit: LengthUnit = METER) -> CloudTable:
     """The arrays and the description of a cloud, with its tips in a unit."""
     tip, activation = cloud["tip"], cloud["activation"]
     names = range(1, activation.sizes["bundle"] + 1)
@@ -115,11 +110,7 @@ def column_names(bundles: Sequence[str]) -> list[str]:
 
 
 def export_cloud(
-    cloud: xr.Dataset,
-    path: str | PathLike[str],
-    *,
-    unit: str | LengthUnit = "m",
-    overwrite: bool = False,
+    cloud: Dataset, path: StrPath, *, unit: str | LengthUnit = "m", overwrite: bool = False
 ) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat or .vtu, chosen by the suffix.
 
@@ -152,14 +143,14 @@ def export_cloud(
     write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite)
 
 
-def path_csv(found: xr.Dataset) -> str:
+def path_csv(found: Dataset) -> str:
     """Activations and tip errors [m] at the points that `track_path` found, as lines of CSV."""
     names = [*column_names(found["bundle"].values.astype(str).tolist()), "tip_error_m"]
     rows = np.column_stack([found.activation.values, found.tip_error.values]).tolist()
     return "\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in rows), ""])
 
 
-def _length(cloud: xr.Dataset) -> float | None:
+def _length(cloud: Dataset) -> float | None:
     length = cloud["tip"].attrs.get("length") if "tip" in cloud else None
     return None if length is None else float(length)
 
@@ -180,9 +171,8 @@ def _write_csv(table: CloudTable, file: BufferedWriter) -> None:
         return
     frame = import_module("pandas").DataFrame  # the same numbers, more slowly
     for rows in table.blocks():
-        frame(table.columns(rows, suffix)).to_csv(
-            file, index=False, header=not rows.start, na_rep="nan"
-        )
+        options = {"index": False, "header": not rows.start, "na_rep": "nan"}
+        frame(table.columns(rows, suffix)).to_csv(file, **options)
 
 
 def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
@@ -192,11 +182,8 @@ def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
 
 def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str = "") -> None:
     pa, units = import_module("pyarrow"), [table.unit.name] * 3 + [*table.units, "1"]
-    kinds = zip(table.columns(slice(0), suffix).items(), units, strict=False)
-    fields = [
-        pa.field(name, pa.from_numpy_dtype(values.dtype), metadata={"units": unit})
-        for (name, values), unit in kinds
-    ]
+    own = zip(table.columns(slice(0), suffix).items(), units, strict=False)
+    fields = [pa.field(x, pa.from_numpy_dtype(v.dtype), metadata={"units": u}) for (x, v), u in own]
     schema = pa.schema(fields, metadata={key: str(v) for key, v in table.metadata.items()})
     with writer_of(schema=schema) as writer:
         for rows in table.blocks():
@@ -231,11 +218,7 @@ def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
     write_vtu(file, table.tip, cells, compression=None, point_data=data)
 
 
-CLOUD_FILES: Formats = {
-    ".ply": FileFormat(write=_write_ply),
-    ".csv": FileFormat(write=_write_csv),
-    ".parquet": FileFormat(("pyarrow",), _write_parquet),
-    ".npz": FileFormat(write=_write_npz),
-    ".mat": FileFormat(write=_write_mat),
-    ".vtu": FileFormat(("meshio",), _write_vtu),
-}
+CLOUD_FILES = {".ply": FileFormat(write=_write_ply), ".csv": FileFormat(write=_write_csv)}
+CLOUD_FILES |= {".parquet": FileFormat(("pyarrow",), _write_parquet)}
+CLOUD_FILES |= {".npz": FileFormat(write=_write_npz), ".mat": FileFormat(write=_write_mat)}
+CLOUD_FILES |= {".vtu": FileFormat(("meshio",), _write_vtu)}

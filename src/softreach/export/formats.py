@@ -1,26 +1,21 @@
 """Writers that clouds and surfaces share."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from io import BufferedWriter
-from os import PathLike
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.support.files.atomic import writing
+from softreach.support.files.atomic import StrPath, writing
 from softreach.support.files.formats import Formats, format_of
 
 _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
 
-def write_by_suffix(
-    path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool
-) -> None:
+def write_by_suffix(path: StrPath, formats: Formats, content: Any, *, overwrite: bool) -> None:
     """Write the content whole, or leave what was there."""
     write = format_of(path, formats).write
     assert write is not None
@@ -57,7 +52,9 @@ def write_ply(
         if number == 0:
             header = ["ply", "format binary_little_endian 1.0"]
             for key, value in description.items():
-                header += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
+                for x in str(value).splitlines():  # in ASCII; TOML means the same by \\uXXXX
+                    own = [c if c.isascii() else f"\\u{ord(c):04x}" for c in x if c.isprintable()]
+                    header.append(f"comment {key}: {''.join(own)}")
             header.append(f"element vertex {count}")
             header += [f"property {_TYPES[kind.str[1:]]} {name}" for name, kind in fields]
             if faces is not None:
@@ -68,8 +65,3 @@ def write_ply(
         triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
         triangles["count"], triangles["corners"] = 3, faces
         file.write(triangles.data)
-
-
-def _ascii(text: str) -> str:
-    r"""A PLY header is ASCII; a TOML string means the same with its letters as \\uXXXX."""
-    return "".join(c if c.isascii() else f"\\u{ord(c):04x}" for c in text if c.isprintable())

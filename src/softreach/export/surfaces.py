@@ -1,13 +1,11 @@
 """Surfaces and arms for other programs: parts with a name and a color."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Sequence
 from importlib import import_module
 from io import BufferedWriter
 from os import PathLike
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -21,12 +19,10 @@ from softreach.schema import a_configuration
 from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
-from softreach.support.files.formats import FileFormat, Formats
+from softreach.support.files.formats import FileFormat
+from softreach.support.lazy import Dataset
 from softreach.support.palette import BODY, Color, bundle_color
 from softreach.support.units import LengthUnit, as_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 _CORE_3MF = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
@@ -113,7 +109,7 @@ def _write_parts(parts: Sequence[Part], path: str, unit: LengthUnit, *, overwrit
 
 def export_arm(
     arm: Manipulator,
-    configuration: xr.Dataset,
+    configuration: Dataset,
     path: str | PathLike[str],
     *,
     sides: int = 64,
@@ -240,11 +236,7 @@ def _colors(part: Part) -> NDArray[np.uint8]:
     return np.tile(color, (len(part.vertices), 1))
 
 
-SURFACE_FILES: Formats = {
-    ".ply": FileFormat(write=_write_ply),
-    ".stl": FileFormat(("trimesh",), _write_stl),
-    ".obj": FileFormat(("trimesh",), _write_obj),
-    ".glb": FileFormat(("trimesh",), _write_glb),
-    ".3mf": FileFormat(write=_write_3mf),
-    ".vtu": FileFormat(("meshio",), _write_vtu),
-}
+_BY_TRIMESH = {".stl": _write_stl, ".obj": _write_obj, ".glb": _write_glb}
+SURFACE_FILES = {".ply": FileFormat(write=_write_ply)}
+SURFACE_FILES |= {x: FileFormat(("trimesh",), write) for x, write in _BY_TRIMESH.items()}
+SURFACE_FILES |= {".3mf": FileFormat(write=_write_3mf), ".vtu": FileFormat(("meshio",), _write_vtu)}

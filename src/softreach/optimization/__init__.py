@@ -9,20 +9,6 @@ from softreach.optimization.tolerance import TargetTolerance, Tolerance, toleran
 from softreach.support.report import Report
 from softreach.workspace.measure import Estimate
 
-__all__ = [
-    "OBJECTIVES",
-    "Candidate",
-    "Estimate",
-    "Multiplier",
-    "Objective",
-    "Report",
-    "Search",
-    "Sensitivity",
-    "Spread",
-    "TargetTolerance",
-    "Tolerance",
-    "VarianceShares",
-    "search",
-    "sensitivity",
-    "tolerance",
-]
+__all__ = ["OBJECTIVES", "Candidate", "Estimate", "Multiplier", "Objective", "Report", "Search"]
+__all__ += ["Sensitivity", "Spread", "TargetTolerance", "Tolerance", "VarianceShares", "search"]
+__all__ += ["sensitivity", "tolerance"]

@@ -1,13 +1,12 @@
 """Deviations of arms as they are made, and their effect to first order: theory (99)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
+from scipy.special import ndtr
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters, shifted
@@ -129,16 +128,11 @@ class Spread:
         off = math.sqrt(self.level * (1.0 - self.level) / count)
         levels = np.clip([self.level - off, self.level, self.level + off], 0.0, 1.0)
         low, quantile, high = np.quantile(values, levels).tolist()
-        return replace(
-            self,
-            made=count,
-            made_mean=mean,
-            made_error=math.hypot(deviation / math.sqrt(count), error),
-            made_deviation=deviation,
-            deviation_error=math.sqrt(spread),
-            made_quantile=quantile,
-            quantile_error=math.hypot(0.5 * (high - low), error),
-        )
+        numbers = {"made_mean": mean, "made_deviation": deviation, "made_quantile": quantile}
+        errors = {"made_error": math.hypot(deviation / math.sqrt(count), error)}
+        errors |= {"deviation_error": math.sqrt(spread)}
+        errors |= {"quantile_error": math.hypot(0.5 * (high - low), error)}
+        return replace(self, made=count, **numbers, **errors)
 
     def __str__(self) -> str:
         scale, unit = (100.0, "%") if self.unit == "1" else (1.0, self.unit.replace("m3", "m³"))
@@ -220,8 +214,6 @@ class FirstOrder:
 
     def probability(self, target: Target) -> Array:
         """Φ(depth / σ) of each place under the worst payload: 0 or 1 where nothing moves."""
-        from scipy.special import ndtr
-
         within, each = max(target.within, TOL * self.solid.arm.length), []
         for depth, speed in self.depths(target.points, within):
             sigma = np.linalg.norm(speed * self.deviations.sigmas, axis=1)

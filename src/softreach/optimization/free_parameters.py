@@ -218,9 +218,8 @@ def _choice(
                 _CHOICES[name](arm, value)
         elif isinstance(value, bool) or not isinstance(value, int | float):
             raise InvalidInput(f"choices {name}", as_given(value), "numbers")
-    return FreeParameter(
-        name=name, unit="1" if name in _CHOICES else known[name].unit, choices=picks
-    )
+    unit = "1" if name in _CHOICES else known[name].unit
+    return FreeParameter(name=name, unit=unit, choices=picks)
 
 
 def _tie(known: Mapping[str, Parameter], free: list[str], name: str, text: str) -> Tie:

@@ -35,13 +35,10 @@ def can_polish(problem: Problem) -> bool:
     """True of problems with numbers that can change a little, and goals with derivatives."""
     needs = problem.requirements
     of_poses = needs.keeps or needs.limits.of_poses
-    return (
-        not (needs.regions and of_poses)  # what is covered depends on poses at countless places
-        and not needs.goals.directed.any()
-        and len(problem.parameters.real) > 0
-        and len(needs.places) * max(1, len(needs.payloads)) <= _MOST_POSES
-        and all(goal.objective.smooth for goal in problem.goals)
-    )
+    covered = needs.regions and of_poses  # which depends on poses at countless places
+    few = len(needs.places) * max(1, len(needs.payloads)) <= _MOST_POSES
+    smooth = all(goal.objective.smooth for goal in problem.goals) and not needs.goals.directed.any()
+    return not covered and few and smooth and len(problem.parameters.real) > 0
 
 
 @parallel.undivided()
@@ -109,7 +106,6 @@ class _Program:
     _like: Sequence[TipMap] = ()
 
     def begin(self) -> Array:
-        """Unknowns of the start."""
         parameters = self.problem.parameters
         low, high = parameters.bounds.T
         reals = (parameters.reals(self.start.values) - low) / (high - low)

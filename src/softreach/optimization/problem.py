@@ -34,8 +34,7 @@ SETS = {f"exact_{name}": name for name in ("volume", "convex_volume", "unreachab
 """Goals and measures of the reachable set, and what they are called there."""
 NEAR = 0.1  # Relative distance within which objectives at the ends of polishes agree
 Names = str | Metric | Sequence[str | Metric]
-Fidelity = Literal["bounds", "coarse", "full"]
-"""A design is judged by bounds alone, on coarse sets, or to the accuracy that is reported."""
+Fidelity = Literal["bounds", "coarse", "full"]  # By bounds alone, on coarse sets, as reported
 _COARSE, _FINE = 1 << 12, 1 << 15  # samples of the cloud of coarse and of fine cases
 _RADIUS = 0.1  # of neighbors for D̄, in L
 _SHARE = 0.8  # of the volume, that the payload leaves
@@ -220,8 +219,7 @@ _OBJECTIVES = (
     Objective("mass", "kg", "mass of the arm", lambda case: Estimate(mass(case.arm), 0.0)),
     Objective("actuators", "1", "number of inputs", lambda case: Estimate(case.arm.inputs, 0.0)),
 )
-OBJECTIVES = {each.name: each for each in _OBJECTIVES}
-"""Objectives by name, beside the metrics of the atlas."""
+OBJECTIVES = {each.name: each for each in _OBJECTIVES}  # beside the metrics of the atlas
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,14 +274,11 @@ class Problem:
     @cached_property
     def digest(self) -> str:
         """Fingerprint of all that decides what a design is worth."""
-        parameters = self.parameters
-        record = {
-            "bases": {name: arm.to_toml() for name, arm in parameters.bases.items()},
-            "free": [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free],
-            "ties": [[t.name, t.of, t.factor, t.constant] for t in parameters.ties],
-            "requirements": self.requirements.to_toml(),
-            "goals": [[goal.name, goal.sense] for goal in self.goals],
-        }
+        parameters, goals = self.parameters, [[goal.name, goal.sense] for goal in self.goals]
+        record: Any = {"bases": {name: arm.to_toml() for name, arm in parameters.bases.items()}}
+        record["free"] = [[p.name, p.low, p.high, [*p.choices]] for p in parameters.free]
+        record["ties"] = [[t.name, t.of, t.factor, t.constant] for t in parameters.ties]
+        record |= {"requirements": self.requirements.to_toml(), "goals": goals}
         text = json.dumps(record, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -1,15 +1,12 @@
 """Result of a search: the best designs with their numbers, and all that was judged."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -22,18 +19,15 @@ from softreach.requirements.checks import Check
 from softreach.requirements.findings import Finding, Verdict
 from softreach.schema import provenance
 from softreach.support.arguments import as_flag, as_path
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, over
 from softreach.support.errors import SoftreachError, check_installed, counted
-from softreach.support.files.atomic import check_place
+from softreach.support.files.atomic import StrPath, check_place
 from softreach.support.files.text import write_table, write_text
+from softreach.support.lazy import DataFrame, Dataset
 from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit, as_unit, readable, readable_unit
 from softreach.support.versions import versions
 from softreach.workspace.measure import Estimate
-
-if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
 
 _AT_END = 1e-3  # of a range
 _FOUND = "# Found by a search of softreach"
@@ -139,11 +133,11 @@ class Search(Reported):
         """Version, objectives and numbers of designs behind the result."""
         judged = ", ".join(f"{count} {word}" for word, count in self.judged.items())
         goals = [f"{'max' if goal.sense > 0 else 'min'}imize {goal.name}" for goal in self.goals]
-        return {
-            "softreach_version": str(versions()["softreach_version"]),
-            "objectives": ", ".join(goals) or "none",
-            "designs": f"{self.designs}, judged by {judged}",
-            "accuracy": f"{self.problem.accuracy:g}, on the way {self.problem.coarse:g}",
+        about = {"softreach_version": str(versions()["softreach_version"])}
+        about |= {"objectives": ", ".join(goals) or "none"}
+        about |= {"designs": f"{self.designs}, judged by {judged}"}
+        about |= {"accuracy": f"{self.problem.accuracy:g}, on the way {self.problem.coarse:g}"}
+        return about | {
             "sampler": self.sampler,
             "seed": str(self.seed),
             "digest": self.problem.digest,
@@ -154,7 +148,7 @@ class Search(Reported):
         """Objectives with their senses."""
         return self.problem.goals
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """All designs over `design`: those on the way in their order, then those at full accuracy.
 
         Values over `parameter`, where a choice counts from 0, and over `objective`; `front` says
@@ -162,38 +156,34 @@ class Search(Reported):
         """
         import xarray as xr
 
-        every, free = self.every, self.problem.parameters.free
-        goals, arm, numbers = self.goals, self.shown, self._numbers(self.every)
-        shown = {"length": arm.length, "display_unit": arm.display_unit or ""}
+        every, free, goals = self.every, self.problem.parameters.free, self.goals
+        arm, numbers = self.shown, self._numbers(every)
+        about = {**provenance(arm), "length": arm.length, "display_unit": arm.display_unit or ""}
+        about |= {**self.provenance, "finalists": len(self.finalists)}
         places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
         coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
-        values = [[p.number(each.values[p.name]) for p in free] for each in every]
         looked_at = np.cumsum([each.designs for each in self.candidates], dtype=int)
-        return xr.Dataset(
-            {
-                "value": (("design", "parameter"), np.array(values)),
-                "objective_value": (("design", "objective"), numbers[..., 0]),
-                "objective_error": (("design", "objective"), numbers[..., 1]),
-                "excess": ("design", [each.excess for each in every], {"units": "1"}),
-                "feasible": ("design", [each.is_feasible for each in every]),
-                "front": ("design", [self._is_in_front(each) for each in every]),
-                "fidelity": ("design", np.array([each.fidelity for each in every], dtype=str)),
-                "looked_at": ("design", [*looked_at, *[self.designs] * len(self.finalists)]),
-                "coarse_design": ("design", [-1] * len(self.candidates) + coarse),
-                "fault": ("design", np.array([each.fault for each in every], dtype=str)),
-            },
-            {
-                "parameter": [p.name for p in free],
-                "parameter_unit": ("parameter", [p.unit for p in free]),
-                "low": ("parameter", [p.number(p.ends[0]) for p in free]),
-                "high": ("parameter", [p.number(p.ends[1]) for p in free]),
-                "choices": ("parameter", [", ".join(map(str, p.choices)) for p in free]),
-                "objective": np.array([goal.name for goal in goals], dtype=str),
-                "objective_unit": ("objective", [goal.objective.unit for goal in goals]),
-                "sense": ("objective", [goal.sense for goal in goals]),
-            },
-            {**provenance(arm), **shown, **self.provenance, "finalists": len(self.finalists)},
-        )
+        looked_at = [*looked_at, *[self.designs] * len(self.finalists)]
+        rows = np.array([[p.number(each.values[p.name]) for p in free] for each in every])
+        at = ("design", "objective")
+        values = over(("design", "parameter"), value=rows)
+        values |= over(at, objective_value=numbers[..., 0], objective_error=numbers[..., 1])
+        values |= over("design", "1", excess=[each.excess for each in every])
+        values |= over("design", feasible=[each.is_feasible for each in every])
+        values |= over("design", front=[self._is_in_front(each) for each in every])
+        values |= over("design", fidelity=np.array([each.fidelity for each in every], dtype=str))
+        values |= over("design", fault=np.array([each.fault for each in every], dtype=str))
+        coarse = [-1] * len(self.candidates) + coarse
+        values |= over("design", looked_at=looked_at, coarse_design=coarse)
+        low, high = ([p.number(p.ends[k]) for p in free] for k in range(2))
+        choices = [", ".join(map(str, p.choices)) for p in free]
+        names = {"parameter": [p.name for p in free]}
+        names |= over("parameter", parameter_unit=[p.unit for p in free], low=low, high=high)
+        names |= over("parameter", choices=choices)
+        names |= {"objective": np.array([goal.name for goal in goals], dtype=str)}
+        names |= over("objective", objective_unit=[goal.objective.unit for goal in goals])
+        names |= over("objective", sense=[goal.sense for goal in goals])
+        return xr.Dataset(values, names, about)
 
     @property
     def shown(self) -> Manipulator:
@@ -203,9 +193,7 @@ class Search(Reported):
         except SoftreachError:
             return self.problem.parameters.base
 
-    def save(
-        self, folder: str | PathLike[str], *, unit: str | None = None, overwrite: bool = False
-    ) -> None:
+    def save(self, folder: StrPath, *, unit: str | None = None, overwrite: bool = False) -> None:
         """Write the best designs, tables of the front and of all candidates, and a report.
 
         `best.toml`, or `front_01.toml` and so on for several objectives, `front.csv`,
@@ -248,7 +236,7 @@ class Search(Reported):
         lines = (f"# {key}: {text}" for key, text in [*numbers.items(), *self.provenance.items()])
         return "\n".join([head, *lines]) + f"\n\n{arm.file_text}"
 
-    def table(self, *, every: bool = False, unit: str = "m") -> pd.DataFrame:
+    def table(self, *, every: bool = False, unit: str = "m") -> DataFrame:
         """Parameters and objectives with their errors, a row for each design of the front.
 
         Args:
@@ -259,13 +247,11 @@ class Search(Reported):
 
         length = as_unit(unit, self.shown.length)
         designs = self.every if as_flag("every", every) else self.front
-        columns: dict[str, Any] = {
-            "design": range(1, len(designs) + 1),
-            "front": [int(self._is_in_front(each)) for each in designs],
-            "fidelity": [each.fidelity for each in designs],
-            "feasible": [int(each.is_feasible) for each in designs],
-            "excess": [each.excess for each in designs],
-        }
+        columns: dict[str, Any] = {"design": range(1, len(designs) + 1)}
+        columns["front"] = [int(self._is_in_front(each)) for each in designs]
+        columns["fidelity"] = [each.fidelity for each in designs]
+        columns["feasible"] = [int(each.is_feasible) for each in designs]
+        columns["excess"] = [each.excess for each in designs]
         numbers = self._numbers(designs)
         for k, goal in enumerate(self.goals):
             suffix, size = _written_unit(goal.objective.unit, length)

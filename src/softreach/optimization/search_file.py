@@ -39,20 +39,9 @@ def read_search(
 ) -> dict[str, Any]:
     """Arguments of `search` from the text of a file: requirements and a table `[search]`.
 
-    ```toml
-    [search]
-    design = "arm.toml"             # or a named design, or a list of several
-    maximize = "exact_volume"
-    designs = 200                   # seed, accuracy, sampler, polish
-    [search.free]
-    "left.revolution_deg" = [-360, 360]
-    "right.revolution" = "-left.revolution"
-    [search.choices]
-    bundles = [3, 4]
-    ```
-
-    What is `given` by the same keys goes before the table; paths in the text start from `folder`.
-    All faults are named at once, of the requirements too, in the words of the file.
+    docs/search.md explains the table. What is `given` by the same keys goes before it; paths in the
+    text start from `folder`. All faults are named at once, of the requirements too, in the words of
+    the file.
     """
     try:
         document = tables_of(text)
@@ -172,7 +161,6 @@ class _Reader(FaultReader):
     def _add_numbers(
         self, path: str, given: Any, table: dict[str, Any], names: Written, key: str, mark: str
     ) -> Any:
-        """Take the numbers of a parameter as written, in a list or divided by a mark."""
         if key not in names.by_key:
             hint = did_you_mean(key, names.by_key, 0.5)
             allowed = unknown_parameter(key, names.written).allowed

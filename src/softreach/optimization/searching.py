@@ -146,16 +146,11 @@ class _Run:
         others = study.others()
         every = [*study.candidates, *others]
         finalists = self._at_full_accuracy(every)
-        return Search(
-            problem=self.problem,
-            front=tuple(self.problem.front(finalists)),
-            finalists=tuple(finalists),
-            candidates=tuple(every),
-            designs=self._spent + sum(each.designs for each in others),
-            seconds=time.perf_counter() - self._begun,
-            seed=study.seed,
-            sampler=study.kind,
-        )
+        found: Any = {"front": tuple(self.problem.front(finalists)), "finalists": tuple(finalists)}
+        found |= {"candidates": tuple(every), "seed": study.seed, "sampler": study.kind}
+        spent, seconds = sum(each.designs for each in others), time.perf_counter() - self._begun
+        spent += self._spent
+        return Search(problem=self.problem, designs=spent, seconds=seconds, **found)
 
     @property
     def _left(self) -> int:
@@ -171,10 +166,8 @@ class _Run:
         while count > 0:
             trials = self._study.ask(min(_BATCH, count))
             count -= len(trials)
-            tasks = (
-                partial(self._study.judged, ["design", values], partial(self._judged, values))
-                for _, values in trials
-            )
+            ask, judge = self._study.judged, self._judged
+            tasks = (partial(ask, ["design", each], partial(judge, each)) for _, each in trials)
             for (trial, _), judged in zip(trials, parallel.in_order(tasks), strict=True):
                 self._note(*judged, trial)
 
@@ -209,7 +202,6 @@ class _Run:
         return goal, self.problem.costs(start) if start.is_feasible else ()
 
     def _chosen(self, candidates: Sequence[Candidate], count: int) -> list[Candidate]:
-        """The best designs that lie apart from each other and from ends of polishes."""
         judged = [each for each in candidates if each.fidelity != "bounds"]
         ordered = sorted(judged, key=self.problem.score)
         if len(self.problem.goals) > 1:  # the front, that of the others, and so on

@@ -1,12 +1,10 @@
 """Sensitivity of a search: what each parameter is worth, and which requirement decides."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,13 +15,11 @@ from softreach.optimization.program import Point, stacked_slopes
 from softreach.optimization.result import Search
 from softreach.support import parallel
 from softreach.support.arguments import as_instance, as_integer
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, over
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, no_warnings
+from softreach.support.lazy import Dataset
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _ACTIVE = 1e-3  # room below which a requirement may decide
 _AT_END = 1e-6  # of a range
@@ -86,32 +82,24 @@ class Sensitivity:
     designs: int
     """Designs that were looked at."""
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """Gradients, shares of variance and multipliers, labeled."""
         import xarray as xr
 
-        at, count = ("goal", "parameter"), len(self.parameters)
+        count = len(self.parameters)
         lacks = np.full((4, count), math.nan)
         each = [lacks if shares is None else shares for shares in self.variance]
         shares = np.array(each).reshape(-1, 4, count).swapaxes(0, 1)
-        variances = zip(VarianceShares._fields, shares, strict=True)
-        return xr.Dataset(
-            {
-                "gradient": (("goal", "real"), self.gradient),
-                "gradient_error": (("goal", "real"), self.gradient_error),
-                **{name: (at, values, {"units": "1"}) for name, values in variances},
-                "multiplier": ("requirement", [each.value for each in self.multipliers]),
-            },
-            {
-                "goal": list(self.goals),
-                "goal_unit": ("goal", list(self.goal_units)),
-                "real": list(self.reals),
-                "real_unit": ("real", list(self.units)),
-                "parameter": list(self.parameters),
-                "requirement": [each.name for each in self.multipliers],
-            },
-            {"residual": self.residual, "designs": self.designs},
-        )
+        variances = dict(zip(VarianceShares._fields, shares, strict=True))
+        at = ("goal", "real")
+        values = over(at, gradient=self.gradient, gradient_error=self.gradient_error)
+        values |= over(("goal", "parameter"), "1", **variances)
+        values |= over("requirement", multiplier=[each.value for each in self.multipliers])
+        names = {"goal": list(self.goals), "real": list(self.reals)}
+        names |= over("goal", goal_unit=list(self.goal_units))
+        names |= over("real", real_unit=list(self.units)) | {"parameter": list(self.parameters)}
+        names |= {"requirement": [each.name for each in self.multipliers]}
+        return xr.Dataset(values, names, {"residual": self.residual, "designs": self.designs})
 
     def __repr__(self) -> str:
         lines = [f"Sensitivity ({self.designs:,} designs):"]
@@ -184,20 +172,14 @@ def sensitivity(
         variance = (None,) * len(problem.goals)
         if n and variance:
             variance = _variances(problem, n, seed, progress)
-    parameters = problem.parameters
-    return Sensitivity(
-        goals=tuple(goal.name for goal in problem.goals),
-        goal_units=tuple(goal.objective.unit for goal in problem.goals),
-        reals=tuple(each.name for each in parameters.real),
-        units=tuple(each.unit for each in parameters.real),
-        parameters=parameters.names,
-        gradient=gradient,
-        gradient_error=error,
-        multipliers=multipliers,
-        residual=residual,
-        variance=variance,
-        designs=n * (len(parameters) + 2),
-    )
+    parameters, goals = problem.parameters, [goal.objective for goal in problem.goals]
+    found: Any = {"gradient": gradient, "gradient_error": error, "variance": variance}
+    found |= {"multipliers": multipliers, "residual": residual}
+    found |= {"goals": tuple(goal.name for goal in goals), "parameters": parameters.names}
+    found |= {"goal_units": tuple(goal.unit for goal in goals)}
+    found |= {"reals": tuple(each.name for each in parameters.real)}
+    units = tuple(each.unit for each in parameters.real)
+    return Sensitivity(units=units, designs=n * (len(parameters) + 2), **found)
 
 
 def _gradients(problem: Problem, candidate: Candidate) -> tuple[Array, Array]:
@@ -226,11 +208,8 @@ def _multipliers(problem: Problem, candidate: Candidate) -> tuple[tuple[Multipli
     point = point_of(problem, candidate, problem.accuracy)
     slope, equations = point.cost_slope, _equations(point)
     size = float(np.linalg.norm(slope))
-    bounds = [
-        (-part.slope()[k], Multiplier(part.name, 1.0 / part.scale, part.unit))
-        for part in point.inequalities
-        for k in np.flatnonzero(part.value <= _ACTIVE)
-    ]
+    rows = ((p, k) for p in point.inequalities for k in np.flatnonzero(p.value <= _ACTIVE))
+    bounds = [(-p.slope()[k], Multiplier(p.name, 1.0 / p.scale, p.unit)) for p, k in rows]
     bounds += _ends(problem, point)
     columns = [*equations, *-equations, *(slope for slope, _ in bounds)]
     if not size or not columns:
@@ -278,10 +257,9 @@ def _variances(
     cube = qmc.Sobol(2 * len(free), rng=rng, bits=64).random(n)
     first, second = np.split(cube, 2, axis=1)
     mixed = np.where(np.eye(len(free), dtype=bool)[:, None], second, first)
-    tasks = (
-        partial(_values, problem, {p.name: p.at(x) for p, x in zip(free, place, strict=True)})
-        for place in np.concatenate([first, second, *mixed]).tolist()
-    )
+    places = np.concatenate([first, second, *mixed]).tolist()
+    designs = ({p.name: p.at(x) for p, x in zip(free, each, strict=True)} for each in places)
+    tasks = (partial(_values, problem, design) for design in designs)
     for row in parallel.in_order(tasks):
         known.append(row)
         progress(1)

@@ -3,13 +3,11 @@
 Their effect is known to first order, theory (99), and checked by arms that are really made.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,15 +22,13 @@ from softreach.sampling import sample_cube
 from softreach.schema import provenance
 from softreach.support import errors, parallel
 from softreach.support.arguments import as_instance, as_integer, as_number
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, over
 from softreach.support.errors import InvalidDesign, NotPossible, counted
+from softreach.support.lazy import Dataset
 from softreach.support.progress import Progress, as_progress
 from softreach.workspace.reach import ACCURACIES, reachable_set
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.search import nearest_tips
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _POOL = 1 << 17  # places of space among which those are that are followed
 _FOLLOWED = 1 << 13  # near the boundary, and as many away from it
@@ -77,7 +73,7 @@ def tolerance(
     accuracy: float = 1e-2,
     seed: int = 0,
     progress: Progress | None = None,
-) -> Tolerance:
+) -> "Tolerance":
     """Share of the reach, and of the targets, that arms keep which deviate as they are made.
 
     To first order the boundary of the reachable set moves along its normal by σ_n, the root of the
@@ -160,33 +156,26 @@ class Tolerance:
         """Every result that is one number [its unit], regions last."""
         return self.kept, self.volume, self.unreachability, *self.regions
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """All numbers, labeled: to first order and of arms made."""
         import xarray as xr
 
         fields = ("nominal", "mean", "deviation", "quantile", "level", "error", "agrees")
         fields += ("made_mean", "made_error", "made_deviation", "deviation_error")
         fields += ("made_quantile", "quantile_error")
-        numbers = {x: ("number", [getattr(each, x) for each in self.spreads]) for x in fields}
-        join = np.concatenate
+        numbers = {x: [getattr(each, x) for each in self.spreads] for x in fields}
         names = [target.name for target in self.targets for _ in target.probability]
-        return xr.Dataset(
-            {
-                **numbers,
-                "sigma": ("parameter", self.sigmas),
-                "cost": ("parameter", self.costs, {"units": "1"}),
-                "target": ("place", np.array(names, dtype=str)),
-                "probability": ("place", join([[], *(t.probability for t in self.targets)])),
-                "made_share": ("place", join([[], *(t.made for t in self.targets)])),
-            },
-            {
-                "number": [each.name for each in self.spreads],
-                "unit": ("number", [each.unit for each in self.spreads]),
-                "parameter": list(self.parameters),
-                "parameter_unit": ("parameter", list(self.units)),
-            },
-            {**provenance(self.arm), "arms_made": self.made, "arms_impossible": self.impossible},
-        )
+        shares = {"probability": [[], *(target.probability for target in self.targets)]}
+        shares |= {"made_share": [[], *(target.made for target in self.targets)]}
+        values = over("number", **numbers) | over("parameter", sigma=self.sigmas)
+        values |= over("parameter", "1", cost=self.costs)
+        values |= over("place", target=np.array(names, dtype=str))
+        values |= over("place", **{name: np.concatenate(x) for name, x in shares.items()})
+        labels = {"number": [x.name for x in self.spreads], "parameter": list(self.parameters)}
+        labels |= over("number", unit=[x.unit for x in self.spreads])
+        labels |= over("parameter", parameter_unit=list(self.units))
+        about = {"arms_made": self.made, "arms_impossible": self.impossible}
+        return xr.Dataset(values, labels, {**provenance(self.arm), **about})
 
     def __repr__(self) -> str:
         made = f"{counted(self.made, 'arm')} made"
@@ -230,20 +219,11 @@ def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -
         if made:
             share[_tried(target)] = np.mean([reached[k] for _, reached in made], axis=0)
         targets.append(TargetTolerance(target.name, first.probability(target), share, len(made)))
-    return Tolerance(
-        arm=first.deviations.arm,
-        parameters=first.deviations.names,
-        units=tuple(each.unit for each in first.deviations.parameters),
-        sigmas=first.deviations.sigmas,
-        kept=kept,
-        volume=volume,
-        unreachability=unreachability,
-        targets=tuple(targets),
-        regions=tuple(regions),
-        costs=first.costs(),
-        made=len(made),
-        impossible=checked - len(made),
-    )
+    own, units = first.deviations, tuple(each.unit for each in first.deviations.parameters)
+    of_arm: Any = {"arm": own.arm, "parameters": own.names, "units": units, "sigmas": own.sigmas}
+    of_sets: Any = {"kept": kept, "volume": volume, "unreachability": unreachability}
+    of_sets |= {"targets": tuple(targets), "regions": tuple(regions), "costs": first.costs()}
+    return Tolerance(made=len(made), impossible=checked - len(made), **of_arm, **of_sets)
 
 
 class _Followed(NamedTuple):
@@ -254,7 +234,7 @@ class _Followed(NamedTuple):
     share: float  # Share of the volume near the boundary
 
     @classmethod
-    def of(cls, first: FirstOrder, seed: int) -> _Followed:
+    def of(cls, first: FirstOrder, seed: int) -> "_Followed":
         solid, boundary = first.solid, first.boundary
         low, high = boundary.places.min(axis=0), boundary.places.max(axis=0)
         pool = low + (high - low) * sample_cube("sobol", _POOL, 3, seed)
@@ -265,7 +245,6 @@ class _Followed(NamedTuple):
         return cls(pool[near][:_FOLLOWED], pool[~near][:_FOLLOWED], float(near.mean()))
 
     def kept(self, solid: ReachableSet) -> float:
-        """Share of the volume that another set contains."""
         parts = ((self.near, self.share), (self.away, 1.0 - self.share))
         return sum(x * float(solid.contains(part).mean()) for part, x in parts if len(part))
 

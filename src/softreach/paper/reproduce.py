@@ -25,14 +25,8 @@ from softreach.support.files.atomic import MARK, check_place
 from softreach.support.files.text import write_text
 from softreach.support.report import Report, Section
 
-SECTIONS: dict[str, Any] = {
-    "model": model,
-    "misprints": model,
-    "redundancy": redundancy,
-    "volume": sweep,
-    "sweep": sweep,
-    "uniqueness": redundancy,
-}
+SECTIONS: dict[str, Any] = {"model": model, "misprints": model, "redundancy": redundancy}
+SECTIONS |= {"volume": sweep, "sweep": sweep, "uniqueness": redundancy}
 """Name of a part -> module whose function of that name computes its numbers; short ones first."""
 
 
@@ -53,11 +47,8 @@ class Claim(NamedTuple):
 
 
 _CLAIMS = tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
-CLAIMS = tuple(
-    Claim(*name.split("."), section=section, **row)
-    for section, rows in _CLAIMS.items()
-    for name, row in rows.items()
-)
+_EACH = ((name, section, row) for section, rows in _CLAIMS.items() for name, row in rows.items())
+CLAIMS = tuple(Claim(*name.split("."), section=section, **row) for name, section, row in _EACH)
 """Every statement that is checked, in the paper's order."""
 
 

@@ -1,7 +1,5 @@
 """A box around everything, with numbers along its outer edges as a camera sees it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 Arrays are base64: places in 16 bits of the box along each axis, colors in 8 bits a channel.
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import json
@@ -92,17 +90,10 @@ def web_page(
     `more` is HTML at the end, whose scripts know the names of the page's own; `scripts` says where
     else scripts may come from, as a Content-Security-Policy has it.
     """
-    content = {
-        "box": box.tolist(),
-        "unit": unit.name,
-        "labels": [unit.label(axis) for axis in "xyz"],
-        "views": [(name, *VIEWS[name]) for name in _BUTTONS],
-        "start": view_angles(view),
-        "keys": [key._asdict() for key in keys],
-        "caption": caption,
-        "note": note,
-        "parts": [part if isinstance(part, dict) else packed(part, box) for part in parts],
-    }
+    content = {"box": box.tolist(), "unit": unit.name, "labels": [unit.label(x) for x in "xyz"]}
+    content |= {"views": [(name, *VIEWS[name]) for name in _BUTTONS], "start": view_angles(view)}
+    content |= {"keys": [key._asdict() for key in keys], "caption": caption, "note": note}
+    content["parts"] = [part if isinstance(part, dict) else packed(part, box) for part in parts]
     page = files("softreach.picture").joinpath("page.html").read_text(encoding="utf-8")
     title = html.escape(caption.partition("\n")[0] or "softreach")
     head, body = page.split("@DATA@")
@@ -125,13 +116,9 @@ def packed(part: PagePart, box: Array) -> PackedPart:
         return common | {"xyz": _places(points, box), "rgb": _text(colors), "size": part.size}
     vertices = np.asarray(shape.vertices, float)
     wide = len(vertices) > _STEPS
-    return common | {
-        "xyz": _places(vertices, box),
-        "faces": _text(np.asarray(shape.faces, "<u4" if wide else "<u2")),
-        "wide": wide,
-        "color": list(shape.color),
-        "start": part.opacity,
-    }
+    faces = _text(np.asarray(shape.faces, "<u4" if wide else "<u2"))
+    common |= {"xyz": _places(vertices, box), "faces": faces, "wide": wide}
+    return common | {"color": list(shape.color), "start": part.opacity}
 
 
 def css_color(rgb: ArrayLike) -> str:

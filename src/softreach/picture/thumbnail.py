@@ -1,7 +1,5 @@
 """Small pictures of values for notebooks, above their text, as PNG without an image library."""
 
-from __future__ import annotations
-
 import base64
 import html
 import struct

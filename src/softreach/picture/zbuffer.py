@@ -5,8 +5,6 @@ the image does not depend on the order of what is drawn, and a point of several 
 maximum of the finished image, whatever the number of points.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Pictures of arms, lit tubes with their bundles: side by side, at their targets, under loads."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,23 +14,22 @@ from softreach.picture.zbuffer import ZBuffer, draw_mesh, faces_to_eye
 from softreach.plot import style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
-from softreach.plot.style import Axes, Figure
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
 from softreach.support.arrays import Array, as_floats, as_stations
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import Axes, Dataset, Figure
 from softreach.support.palette import BODY, MET, MISSED, bundle_color
 from softreach.support.quantity import round_below
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
 
+Shapes = list[Dataset]  # Single configurations of an arm
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
@@ -59,7 +56,7 @@ _COLOR = "tab:orange"
 
 def plot_arm(
     arm: Manipulator,
-    configuration: xr.Dataset | None = None,
+    configuration: Dataset | None = None,
     *,
     ax: Axes | None = None,
     view: View = "front",
@@ -95,7 +92,7 @@ def plot_arm(
     return panel.ax
 
 
-def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
+def shapes_of(configuration: Dataset | None) -> list[Dataset]:
     """The single configurations of a dataset that may hold several."""
     if configuration is None:
         return []
@@ -105,7 +102,7 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
     return [configuration.isel(sample=k) for k in range(configuration.sizes["sample"])]
 
 
-def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
+def arm_points(arm: Manipulator, shape: Dataset, unit: LengthUnit) -> Array:
     """Points of one configuration: its surface, bundles outside of it, markers; shape (n, 3)."""
     outline = arm.outline(shape["Z"].values)
     out = (outline.outer_ratio > _BULGE) & outline.acts
@@ -117,11 +114,7 @@ def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
 
 
 def draw_arms(
-    panel: Panel,
-    arm: Manipulator,
-    shapes: list[xr.Dataset],
-    bundles: Collection[int],
-    fade: float = 0.0,
+    panel: Panel, arm: Manipulator, shapes: Shapes, bundles: Collection[int], fade: float = 0.0
 ) -> None:
     """One image of all shapes, over what the axes hold, and their markers in front."""
     if shapes:
@@ -129,7 +122,7 @@ def draw_arms(
         draw_markers(panel, arm, shapes, fade)
 
 
-def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade: float) -> None:
+def draw_markers(panel: Panel, arm: Manipulator, shapes: list[Dataset], fade: float) -> None:
     """Small dots where the markers of all shapes are."""
     if arm.markers:
         points = np.concatenate([marker_points(arm.markers, shape) for shape in shapes])
@@ -138,11 +131,7 @@ def draw_markers(panel: Panel, arm: Manipulator, shapes: list[xr.Dataset], fade:
 
 
 def arm_images(
-    panel: Panel,
-    arm: Manipulator,
-    shapes: list[xr.Dataset],
-    bundles: Collection[int],
-    fade: float = 0.0,
+    panel: Panel, arm: Manipulator, shapes: Shapes, bundles: Collection[int], fade: float = 0.0
 ) -> tuple[ZBuffer, ZBuffer | None]:
     """All shapes in a panel, and what shows through them; None for nothing."""
     buffer, within = panel.buffer(oversample=3), panel.buffer(oversample=3)
@@ -202,12 +191,8 @@ def plot_designs(
     least = _LEAST if all(plane_of(p.view) for p in panels) else _LEAST_OBLIQUE
     usual = max(_LEAST * len(panels), least)
     width = usual if width is None else as_number("width", width, style.WIDTH)
-    box = bounding_box(
-        *(
-            arm_points(p.arm, rest_configuration(p.arm), LengthUnit("L", p.arm.length))
-            for p in panels
-        )
-    )
+    rests = [(p.arm, rest_configuration(p.arm), LengthUnit("L", p.arm.length)) for p in panels]
+    box = bounding_box(*(arm_points(*each) for each in rests))
     places = [(p.arm, s * p.arm.length) for p in panels for s in (*stations, 0.0)]
     reach = 1.08 * max(section_reach(arm, z) / arm.length for arm, z in places)
     with style.figure_style():
@@ -289,7 +274,7 @@ def _draw_places(panel: Panel, check: Any) -> None:
 
 
 def plot_equilibria(
-    equilibria: AllEquilibria,
+    equilibria: "AllEquilibria",
     *,
     ax: Axes | None = None,
     view: View = "front",
@@ -349,7 +334,7 @@ def plot_equilibria(
 
 def plot_compliance(
     arm: Manipulator,
-    configuration: xr.Dataset,
+    configuration: Dataset,
     compliance: ArrayLike,
     *,
     ax: Axes | None = None,
@@ -406,7 +391,7 @@ def plot_compliance(
 
 
 def plot_payload_curve(
-    curve: PayloadCurve, *, ax: Axes | None = None, largest: Sequence[LargestPayload] = ()
+    curve: "PayloadCurve", *, ax: Axes | None = None, largest: "Sequence[LargestPayload]" = ()
 ) -> Axes:
     """Draw the share of the reachable volume against the payload, with its errors.
 
@@ -436,7 +421,7 @@ def plot_payload_curve(
     return ax
 
 
-def _circle(equilibria: AllEquilibria, k: int) -> Array:
+def _circle(equilibria: "AllEquilibria", k: int) -> Array:
     """Where the tip of a ring of equilibria may be [m], shape (n, 3)."""
     assert equilibria.solver is not None
     pose, axis = equilibria.rod.pose, equilibria.solver.tables.axes[0]
@@ -445,7 +430,7 @@ def _circle(equilibria: AllEquilibria, k: int) -> Array:
     return pose.to_world(along + np.cos(angle) * (tip - along) + np.sin(angle) * across)
 
 
-def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
+def _gravity_arrow(panel: Panel, equilibria: "AllEquilibria") -> None:
     if equilibria.solver is None:
         return
     tables = equilibria.solver.tables

@@ -1,12 +1,10 @@
 """Figures of an atlas: maps of its metrics, and sheets with a picture of each design."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +20,13 @@ from softreach.plot import coloring, style
 from softreach.plot.axes import view_extent
 from softreach.plot.reach import drawn_tips, plot_opposite_sides, point_size
 from softreach.plot.statistics import SIDES, plot_curvature
-from softreach.plot.style import Axes, Figure
 from softreach.schema import is_stable
 from softreach.support import parallel
 from softreach.support.arguments import as_integer
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput, warn
+from softreach.support.lazy import Axes, DataArray, Dataset, Figure
 from softreach.support.palette import STEEL, activation_colors
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
 _KEY = 0.45  # inches for the key of colors at least
@@ -40,18 +35,13 @@ _METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
 _UNITS = {"rad": "°", "1": ""}
 _INDEXED = re.compile(r"(?<![a-z])[ERZaρθγ][0-9]+")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_NAMES = {
-    "volume": "V/L³ (α-shape)",
-    "exact_volume": "V/L³ (exact)",
-    "convex_volume": "convex V/L³",
-    "exact_convex_volume": "convex V/L³ (exact)",
-    "unreachability": "UNR (α-shape)",
-    "exact_unreachability": "UNR (exact)",
-}
+_NAMES = {"volume": "V/L³ (α-shape)", "exact_volume": "V/L³ (exact)"}
+_NAMES |= {"convex_volume": "convex V/L³", "exact_convex_volume": "convex V/L³ (exact)"}
+_NAMES |= {"unreachability": "UNR (α-shape)", "exact_unreachability": "UNR (exact)"}
 _RELATIVE = {"m": " / L", "m2": " / L²", "m3": " / L³", "1/m": " · L"}
 
 
-def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any]]:
+def atlas_figures(atlas: Dataset, panels: int = 7) -> Iterator[tuple[str, Any]]:
     """Name and figure (or axes) of each figure that an atlas has the numbers for.
 
     They are drawn one after the other, so that few clouds are held at once.
@@ -87,7 +77,7 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
     yield "hulls", hulls
 
 
-def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
+def plot_cloud_sheet(atlas: Dataset, *, panels: int = 7) -> Figure:
     """A sheet of the clouds of an atlas at one scale, colored by activation (figure 2a).
 
     Each is drawn in its own L. Designs that are not done leave a gap.
@@ -102,7 +92,7 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
     """
     box = box_over_length(atlas)
 
-    def image(cloud: xr.Dataset, extent: Extent, columns: int) -> ZBuffer:
+    def image(cloud: Dataset, extent: Extent, columns: int) -> ZBuffer:
         tips = drawn_tips(cloud, style.unit_of(cloud["tip"]))
         pixels = point_size(len(tips), box) * columns / extent.size[0]
         buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
@@ -113,14 +103,11 @@ def plot_cloud_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
     return _sheet(atlas, panels, box, image, keyed=True)
 
 
-def plot_hull_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
+def plot_hull_sheet(atlas: Dataset, *, panels: int = 7) -> Figure:
     """A sheet of the lit α-shapes of an atlas at one scale (figure 3a).
 
-    The radius is that of the metric `volume`, or 0.05 L; all else is as in `plot_cloud_sheet`.
-
-    Args:
-        atlas: As in `plot_cloud_sheet`.
-        panels: As in `plot_cloud_sheet`.
+    The radius is that of the metric `volume`, or 0.05 L. What is not described here is as in
+    `plot_cloud_sheet`.
 
     Raises:
         InvalidInput: As `plot_cloud_sheet`.
@@ -128,7 +115,7 @@ def plot_hull_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
     """
     alpha = float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
 
-    def image(cloud: xr.Dataset, extent: Extent, columns: int) -> ZBuffer:
+    def image(cloud: Dataset, extent: Extent, columns: int) -> ZBuffer:
         hull = hull_over_length(cloud, alpha)
         buffer = ZBuffer(extent, columns, oversample=3, color_step=4)
         draw_mesh(buffer, hull.vertices, hull.faces, STEEL, _VIEW)
@@ -137,13 +124,13 @@ def plot_hull_sheet(atlas: xr.Dataset, *, panels: int = 7) -> Figure:
     return _sheet(atlas, panels, box_over_length(atlas), image)
 
 
-def hull_over_length(cloud: xr.Dataset, alpha: float) -> Hull:
+def hull_over_length(cloud: Dataset, alpha: float) -> Hull:
     """The α-shape of the stable tips of a cloud; it, its radius and its volume in L of the arm."""
     tips = cloud.tip.values[is_stable(cloud.tip)]
     return concave_hull(tips / cloud.tip.attrs["length"], alpha)
 
 
-def box_over_length(atlas: xr.Dataset) -> Array:
+def box_over_length(atlas: Dataset) -> Array:
     """Corners around all clouds, each in its own L [-], shape (2, 3)."""
     if "x_min" not in atlas:
         raise InvalidInput("atlas", "without bounding boxes", 'built with the metrics "extent"')
@@ -166,10 +153,10 @@ def panel_extent(box: Array, view: View) -> Extent:
 
 
 def _sheet(
-    atlas: xr.Dataset,
+    atlas: Dataset,
     panels: int,
     box: Array,
-    image: Callable[[xr.Dataset, Extent, int], ZBuffer],
+    image: Callable[[Dataset, Extent, int], ZBuffer],
     *,
     keyed: bool = False,
 ) -> Figure:
@@ -205,7 +192,7 @@ def _sheet(
 
 
 def _label_sheet(
-    figure: Figure, grid: NDArray[Any], axes: Sequence[SheetAxis], atlas: xr.Dataset, top: float
+    figure: Figure, grid: NDArray[Any], axes: Sequence["SheetAxis"], atlas: Dataset, top: float
 ) -> None:
     for ax in grid.ravel().tolist():
         ax.patch.set_visible(False)
@@ -244,7 +231,7 @@ def _draw_scale(figure: Figure, panel: Axes) -> None:
         ax.text(x, y, name, fontsize=7, ha="center", va="center")
 
 
-def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
+def _thinned(atlas: Dataset, panels: int) -> Dataset:
     return atlas.isel({dim: evenly(atlas.sizes[dim], panels) for dim in atlas["status"].dims})
 
 
@@ -255,7 +242,7 @@ def evenly(size: int, most: int) -> Index:
     return np.rint(np.linspace(0, size - 1, next(steps, shown))).astype(int)
 
 
-def _cloud_at(atlas: xr.Dataset, column: int, row: int) -> xr.Dataset | None:
+def _cloud_at(atlas: Dataset, column: int, row: int) -> Dataset | None:
     if int(atlas["status"][column, row]) != DONE:
         return None
     places = zip(map(str, atlas["status"].dims), (column, row), strict=True)
@@ -279,14 +266,14 @@ class SheetAxis(NamedTuple):
         return f"{symbol} = {self.values[k]:.4g}{' ' if unit.isalpha() else ''}{unit}"
 
 
-def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:
+def sheet_axes(atlas: Dataset) -> tuple[SheetAxis, SheetAxis]:
     """The two parameters of an atlas, for the horizontal and the vertical edge."""
     if len(dims := atlas["status"].dims) != 2:
         raise InvalidInput("atlas", f"of dimensions {dims}", "a grid of two parameters")
     return _axis(atlas[dims[0]]), _axis(atlas[dims[1]])
 
 
-def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -> Axes:
+def plot_metric_map(atlas: Dataset, metric: str, *, ax: Axes | None = None) -> Axes:
     """Contours of a metric over the two parameters of an atlas (figure 3b); its best is marked.
 
     Volumes and lengths are relative to each design's own L. The best is the largest value, of
@@ -306,7 +293,12 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
         raise InvalidInput("metric", metric, "a metric of the atlas")
     values = over_length(atlas, metric).values.T
     with style.styled_axes(ax) as ax:
-        filled = _fill(ax, across, up, np.ma.masked_invalid(values))
+        shown = np.ma.masked_invalid(values)
+        if min(values.shape) < 2 or not shown.count() or np.ptp(shown.compressed()) == 0:
+            filled = ax.pcolormesh(_edges(across), _edges(up), shown, cmap=coloring.COLORMAP)
+        else:
+            filled = ax.contourf(across.values, up.values, shown, 14, cmap=coloring.COLORMAP)
+            _contour(ax, across, up, shown, np.asarray(filled.levels))
         if np.isfinite(values).any():
             _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         relative = _RELATIVE.get(atlas[metric].attrs.get("units", "1"), "")
@@ -316,7 +308,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
     return ax
 
 
-def _axis(values: xr.DataArray) -> SheetAxis:
+def _axis(values: DataArray) -> SheetAxis:
     si_unit = values.attrs.get("units", "1")
     unit = _UNITS.get(si_unit, si_unit)
     shown = np.degrees(values.values) if si_unit == "rad" else values.values
@@ -325,15 +317,6 @@ def _axis(values: xr.DataArray) -> SheetAxis:
         name = _INDEXED.sub(lambda found: found[0].translate(_LOWERED), symbol)
         name += f" of {part}" if (part := values.attrs.get("part")) else ""
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
-
-
-def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
-    known = values.compressed()
-    if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
-        return ax.pcolormesh(_edges(across), _edges(up), values, cmap=coloring.COLORMAP)
-    filled = ax.contourf(across.values, up.values, values, 14, cmap=coloring.COLORMAP)
-    _contour(ax, across, up, values, np.asarray(filled.levels))
-    return filled
 
 
 def _edges(axis: SheetAxis) -> Array:

@@ -1,7 +1,5 @@
 """The axes around an image: labeled coordinates of a view along an axis, or a box in space."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from softreach.picture.projection import View, is_mirrored, on_paper, plane_of, project, view_axes
 from softreach.picture.zbuffer import Extent, ZBuffer, seen_through
-from softreach.plot.style import DPI, Axes, as_axes, as_box, figure_style, small_axes
+from softreach.plot.style import DPI, as_axes, as_box, figure_style, small_axes
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import Axes
 from softreach.support.units import LengthUnit
 
 _TICK_GAP = 4.0  # points between an edge and its numbers

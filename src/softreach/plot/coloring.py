@@ -1,23 +1,18 @@
 """Colors of samples, and the key that explains them."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.plot.style import Axes, Figure
 from softreach.schema import activation_symbols, activation_units
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import Axes, DataArray, Dataset, Figure
 from softreach.support.palette import activation_colors, bundle_color
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 Pixels = NDArray[np.uint8]  # RGB from 0 to 255
 COLORMAP = "viridis"
@@ -75,7 +70,7 @@ class Coloring(NamedTuple):
     key: Key | None
 
 
-def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None) -> Coloring:
+def color_samples(cloud: Dataset, color: str | int | ArrayLike | None = None) -> Coloring:
     """Color samples by all activations, by one bundle's magnitude, or by given values.
 
     Args:
@@ -99,7 +94,7 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None)
     return Coloring(rgb, None if coloring.key is None else coloring.key._replace(unstable=True))
 
 
-def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring:
+def _colored(cloud: Dataset, color: str | int | ArrayLike | None) -> Coloring:
     activation = bundle_activations(cloud)
     names, units = bundle_names(cloud), activation_units(activation)
     symbols, magnitude = activation_symbols(activation), np.abs(activation.values)
@@ -147,14 +142,14 @@ def _effort(magnitude: Array, symbols: tuple[str, ...]) -> Coloring:
     return Coloring(*_scalar(share, f"effort: mean |{symbol}| / max |{symbol}| [-]", 0.0))
 
 
-def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
+def bundle_activations(cloud: Dataset) -> DataArray:
     """Activations over samples and bundles, for any name of that dimension."""
     activation = cloud["activation"]
     (bundle,) = (dim for dim in activation.dims if dim != "sample")
     return activation.transpose("sample", bundle)
 
 
-def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
+def bundle_names(cloud: Dataset) -> tuple[str, ...]:
     """Names of the bundles, or their numbers from 1 up if the cloud has none."""
     activation = bundle_activations(cloud)
     bundle, numbers = activation.dims[1], range(1, activation.shape[1] + 1)
@@ -189,14 +184,12 @@ def key_height(key: Key | None) -> float:
     return _AROUND + _ROW * (bool(title) + math.ceil(len(entries) / columns))
 
 
-def _draw_legend(
-    owner: Axes | Figure, key: Key | None, room: int, columns: int, **place: Any
-) -> None:
+def _draw_legend(owner: Axes | Figure, key: Key | None, room: int, columns: int, **at: Any) -> None:
     entries, title, columns = _arranged(key, room, columns)
     if entries:
         above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "columnspacing": 1.2}
         look = above | {"title": title or None, "ncols": columns, "handlelength": 1.0}
-        draw_entries(owner, entries, **look | place)
+        draw_entries(owner, entries, **look | at)
 
 
 def _arranged(key: Key | None, room: int, columns: int) -> tuple[list[tuple[str, Any]], str, int]:

@@ -1,26 +1,20 @@
 """Picture of a cross-section: its layers by material, its bundles in their colors, their key."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.section import Material, Section
-from softreach.plot.style import LENGTH, PLACE, Axes, Unit, some_bundles, styled_axes, unit_for
+from softreach.plot.style import LENGTH, PLACE, Unit, some_bundles, styled_axes, unit_for
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
+from softreach.support.lazy import Axes
 from softreach.support.palette import BODY, bundle_color, material_fill
 from softreach.support.units import METER, readable
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.collections import LineCollection
-    from matplotlib.patches import Patch, Wedge
 
 _MOST = 12  # entries
 _HANDLE, _LETTER = 0.5, 0.056  # inches
@@ -125,7 +119,7 @@ def _material_style(number: int) -> dict[str, Any]:
     return {"facecolor": color, "hatch": hatch, "edgecolor": _HATCH, "linewidth": 0.0}
 
 
-def _material_entries(section: Section) -> Iterator[tuple[Artist, str]]:
+def _material_entries(section: Section) -> Iterator[tuple[Any, str]]:
     from matplotlib.patches import Patch
 
     materials = [*_materials(section).values()]
@@ -139,7 +133,7 @@ def _material_entries(section: Section) -> Iterator[tuple[Artist, str]]:
         yield patch, label
 
 
-def _bundle_entries(arm: Manipulator, placed: Collection[_Placed]) -> Iterator[tuple[Artist, str]]:
+def _bundle_entries(arm: Manipulator, placed: "Collection[_Placed]") -> Iterator[tuple[Any, str]]:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -183,7 +177,7 @@ def _draw_layers(ax: Axes, section: Section, outer: float) -> None:
         draw(low, high, ring.material, 0.5 if over else 1.0)
 
 
-def _flatten(ax: Axes, layers: Sequence[Patch], arm: Manipulator) -> None:
+def _flatten(ax: Axes, layers: Sequence[Any], arm: Manipulator) -> None:
     """Make ellipses of layers where two bending stiffnesses were measured."""
     from matplotlib.transforms import Affine2D
 
@@ -193,7 +187,7 @@ def _flatten(ax: Axes, layers: Sequence[Patch], arm: Manipulator) -> None:
             layer.set_transform(flat + ax.transData)
 
 
-def _annulus(low: float, high: float, fill: Any) -> Patch:
+def _annulus(low: float, high: float, fill: Any) -> Any:
     from matplotlib.patches import Annulus, Circle
 
     look = {"facecolor": fill, "edgecolor": _EDGE, "linewidth": 0.4}
@@ -227,15 +221,14 @@ class _Placed:
         pale = tuple(0.25 * part + 0.75 for part in color)
         return {"facecolor": pale, "edgecolor": color, "linewidth": 1.4}
 
-    def sector(self, **style: Any) -> Wedge:
+    def sector(self, **style: Any) -> Any:
         from matplotlib.patches import Wedge
 
         center, extent = np.degrees(self.center), np.degrees(self.extent)
         ends, width = (center - extent / 2, center + extent / 2), self.outer - self.inner
         return Wedge((0, 0), self.outer, *ends, width=width, **style)
 
-    def overlaps(self, other: _Placed) -> Iterator[_Placed]:
-        """The parts of this sector that another shares."""
+    def overlaps(self, other: "_Placed") -> Iterator["_Placed"]:
         inner, outer = max(self.inner, other.inner), min(self.outer, other.outer)
         apart = (other.center - self.center + np.pi) % (2 * np.pi) - np.pi
         for turn in (apart - 2 * np.pi, apart, apart + 2 * np.pi):
@@ -245,7 +238,7 @@ class _Placed:
                 middle, extent = self.center + 0.5 * (low + high), high - low
                 yield replace(self, center=middle, extent=extent, inner=inner, outer=outer)
 
-    def strokes(self) -> LineCollection:
+    def strokes(self) -> Any:
         """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
         from matplotlib.collections import LineCollection
 
@@ -265,20 +258,16 @@ def _placed(arm: Manipulator, z: float, outer: float, bundles: Collection[int]) 
     ratios = outline.inner_ratio[0], outline.outer_ratio[0], outline.held_ratio[0]
     sizes = outline.center[0], outline.extent, *(outer * ratio for ratio in ratios)
     ways = [actuator.fiber_direction for actuator in arm.bundle_actuators]
-    return [
-        _Placed(k, outline.shape[k], ways[k], *(float(size[k]) for size in sizes))
-        for k in bundles
-        if outline.acts[0, k]
-    ]
+    acting = [k for k in bundles if outline.acts[0, k]]
+    each = ([float(size[k]) for size in sizes] for k in acting)
+    return [_Placed(k, outline.shape[k], ways[k], *x) for k, x in zip(acting, each, strict=True)]
 
 
 def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
     from matplotlib.patches import Circle
 
-    sectors, lumens, lines = (
-        [bundle for bundle in placed if bundle.shape == shape]
-        for shape in ("sector", "lumen", "line")
-    )
+    kinds = ("sector", "lumen", "line")
+    sectors, lumens, lines = ([x for x in placed if x.shape == kind] for kind in kinds)
     for bundle in sectors:
         ax.add_patch(bundle.sector(linewidth=0, **bundle.style))
     for below, above in combinations(sectors, 2):

@@ -1,11 +1,9 @@
 """Figures in space that turn in a browser: clouds, surfaces, arms and equilibria together."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,11 +26,9 @@ from softreach.schema import a_cloud, a_configuration
 from softreach.support.arguments import as_given, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted
+from softreach.support.lazy import Dataset
 from softreach.support.palette import BODY, STEEL, Color, bundle_color
 from softreach.support.units import LengthUnit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _POINTS = 200_000  # of a cloud: 2.4 MB of the page
 _STATIONS = 121  # of equilibria
@@ -44,10 +40,8 @@ _MARKER = 1 / 60  # diameter of the dot of a marker, in L
 _UNSTABLE: Color = (0.45, 0.45, 0.45)
 _SIZES = "", "curve_length", "area", "volume"  # of a reachable set, by its dimension
 _SURFACES: tuple[Color, ...] = (STEEL, (0.88, 0.66, 0.42), (0.62, 0.76, 0.55))
-HELP = (
-    "Drag to turn, wheel or pinch to zoom, Shift-drag or two fingers to move, "
-    "double-click for the first view."
-)
+HELP = "Drag to turn, wheel or pinch to zoom, Shift-drag or two fingers to move, "
+HELP += "double-click for the first view."
 
 
 def plot_3d(
@@ -123,7 +117,7 @@ class Scene:
         """All places, one array for each part."""
         return [p.shape[0] for p in self.parts]
 
-    def add_cloud(self, cloud: xr.Dataset) -> None:
+    def add_cloud(self, cloud: Dataset) -> None:
         """A cloud, of which a random part is enough."""
         tips, coloring = drawn_tips(cloud, self.unit), color_samples(cloud, self.color)
         chosen = np.flatnonzero(np.isfinite(tips).all(axis=1))
@@ -181,7 +175,7 @@ class Scene:
         self._add_body(arm, shape, name, _PALE if beside else 0.0)
         self._explain_bundles(arm)
 
-    def add_configuration(self, configuration: xr.Dataset) -> None:
+    def add_configuration(self, configuration: Dataset) -> None:
         """The arm in one configuration or several."""
         arm, name = design_of(configuration), self._name("arm")
         for shape in shapes_of(configuration):
@@ -206,7 +200,7 @@ class Scene:
         self.captions.append(f"Equilibria: {count}, {int(stable.sum())} of them stable")
         self._explain_bundles(arm)
 
-    def _add_body(self, arm: Manipulator, shape: xr.Dataset, name: str, fade: float = 0.0) -> None:
+    def _add_body(self, arm: Manipulator, shape: Dataset, name: str, fade: float = 0.0) -> None:
         sides = self.detail.sides
         body, caps = arm_surface(arm, shape, sides), 2 * sides
         opacity = _BODY_CLEAR if any(inside(arm)) else 1.0
@@ -237,13 +231,10 @@ class Scene:
 
 
 _CLASSES = {"AllEquilibria": "equilibria", "ReachableSet": "set", "Hull": "hull"}
-_LENGTHS = {
-    "cloud": lambda thing: thing["tip"].attrs.get("length"),
-    "configuration": lambda thing: design_of(thing).length,
-    "arm": attrgetter("length"),
-    "set": attrgetter("arm.length"),
-    "equilibria": attrgetter("rod.arm.length"),
-}
+_LENGTHS = {"arm": attrgetter("length"), "set": attrgetter("arm.length")}
+_LENGTHS |= {"equilibria": attrgetter("rod.arm.length")}
+_LENGTHS |= {"cloud": lambda thing: thing["tip"].attrs.get("length")}
+_LENGTHS |= {"configuration": lambda thing: design_of(thing).length}
 """L [m] of the arm that a thing is of, by its kind."""
 
 

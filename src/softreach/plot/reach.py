@@ -1,11 +1,9 @@
 """Pictures of what an arm reaches: clouds, whole or in slabs; sets and hulls, lit or in slices."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,18 +16,16 @@ from softreach.picture.zbuffer import ZBuffer, draw_mesh
 from softreach.plot import coloring, style
 from softreach.plot.arm import arm_images, arm_points, draw_markers, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.style import Axes, Figure
+from softreach.plot.style import Unit
 from softreach.rod.kinematics import rest_configuration
 from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput, Range
+from softreach.support.lazy import Axes, Dataset, Figure
 from softreach.support.palette import STEEL
 from softreach.support.units import LengthUnit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LARGEST = 8.0  # pixels
 _THICKNESS = 1 / 50  # of L, or of the cloud's extent
@@ -45,7 +41,7 @@ _LABELS = ("out of reach", "one activation", "two", "three", "four or more")
 
 
 def plot_cloud(
-    cloud: xr.Dataset,
+    cloud: Dataset,
     *,
     ax: Axes | None = None,
     view: View = "front",
@@ -53,7 +49,7 @@ def plot_cloud(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw a cloud in one view.
 
@@ -92,7 +88,7 @@ def cloud_image(panel: Panel, tips: Array, rgb: NDArray[np.uint8], size: float |
     return buffer
 
 
-def drawn_tips(cloud: xr.Dataset, unit: LengthUnit) -> Array:
+def drawn_tips(cloud: Dataset, unit: LengthUnit) -> Array:
     """Tip positions in the unit of the axes, shape (sample, 3)."""
     return unit.of(cloud["tip"].transpose("sample", "axis").values)
 
@@ -103,7 +99,7 @@ def point_size(samples: int, box: Array) -> float:
 
 
 def plot_slab(
-    cloud: xr.Dataset,
+    cloud: Dataset,
     *,
     ax: Axes | None = None,
     view: View = "front",
@@ -113,7 +109,7 @@ def plot_slab(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the tips in a slab across the line of sight; a note in the axes says which.
 
@@ -163,12 +159,12 @@ def plot_slab(
 
 
 def plot_views(
-    cloud: xr.Dataset,
+    cloud: Dataset,
     arm: Manipulator | None = None,
-    configuration: xr.Dataset | None = None,
+    configuration: Dataset | None = None,
     *,
     color: str | int | ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Figure:
     """Draw a cloud in three orthogonal views at one scale and an oblique one.
 
@@ -230,11 +226,11 @@ def plot_views(
 
 
 def plot_opposite_sides(
-    clouds: Mapping[str, xr.Dataset],
+    clouds: Mapping[str, Dataset],
     *,
     view: View = "oblique",
     box_over_length: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Figure:
     """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
 
@@ -286,7 +282,7 @@ def plot_hull(
     view: View = "front",
     length: float | None = None,
     box: ArrayLike | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the boundary of a hull in one view.
 
@@ -321,7 +317,7 @@ def plot_volume_curve(
     length: float | None = None,
     exact: float | None = None,
     convex: float | None = None,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw V(α) of clouds.
 
@@ -364,13 +360,13 @@ def plot_volume_curve(
 
 
 def plot_slice(
-    grid: xr.Dataset,
+    grid: Dataset,
     *,
     ax: Axes | None = None,
     view: View = "front",
     at: float | None = None,
     key: bool = True,
-    unit: style.Unit = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw one plane of a reachable set: the number of activations that reach each place.
 
@@ -407,9 +403,7 @@ def plot_slice(
     return ax
 
 
-def plot_slices(
-    grid: xr.Dataset, *, at: Sequence[float] | None = None, unit: style.Unit = None
-) -> Figure:
+def plot_slices(grid: Dataset, *, at: Sequence[float] | None = None, unit: Unit = None) -> Figure:
     """Draw the three planes of a reachable set that meet at a point: from the side, front and top.
 
     Args:
@@ -435,7 +429,7 @@ def plot_slices(
     return figure
 
 
-def _middle(grid: xr.Dataset, axis: str) -> float:
+def _middle(grid: Dataset, axis: str) -> float:
     """Middle of what is reached along an axis, to a tenth of a cell [m]."""
     reached = grid["count" if "count" in grid else "occupied"] > 0
     extent = grid[axis].values[reached.any([other for other in "xyz" if other != axis]).values]
@@ -444,7 +438,7 @@ def _middle(grid: xr.Dataset, axis: str) -> float:
     return float(np.rint(middle / tenth) * tenth) + 0.0  # no -0
 
 
-def _draw_slice(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
+def _draw_slice(ax: Axes, layer: Dataset, view: View, unit: LengthUnit) -> int:
     from matplotlib.colors import ListedColormap
 
     across, up = plane_of(view) or "xz"  # the view is along an axis

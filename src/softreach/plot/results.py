@@ -1,11 +1,9 @@
 """Pictures of results: errors of a calibration, and the designs of a search."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +11,11 @@ from softreach.picture.projection import View, on_paper, view_angles
 from softreach.plot import style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import COLORMAP
-from softreach.plot.style import Axes, Figure
+from softreach.plot.style import Unit
 from softreach.support.arrays import Array, Mask
+from softreach.support.lazy import Axes, Dataset, Figure
 from softreach.support.palette import BEST, MET, MISSED
 from softreach.support.units import LengthUnit, handy_unit, readable, readable_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _WIDTH = 7.2  # inches
 _SPACE, _ROW = 3.6, 1.75  # heights of the upper part and of each row of inputs [inch]
@@ -37,9 +33,7 @@ _MOST_LINES = 200
 _LETTERS = 40  # beside or below a panel
 
 
-def plot_calibration(
-    calibration: Any, *, view: View = "oblique", unit: style.Unit = None
-) -> Figure:
+def plot_calibration(calibration: Any, *, view: View = "oblique", unit: Unit = None) -> Figure:
     """Draw how far measured and predicted places of the markers are apart.
 
     In space, with a line from each measured place to the predicted one; the distances by marker, in
@@ -81,7 +75,7 @@ def plot_calibration(
 
 
 class _Errors:
-    def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
+    def __init__(self, data: Dataset, unit: LengthUnit) -> None:
         self.data, self.unit, self.label = data, unit, unit.label("error")
         self.markers = [str(name) for name in data["marker"].values]
         moving = np.ptp(data["input_value"].values, axis=0) > 0
@@ -165,7 +159,7 @@ def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
     shown.frame(ax)
 
 
-def plot_search(search: Any, *, unit: style.Unit = None) -> Figure:
+def plot_search(search: Any, *, unit: Unit = None) -> Figure:
     """Draw what a search came to: designs that were judged, and the best in their ranges.
 
     Of one objective, its value against the designs that were looked at, with the best so far, and
@@ -199,7 +193,7 @@ def plot_search(search: Any, *, unit: style.Unit = None) -> Figure:
 
 
 class _Designs:
-    def __init__(self, data: xr.Dataset, unit: LengthUnit) -> None:
+    def __init__(self, data: Dataset, unit: LengthUnit) -> None:
         self.data, self.unit = data, unit
         self.feasible: Mask = data["feasible"].values
         count = data.sizes["design"]
@@ -219,7 +213,6 @@ class _Designs:
             self.labels.append(label if name else objective)
 
     def mark(self, ax: Axes, rows: Mask, heights: Array, **look: Any) -> None:
-        """Marks of some designs, if any, over when they were looked at."""
         if rows.any():
             ax.scatter(self.looked_at[rows], heights[rows], **look)
 
@@ -271,10 +264,9 @@ def _draw_front(ax: Axes, shown: _Designs) -> None:
         ax.step(*points[:, points[0].argsort()], where=where, color=BEST, lw=0.9, zorder=2)
         ax.errorbar(*points, *errors[::-1], **_BARS)
         ax.scatter(*points, label="front, full accuracy", **_FINAL)
-    words = [
-        fill(f"{label} ({'large' if sense > 0 else 'small'} is better)", _LETTERS)
-        for label, sense in zip(shown.labels, shown.senses, strict=True)
-    ]
+    ways = ("large" if sense > 0 else "small" for sense in shown.senses)
+    pairs = zip(shown.labels, ways, strict=True)
+    words = [fill(f"{label} ({way} is better)", _LETTERS) for label, way in pairs]
     ax.set(xlabel=words[0], ylabel=words[1])
     style.legend_above(ax, handletextpad=0.3)
 

@@ -1,11 +1,9 @@
 """Pictures of what clouds are asked: activation distance D̄, redundancy, curvature."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from functools import partial
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,13 +12,10 @@ from softreach.picture.projection import View, project
 from softreach.plot import coloring, style
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.reach import drawn_tips, plot_cloud, plot_slab
-from softreach.plot.style import Axes, Figure
 from softreach.schema import a_cloud
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number, as_one_of
 from softreach.support.errors import InvalidInput
-
-if TYPE_CHECKING:
-    import xarray as xr
+from softreach.support.lazy import Axes, DataArray, Dataset, Figure
 
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
@@ -34,8 +29,8 @@ _COARSE = 64  # bins of a distribution of curvature
 
 
 def plot_distance(
-    cloud: xr.Dataset,
-    distance: xr.DataArray,
+    cloud: Dataset,
+    distance: DataArray,
     *,
     ax: Axes | None = None,
     view: View = "front",
@@ -78,7 +73,7 @@ def plot_distance(
     return panel.ax
 
 
-def plot_distance_histograms(distances: Mapping[str, xr.DataArray]) -> Figure:
+def plot_distance_histograms(distances: Mapping[str, DataArray]) -> Figure:
     """Draw the distribution of D̄ of several clouds side by side, at one scale.
 
     Args:
@@ -113,15 +108,15 @@ def plot_distance_histograms(distances: Mapping[str, xr.DataArray]) -> Figure:
     return figure
 
 
-def largest_distance(distances: Iterable[xr.DataArray]) -> float:
+def largest_distance(distances: Iterable[DataArray]) -> float:
     """The largest finite D̄, 1 if there is none."""
     finite = [d.values[np.isfinite(d.values)] for d in distances]
     return max((float(f.max()) for f in finite if len(f)), default=1.0) or 1.0
 
 
 def plot_redundancy(
-    clouds: Mapping[str, xr.Dataset],
-    distances: Mapping[str, xr.DataArray],
+    clouds: Mapping[str, Dataset],
+    distances: Mapping[str, DataArray],
     *,
     thickness: float | None = None,
     unit: style.Unit = None,
@@ -180,7 +175,7 @@ def plot_redundancy(
 
 
 def plot_curvature(
-    statistics: Mapping[str, xr.Dataset],
+    statistics: Mapping[str, Dataset],
     *,
     ax: Axes | None = None,
     quantity: str = "bending",
@@ -227,7 +222,7 @@ def plot_curvature(
 
 
 def _draw_side(
-    ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str, scale: float
+    ax: Axes, data: Dataset, quantity: str, side: int, color: str, label: str, scale: float
 ) -> None:
     medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
     look: dict[str, Any] = {"color": color, "alpha": 0.75, "lw": 0.3, "ec": "w"}

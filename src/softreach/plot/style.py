@@ -1,14 +1,11 @@
 """Style of every figure: light, small type, thin lines, images sharp at print size."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import cache
-from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,42 +16,25 @@ from softreach.picture.page import Figure3D
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
-from softreach.support.files.atomic import writing
+from softreach.support.files.atomic import StrPath, writing
 from softreach.support.files.formats import PAGES, PICTURES, format_of
+from softreach.support.lazy import Axes, DataArray, Dataset, Figure
 from softreach.support.units import METER, LengthUnit, as_unit
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-else:  # matplotlib is imported where it draws
-    Axes = Figure = Any
 
 Unit = str | LengthUnit | None  # one asked for, "m", "cm", "mm" or "L"; None for L if known, else m
 DPI = 250  # pixels per inch of images inside figures, and of saved PNG files
-_RC: dict[str, Any] = {
-    "figure.facecolor": "white",
-    "axes.facecolor": "white",
-    "axes.edgecolor": "0.35",
-    "axes.linewidth": 0.6,
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
-    "font.family": "sans-serif",
-    "font.size": 8,
-    "legend.fontsize": 7,
-    "legend.frameon": False,
-}
+_RC: dict[str, Any] = {"figure.facecolor": "white", "font.family": "sans-serif", "font.size": 8}
+_RC |= {"axes.facecolor": "white", "axes.edgecolor": "0.35", "axes.linewidth": 0.6}
+_RC |= {"axes.labelsize": 8, "axes.titlesize": 8, "legend.fontsize": 7, "legend.frameon": False}
 _TICKS = {"labelsize": 7, "color": "0.25", "major.width": 0.6, "major.size": 2.5}
 _RC |= {f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.items()}
 # names that others gave, such as $x_1$ or 50 %, are no mathematics and no LaTeX
 _TEXT: dict[str, Any] = {"text.parse_math": False, "text.usetex": False}
 # text stays text in vector files, so that a journal can set it in its own type
 _SAVING: dict[str, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none"}
-_ENCODINGS: dict[str, Any] = {
-    # at this level a PNG takes less than half the time of the default for 5 % more bytes
-    ".png": {"pil_kwargs": {"compress_level": 4}},
-    ".pdf": {"metadata": {"CreationDate": None}},
-}
+# at this level a PNG takes less than half the time of the default for 5 % more bytes
+_ENCODINGS: dict[str, Any] = {".png": {"pil_kwargs": {"compress_level": 4}}}
+_ENCODINGS[".pdf"] = {"metadata": {"CreationDate": None}}
 LENGTH = POSITIVE._replace(unit="m")
 PLACE = Range(unit="m")
 SIZE = Range(0.0, 1e3, "pixels", open_low=True)
@@ -136,7 +116,7 @@ def place_panels(
 
 
 def save_figure(
-    figure: Figure | Axes | Figure3D, path: str | PathLike[str], *, overwrite: bool = False
+    figure: Figure | Axes | Figure3D, path: StrPath, *, overwrite: bool = False
 ) -> None:
     """Save as .png, .pdf, .svg or another format that matplotlib knows, whole or not at all.
 
@@ -230,7 +210,7 @@ def as_box(name: str, value: Any) -> Array:
     raise InvalidInput(name, corners.tolist(), allowed)
 
 
-def unit_of(data: xr.Dataset | xr.DataArray, unit: Unit = None) -> LengthUnit:
+def unit_of(data: Dataset | DataArray, unit: Unit = None) -> LengthUnit:
     """The unit of lengths on paper for data, whose attributes may say how long the arm is [m]."""
     length = data.attrs.get("length")
     return unit_for(None if length is None else float(length), unit)

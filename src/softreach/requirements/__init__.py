@@ -6,19 +6,5 @@ from softreach.requirements.parts import Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.requirements.requirements import Requirements
 
-__all__ = [
-    "Box",
-    "Check",
-    "Coverage",
-    "Finding",
-    "HalfSpace",
-    "Keep",
-    "Limits",
-    "Mesh",
-    "Region",
-    "Requirements",
-    "Sphere",
-    "Target",
-    "check",
-    "quick_excess",
-]
+__all__ = ["Box", "Check", "Coverage", "Finding", "HalfSpace", "Keep", "Limits", "Mesh", "Region"]
+__all__ += ["Requirements", "Sphere", "Target", "check", "quick_excess"]

@@ -1,11 +1,9 @@
 """A design against requirements: the verdict, by how much, and what it would take."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,16 +28,13 @@ from softreach.rod.rods import as_tip_map, in_steps
 from softreach.rod.tip_map import InvalidLoads
 from softreach.schema import AXES, provenance
 from softreach.support.arguments import as_instance, as_integer, as_number
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, over
 from softreach.support.errors import NotPossible, Range, counted, no_warnings
-from softreach.support.lazy import lazy
+from softreach.support.lazy import Dataset, lazy
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.support.report import Report, Reported, Section
 from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSet, reachable_set
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 _LEAST_PLACES = 64  # in a region to be covered
 _MOST_PLACES = 100_000
@@ -131,7 +126,7 @@ class Check(Reported):
         kept = ((keep.kind, keep.region) for keep in self.requirements.keeps)
         return (*kept, *(("cover", region) for _, region in self.requirements.regions))
 
-    def shapes(self, count: int) -> xr.Dataset | None:
+    def shapes(self, count: int) -> Dataset | None:
         """The arm in poses of some places that are apart, under the largest payload.
 
         Args:
@@ -171,42 +166,32 @@ class Check(Reported):
             ],
         )
 
-    def to_dataset(self) -> xr.Dataset:
+    def to_dataset(self) -> Dataset:
         """Places with their gaps, poses and efforts, and the findings, labeled."""
         import xarray as xr
 
-        at = ("payload", "place")
-        findings = self.findings
+        at, findings, covers = ("payload", "place"), self.findings, self.coverages
         masses = [np.nan if payload is None else payload for payload in self.payloads]
-        names = [self.requirements.targets[k].name for k in self.target_of]
-        return xr.Dataset(
-            {
-                "position": (("place", "axis"), self.places, {"units": "m"}),
-                "target": ("place", np.array(names, dtype=str)),
-                "gap": (at, self.gaps, {"units": "m"}),
-                "direction_error": (at, self.direction_errors, {"units": "rad"}),
-                "reached": (at, self.reached),
-                "pose": ((*at, "input"), self.poses),
-                "nearest": ((*at, "axis"), self.nearest, {"units": "m"}),
-                "effort": (at, self.effort, {"units": "1"}),
-                "met": ("finding", [finding.met for finding in findings]),
-                "verdict": ("finding", np.array([f.verdict for f in findings], dtype=str)),
-                "excess": ("finding", [finding.excess for finding in findings], {"units": "1"}),
-                "text": ("finding", np.array([finding.text for finding in findings], dtype=str)),
-                "share": ("coverage", [each.share for each in self.coverages], {"units": "1"}),
-                "share_error": ("coverage", [each.error for each in self.coverages]),
-            },
-            {
-                "axis": list(AXES),
-                "payload": ("payload", masses, {"units": "kg"}),
-                "input": list(self.arm.input_names),
-                "input_unit": ("input", list(self.arm.input_units)),
-                "finding": np.array([finding.name for finding in findings], dtype=str),
-                "kind": ("finding", np.array([finding.kind for finding in findings], dtype=str)),
-                "coverage": np.array([each.name for each in self.coverages], dtype=str),
-            },
-            {**provenance(self.arm), "length": self.arm.length},
-        )
+        of_places = [self.requirements.targets[k].name for k in self.target_of]
+        kinds = ("name", "kind", "verdict", "text")
+        words = {x: np.array([getattr(each, x) for each in findings], dtype=str) for x in kinds}
+        values = over(("place", "axis"), "m", position=self.places)
+        values |= over("place", target=np.array(of_places, dtype=str))
+        values |= over(at, "m", gap=self.gaps)
+        values |= over(at, "rad", direction_error=self.direction_errors)
+        values |= over(at, reached=self.reached) | over((*at, "input"), pose=self.poses)
+        values |= over((*at, "axis"), "m", nearest=self.nearest)
+        values |= over(at, "1", effort=self.effort)
+        values |= over("finding", met=[each.met for each in findings], verdict=words["verdict"])
+        values |= over("finding", "1", excess=[each.excess for each in findings])
+        values |= over("finding", text=words["text"])
+        values |= over("coverage", "1", share=[each.share for each in covers])
+        values |= over("coverage", share_error=[each.error for each in covers])
+        names = {"axis": list(AXES), "input": list(self.arm.input_names), "finding": words["name"]}
+        names["coverage"] = np.array([each.name for each in covers], dtype=str)
+        names |= over("payload", "kg", payload=masses) | over("finding", kind=words["kind"])
+        names |= over("input", input_unit=list(self.arm.input_units))
+        return xr.Dataset(values, names, {**provenance(self.arm), "length": self.arm.length})
 
 
 def check(
@@ -327,7 +312,6 @@ def _covered(rules: PoseRules, target: Target, places: Array, sets: Sets, step: 
 
 
 def _largest(values: Array) -> tuple[int, int]:
-    """Payload and place of the largest value, by their numbers."""
     return divmod(int(values.argmax()), values.shape[1])
 
 

@@ -22,8 +22,7 @@ from softreach.support.quantity import quantity
 from softreach.support.units import LengthUnit
 from softreach.workspace import ReachableSet
 
-Verdict = Literal["met", "missed", "undecided"]
-"""A requirement is undecided where its margin is smaller than the error of that."""
+Verdict = Literal["met", "missed", "undecided"]  # Undecided: the margin is below its error
 
 _SAMPLES, _FEWER = 2**15, 8
 """Samples of clouds, and how many times fewer another has, which is farther off by as much at least

@@ -12,10 +12,8 @@ from softreach.requirements.regions import Region
 from softreach.support import arguments
 from softreach.support.arrays import Array, Mask, as_directions, as_points, read_only
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.files.text import MEGABYTE
 
 MOST_PLACES = 1_000_000  # Places that all targets may have together
-LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
 TOL = 1e-6  # over L: a place that is reached to the error of the tips is reached
 
 _LENGTH = Range(0.0, unit="m")

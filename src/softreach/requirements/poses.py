@@ -35,8 +35,7 @@ _MOST_TRIED = 4_096  # places for which they are
 _SAME = 1e-4  # of the ranges, by which poses are told apart
 _WEIGHT = 0.1  # of an angle [rad] against a distance in L, where not both can be met
 _PLACE_FIRST = 1e-5  # weight with which the tip is at the place but for some 1e-10 L
-_SEEDS, _NEIGHBORS = 256, 5
-"""Samples that quick descents start from, and how many of them for each place."""
+_SEEDS, _NEIGHBORS = 256, 5  # samples that quick descents start from; of them for each place
 _CELLS = 16  # along each axis of three bundles: as many solutions as with 32, in half the time
 _LEVELS = (48, 768, 4096)
 """Parts of the arm between which it is seen where a body is, finer where that does not decide."""
@@ -390,16 +389,10 @@ def _ends(
     """Ends of descents to places, and angles from the directions wanted there [rad]; 0 if none."""
     if not goals.directed.any():
         return nearest_tips(rod, start, goals.places, enough), np.zeros(len(start))
-    request = Request(
-        targets=goals.places,
-        residual=enough,
-        reach_tol=enough,
-        near=np.zeros_like(start),
-        direction=goals.directions,
-        cone=float(goals.cones[0]),
-        direction_weight=weight,
-        within=float(goals.within[0]),
-    )
+    options: Any = {"residual": enough, "reach_tol": enough, "direction_weight": weight}
+    options |= {"cone": float(goals.cones[0]), "within": float(goals.within[0])}
+    near = np.zeros_like(start)
+    request = Request(targets=goals.places, near=near, direction=goals.directions, **options)
     gamma = compromises(rod, request, start).gamma
     tips = placed(rod, gamma)
     distance = np.nan_to_num(np.linalg.norm(tips - goals.places, axis=1), nan=np.inf)
@@ -425,16 +418,9 @@ def _owned(solutions: Solutions) -> tuple[Index, Array]:
     return owner, np.concatenate([solutions.activations, solutions.nearest_activations[missing]])
 
 
-def _ranked(
-    rules: PoseRules,
-    places: Array,
-    owner: Index,
-    gamma: Array,
-    gaps: Array,
-    nearest: Array,
-    turn: Array,
-) -> Posed:
-    """Of each place the best of the poses that it owns, one at least."""
+def _ranked(rules: PoseRules, places: Array, owner: Index, *poses: Array) -> Posed:
+    """Of each place the best of the poses that it owns: their inputs, gaps, tips and angles."""
+    gamma, gaps, nearest, turn = poses
     lost = ~np.isfinite(gamma).all(axis=1)
     gamma[lost] = rules.rod.box.low
     judged = rules.judged(gamma)

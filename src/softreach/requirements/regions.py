@@ -325,10 +325,8 @@ class Mesh(Region):
         points = arrays.as_points("points", points)
         out, face = np.empty(len(points)), np.empty(len(points), np.int64)
         table = (self.vertices, self.faces, *self._spheres)
-        parallel.run(
-            partial(nearest_faces, points[block], *table, face[block], out[block])
-            for block in parallel.blocks(len(points), _BLOCK // 16)
-        )
+        blocks = parallel.blocks(len(points), _BLOCK // 16)
+        parallel.run(partial(nearest_faces, points[b], *table, face[b], out[b]) for b in blocks)
         for block in parallel.blocks(len(points), _BLOCK):
             is_inside = self._outside(points[block], face[block]) < 0.0
             out[block] = np.where(is_inside, -out[block], out[block])

@@ -15,23 +15,19 @@ from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
 from softreach.inverse.request import positions_in
-from softreach.requirements.parts import (
-    LIMIT_UNITS,
-    LONGEST,
-    MOST_PLACES,
-    Goals,
-    Keep,
-    Limits,
-    Target,
-)
+from softreach.requirements.parts import LIMIT_UNITS, MOST_PLACES, Goals, Keep, Limits, Target
 from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats, joined
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.files import toml
-from softreach.support.files.text import read_text, write_text
+from softreach.support.files.text import MEGABYTE, read_text, write_text
 from softreach.support.quantity import read_quantity, unit_names
 from softreach.support.units import read_length
+
+LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
+Raw = dict[str, Any]  # A table of a file
+Units = Mapping[str, str]  # Field -> unit of its numbers
 
 _KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
 """At the top, beside payloads; `search` is read by the search of designs."""
@@ -44,12 +40,10 @@ _SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
     "mesh": (Mesh, {"vertices": "m", "faces": ""}),
 }
 """Regions, with their numbers and the units of these."""
-_LISTS = {"payloads", "places", "direction", *(n for _, own in _SHAPES.values() for n in own)} - {
-    "radius"
-}
+_LISTS = {"payloads", "places", "direction", *(n for _, own in _SHAPES.values() for n in own)}
+_LISTS -= {"radius"}
 _BALL = {"region": Sphere((0.0, 0.0, 0.0), 1.0)}
-_INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}
-"""In place of faulty parts, so that the others can be judged."""
+_INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}  # for faulty parts: others are judged too
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -218,11 +212,9 @@ class Requirements:
 
     def __repr__(self) -> str:
         payloads = ", ".join(f"{x:g}" for x in self.payloads) or "none"
-        return (
-            f"Requirements: {len(self.targets)} targets with {len(self.places):,} places; "
-            f"{len(self.keeps)} regions to keep to; {len(self.limits.given)} limits; "
-            f"payloads {payloads} kg; {len(self.measures)} measures"
-        )
+        counts = f"{len(self.targets)} targets with {len(self.places):,} places; "
+        counts += f"{len(self.keeps)} regions to keep to; {len(self.limits.given)} limits"
+        return f"Requirements: {counts}; payloads {payloads} kg; {len(self.measures)} measures"
 
 
 def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
@@ -289,18 +281,15 @@ class _Reader(toml.FaultReader):
         raw = self._table(document, "limits")
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
-        return payloads | {
-            "targets": [self._target(*each) for each in self._tables(document, "reach")],
-            "keeps": [
-                self._keep(*each, kind == "stay_inside")
-                for kind in ("stay_inside", "avoid")
-                for each in self._tables(document, kind)
-            ],
-            "limits": self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS)),
-            "measures": self._measures(self._table(document, "measures")),
-        }
+        targets = [self._target(*each) for each in self._tables(document, "reach")]
+        keeps = [self._keep(*each, True) for each in self._tables(document, "stay_inside")]
+        keeps += [self._keep(*each, False) for each in self._tables(document, "avoid")]
+        limits = self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS))
+        measures = self._measures(self._table(document, "measures"))
+        made = {"targets": targets, "keeps": keeps, "limits": limits, "measures": measures}
+        return payloads | made
 
-    def _target(self, raw: dict[str, Any], path: str) -> Any:
+    def _target(self, raw: Raw, path: str) -> Any:
         numbers = {"within": "m", "share": "", "places": "m", "direction": "", "cone": "rad"}
         values = self._part(raw, path, numbers, ("name", "file"))
         file = values.pop("file", None)
@@ -323,15 +312,13 @@ class _Reader(toml.FaultReader):
         allowed = f"part of the text: other files are not sent along; write {instead}"
         raise InvalidInput("file", repr(name), allowed)
 
-    def _keep(self, raw: dict[str, Any], path: str, inside: bool) -> Any:
+    def _keep(self, raw: Raw, path: str, inside: bool) -> Any:
         values = self._part(raw, path, {"clearance": "m"}, ("name", "of", "when"))
         if "region" not in values:
             return self._refuse(path, None, f"needs one of {', '.join(_SHAPES)}")
         return self._made(Keep, raw, path, values | {"inside": inside})
 
-    def _part(
-        self, raw: dict[str, Any], path: str, numbers: Mapping[str, str], words: tuple[str, ...]
-    ) -> dict[str, Any]:
+    def _part(self, raw: Raw, path: str, numbers: Units, words: tuple[str, ...]) -> dict[str, Any]:
         """Values of a table by field: numbers, words, and the region that it has."""
         values = self._numbers(raw, path, numbers, (*words, *_SHAPES, "mesh_unit"))
         values |= {name: raw[name] for name in words if name in raw}
@@ -344,7 +331,7 @@ class _Reader(toml.FaultReader):
             self._refuse(f"{path}.mesh_unit", raw["mesh_unit"], "needs a mesh")
         return values
 
-    def _region(self, raw: dict[str, Any], shape: str, path: str) -> Any:
+    def _region(self, raw: Raw, shape: str, path: str) -> Any:
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
@@ -366,7 +353,7 @@ class _Reader(toml.FaultReader):
                 return self._refuse(f"{path}.{key}", None, "required key is missing")
         return self._made(kind, table, path, values)
 
-    def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
+    def _measures(self, raw: Raw) -> dict[str, Any]:
         measures = {}
         for name, table in raw.items():
             path = f"measures.{toml.key_text(name)}"
@@ -378,17 +365,16 @@ class _Reader(toml.FaultReader):
             else:
                 unit = metric.unit if metric.unit in _EXAMPLES else ""
                 ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
-                values = self._numbers(table, path, ends, plain=True)
+                values = self._numbers(table, path, ends, bare=True)
                 measures[name] = tuple(map(values.get, ends))
         return measures
 
-    def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
+    def _made(self, kind: Any, raw: Raw, path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `WRONG` and a fault where it refuses them."""
         wrong = {name for name, value in values.items() if value is toml.WRONG}
         # Of directions nothing can be said without their places.
-        lost = wrong | (
-            {"direction", "cone"} if wrong & {"region", "places", "direction"} else set()
-        )
+        of_places = {"direction", "cone"} if wrong & {"region", "places", "direction"} else set()
+        lost = wrong | of_places
         right = {name: value for name, value in values.items() if name not in lost}
         if wrong and kind not in _INSTEAD:
             return toml.WRONG
@@ -408,17 +394,11 @@ class _Reader(toml.FaultReader):
             return self._refuse(path, None, str(error))
 
     def _numbers(
-        self,
-        raw: dict[str, Any],
-        path: str,
-        numbers: Mapping[str, str],
-        others: Sequence[str] = (),
-        *,
-        plain: bool = False,
+        self, raw: Raw, path: str, numbers: Units, others: Sequence[str] = (), *, bare: bool = False
     ) -> dict[str, Any]:
         """Numbers of a table in SI units by field; keys beside these and `others` are refused.
 
-        `plain` ones may go without their unit.
+        `bare` ones may go without their unit.
         """
         known = {name: _keys(name, unit) for name, unit in numbers.items()}
         self._check_keys(raw, path, (*numbers, *others), set().union(*known.values()))
@@ -433,7 +413,7 @@ class _Reader(toml.FaultReader):
                 fits = name not in _LISTS or isinstance(value, list | str)
                 try:
                     own = value if fits else None
-                    values[name] = self._read(own, unit, symbol, plain or not unit)
+                    values[name] = self._read(own, unit, symbol, bare or not unit)
                 except ValueError:
                     allowed = self._allowed(unit, symbol, name) if fits else "must be a list"
                     values[name] = self._refuse(start + keys[0], value, allowed)

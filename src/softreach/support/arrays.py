@@ -41,6 +41,11 @@ def joined_by(column: str, tables: Sequence[Table]) -> Table:
     return rows(table, np.argsort(getattr(table, column), kind="stable"))
 
 
+def over(dims: str | tuple[str, ...], unit: str = "", /, **columns: Any) -> dict[str, Any]:
+    """Columns over the same dimensions, and in one unit if any, as `xarray.Dataset` takes them."""
+    return {name: (dims, x, {"units": unit} if unit else {}) for name, x in columns.items()}
+
+
 def read_only(values: Array) -> Array:
     """The array itself, not to be written: kernels are compiled once more for those that are."""
     values.setflags(write=False)

@@ -9,17 +9,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple, Self
 
-__all__ = [
-    "Fault",
-    "InvalidDesign",
-    "InvalidInput",
-    "MissingExtra",
-    "NotPossible",
-    "NotWritten",
-    "Range",
-    "SoftreachError",
-    "SoftreachWarning",
-]
+__all__ = ["Fault", "InvalidDesign", "InvalidInput", "MissingExtra", "NotPossible", "NotWritten"]
+__all__ += ["Range", "SoftreachError", "SoftreachWarning"]
 
 _LONGEST = 300  # characters of a value that an error shows
 
@@ -127,14 +118,11 @@ class Fault(NamedTuple):
     """Values that are allowed, and what to do."""
 
     def __str__(self) -> str:
-        if self.value is None or isinstance(self.value, dict) or _is_tables(self.value):
+        many = isinstance(self.value, list) and any(isinstance(each, dict) for each in self.value)
+        if many or self.value is None or isinstance(self.value, dict):
             return f"{self.path}: {self.allowed}"  # a table takes more lines than its fault
         shown = f"{self.value:.6g}" if isinstance(self.value, float) else in_short(repr(self.value))
         return f"{self.path} = {shown}: {self.allowed}"
-
-
-def _is_tables(value: object) -> bool:
-    return isinstance(value, list) and any(isinstance(each, dict) for each in value)
 
 
 class InvalidDesign(SoftreachError, ValueError):
@@ -152,8 +140,7 @@ class InvalidDesign(SoftreachError, ValueError):
 
 _EXTRAS = {"matplotlib": "plot", "skimage": "surface", "distributed": "cluster", "viser": "studio"}
 _EXTRAS |= {"numba_cuda": "cuda", "jinja2": "report", "optuna": "search", "cmaes": "search"}
-_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")
-"""Module -> extra of softreach that brings it."""
+_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")  # module -> extra with it
 
 
 class MissingExtra(SoftreachError, ImportError):

@@ -20,9 +20,8 @@ def free_memory() -> float:
     """Memory that can be had without swapping [bytes], or 4e9 where the system does not say."""
     left = math.inf
     with suppress(OSError, ValueError):  # no container, or its limit is "max"
-        limit, used, stat = (
-            (_CONTROL_GROUP / f"memory.{name}").read_text() for name in ("max", "current", "stat")
-        )
+        names = ("memory.max", "memory.current", "memory.stat")
+        limit, used, stat = ((_CONTROL_GROUP / name).read_text() for name in names)
         cache = re.search(r"^inactive_file (\d+)", stat, re.MULTILINE)  # kept only to be read
         left = float(limit) - float(used) + (float(cache[1]) if cache else 0.0)
     return min(_system(), left)

@@ -1,21 +1,12 @@
 """Units of length that a user chooses, and named values of a result as lines in them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import (
-    columns,
-    five_digits,
-    quantity,
-    read_number,
-    read_quantity,
-    unit_names,
-)
+from softreach.support.quantity import columns, five_digits, quantity, read_quantity, unit_names
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -45,7 +36,7 @@ class LengthUnit(NamedTuple):
         """True if it is L, the length of the arm."""
         return self.name == "L"
 
-    def of(self, values: ArrayLike, power: int = 1) -> Array:
+    def of(self, values: "ArrayLike", power: int = 1) -> "Array":
         """Lengths [m] in this unit; areas [m²] for power 2, volumes [m³] for 3."""
         import numpy as np  # the command line reads units before it needs arrays
 
@@ -131,8 +122,8 @@ def read_length(text: str, length: float | None = None) -> float:
     """A length [m] typed as "80mm", "0.08" in m, or "0.1L" where L is known; or `ValueError`."""
     text = text.strip()
     if length is not None and text.endswith("L"):
-        return length * read_number(text[:-1])
-    return read_quantity(text, "m") if text[-1:].isalpha() else read_number(text)
+        return length * read_quantity(text[:-1], "1")
+    return read_quantity(text, "m") if text[-1:].isalpha() else read_quantity(text, "1")
 
 
 def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
@@ -164,7 +155,6 @@ def lines_of(rows: Rows, unit: LengthUnit) -> Iterator[str]:
 
 
 def _shown_in(value: Any, error: Any, size: float) -> str:
-    """Numbers in a unit of this size, each to the first digit of its error if that is known."""
     if isinstance(value, list):
         errors = error if isinstance(error, list) else [error] * len(value)
         return ", ".join(_shown_in(*pair, size) for pair in zip(value, errors, strict=True))

@@ -1,12 +1,10 @@
 """Clouds of ActiveFilaments.jl: NAME.csv and NAME_gamma.csv, without headers, a row a sample."""
 
-from __future__ import annotations
-
 import re
 from io import BufferedWriter
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +19,7 @@ from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.text import MEGABYTE, read_text
-
-if TYPE_CHECKING:
-    import xarray as xr
+from softreach.support.lazy import Dataset
 
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
@@ -38,7 +34,7 @@ def gamma_path(path: str | PathLike[str]) -> Path:
     return tips.with_name(f"{tips.stem}{_ENDING}{tips.suffix}")
 
 
-def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6) -> xr.Dataset:
+def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6) -> Dataset:
     """Read a cloud of ActiveFilaments.jl, and compare its tips with those that softreach computes.
 
     Columns of NAME_gamma.csv are the sectors of the filament that `write_design` writes for the
@@ -86,7 +82,7 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     return cloud
 
 
-def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+def write_cloud(cloud: Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write tips to NAME.csv and activations to NAME_gamma.csv, as ActiveFilaments.jl does.
 
     Args:

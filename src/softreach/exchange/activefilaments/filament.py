@@ -148,14 +148,10 @@ def filament_of(arm: Manipulator) -> Filament:
     if not right:
         allowed = f"{_THERE} such that the innermost one is not the outermost of several"
         raise InvalidInput("radii of the rings", [ring.radii for ring in rings], allowed)
-    return Filament(
-        length=arm.length,
-        taper=arm.profile.taper,
-        density=float(arm.section.mass_per_length(1.0)) / math.pi if is_dense else None,
-        rings=right[0],
-        core_modulus=_modulus(core),
-        core_poisson_ratio=core.poisson_ratio,
-    )
+    dense = float(arm.section.mass_per_length(1.0)) / math.pi if is_dense else None
+    inside = {"core_modulus": _modulus(core), "core_poisson_ratio": core.poisson_ratio}
+    outside = {"length": arm.length, "taper": arm.profile.taper}
+    return Filament(rings=right[0], density=dense, **outside, **inside)
 
 
 def is_from_inside_out(radii: Sequence[tuple[float, float]]) -> bool:
@@ -171,28 +167,21 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
     shared = Counter(places)
     for k, ring in enumerate(section.rings):
         share = max(shared[k], 1)
-        body = FilamentRing(
-            young_modulus=_modulus(ring.material) / share,
-            poisson_ratio=ring.material.poisson_ratio,
-            radii=(ring.inner_ratio * base, ring.outer_ratio * base),
-            scale=float(share),
-            name=ring.name,
-        )
+        known: Any = {"young_modulus": _modulus(ring.material) / share, "scale": float(share)}
+        known |= {"poisson_ratio": ring.material.poisson_ratio, "name": ring.name}
+        radii = ring.inner_ratio * base, ring.outer_ratio * base
+        body = FilamentRing(radii=radii, **known)
         if not shared[k]:
             yield body
         for place, first, fiber in zip(places, firsts, arm.fibers, strict=False):
             if place != k:
                 continue
             angle: Any = fiber.helical_angle_on(arm.profile, arm.section)
-            yield replace(
-                body,
-                angle=angle if isinstance(angle, Pieces) else float(angle),
-                extent=fiber.extent,
-                offset=fiber.offset,
-                bounds=tuple(map(tuple, (fiber.bounds * body.scale).tolist())),
-                bundles=tuple(range(first, first + fiber.bundles)),
-                name=fiber.name,
-            )
+            angle = angle if isinstance(angle, Pieces) else float(angle)
+            own: Any = {"angle": angle, "extent": fiber.extent, "offset": fiber.offset}
+            own |= {"bounds": tuple(map(tuple, (fiber.bounds * body.scale).tolist()))}
+            own |= {"bundles": tuple(range(first, first + fiber.bundles)), "name": fiber.name}
+            yield replace(body, **own)
 
 
 def _modulus(material: Material) -> float:
@@ -321,10 +310,8 @@ def _arm(definition: _Value) -> Manipulator:
     density = density / layers if abs(layers - 1.0) > 1e-9 else density
     *materials, core = (_material(part, density) for part in (*rings, tube))
     default = materials[min(range(len(spans)), key=lambda k: spans[k][0])]
-    layered = (
-        Ring(inner_ratio=inner, outer_ratio=outer, material=material)
-        for (inner, outer), material in zip(spans, materials, strict=True)
-    )
+    each = zip(spans, materials, strict=True)
+    layered = (Ring(inner_ratio=a, outer_ratio=b, material=x) for (a, b), x in each)
     taper = definition.of("phi2").number()
     return Manipulator(
         profile=LinearTaper(length=length, outer_radius=base, taper=taper),
@@ -349,15 +336,11 @@ def _fibers(definition: _Value, rings: list[_Value], length: float) -> Iterator[
     activation = definition.of("activation").each(len(rings))
     bounds = _bounds(definition, activation)
     for k, (ring, sectors, own) in enumerate(zip(rings, activation, bounds, strict=True)):
-        yield FiberArchitecture(
-            name=f"ring {k + 1}",
-            ring=k,
-            bundles=len(own),
-            helical_angle=_read_angle(ring.of("fiberArchitecture", "α2"), length),
-            extent=sectors.of("σ").number(),
-            offset=sectors.of("θ0").number(),
-            activation_bounds=own,
-        )
+        angle = _read_angle(ring.of("fiberArchitecture", "α2"), length)
+        extent, offset = sectors.of("σ").number(), sectors.of("θ0").number()
+        known: Any = {"helical_angle": angle, "extent": extent, "offset": offset}
+        known |= {"name": f"ring {k + 1}", "ring": k}
+        yield FiberArchitecture(bundles=len(own), activation_bounds=own, **known)
 
 
 def _read_angle(angle: _Value, length: float) -> float | Pieces:

@@ -44,11 +44,9 @@ def redundancy(settings: Settings, notes: Notebook) -> dict[str, Any]:
     words = "Distribution of the mean activation-space distance in both clouds."
     notes.draw("", "distances", words, plot.plot_distance_histograms(distances))
     outline = arms["redundant"].outline(0.0)
-    return numbers | {
-        "samples": settings.redundant_samples,
-        "offsets_deg": np.degrees(outline.center[0][2:]).round(9),
-        "extent_deg": np.degrees(outline.extent[2]).round(9),
-    }
+    offsets, extent = (np.degrees(x).round(9) for x in (outline.center[0][2:], outline.extent[2]))
+    numbers |= {"samples": settings.redundant_samples}
+    return numbers | {"offsets_deg": offsets, "extent_deg": extent}
 
 
 def cost(n: Numbers) -> Finding:
@@ -131,17 +129,10 @@ def uniqueness(settings: Settings, notes: Notebook) -> dict[str, Any]:
     # two fibers, and one: areas and lengths for L = 1 m
     fewer = [arms[0].replace(actuators=arms[0].actuators[:count]) for count in (2, 1)]
     surface, curve = (reachable_set(arm) for arm in fewer)
-    return {
-        "share": share.transpose("revolution", "taper").values,
-        "worst": float(worst),
-        "revolution_deg": np.degrees(turn),
-        "taper_deg": np.degrees(taper),
-        "paper_share": 1 - paper.multiplicity[1] / paper.volume,
-        "tip": tip,
-        "activations": activations,
-        "area": surface.area,
-        "curve": curve.curve_length,
-    }
+    found: Any = {"share": share.transpose("revolution", "taper").values, "worst": float(worst)}
+    found |= {"revolution_deg": np.degrees(turn), "taper_deg": np.degrees(taper)}
+    found |= {"paper_share": 1 - paper.multiplicity[1] / paper.volume, "tip": tip}
+    return found | {"activations": activations, "area": surface.area, "curve": curve.curve_length}
 
 
 def unique(n: Numbers) -> Finding:

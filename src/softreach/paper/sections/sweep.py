@@ -39,9 +39,8 @@ def sweep(settings: Settings, notes: Notebook) -> dict[str, Any]:
     tapers = np.radians(np.linspace(0, 3, settings.designs))
     space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
     sizes: dict[str, Any] = {"alpha_over_length": settings.alpha, "accuracy": settings.accuracy}
-    atlas = build_atlas(
-        space, notes.folder.parent / STORE, settings.samples, settings.seed, **sizes
-    )
+    store = notes.folder.parent / STORE
+    atlas = build_atlas(space, store, settings.samples, settings.seed, **sizes)
     for name, figure in atlas_figures(atlas, settings.panels):
         if name in _CAPTIONS:
             label, words = _CAPTIONS[name]
@@ -49,18 +48,18 @@ def sweep(settings: Settings, notes: Notebook) -> dict[str, Any]:
     grid = atlas.transpose("revolution", "taper", ...)
     wound = turns[-1], tapers, settings.accuracy
     curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
-    return {
+    found: dict[str, Any] = {
         "designs": int(atlas["volume"].notnull().sum()),
         "samples": settings.samples,
-        "revolution_deg": np.degrees(turns).round(6),
-        "taper_deg": np.degrees(tapers).round(6),
-        "alpha": atlas["volume"].attrs["alpha_over_length"],
-        **shapes(turns, tapers, settings.accuracy),
-        "best_taper_deg": {ratio: _best_taper(ratio, *wound) for ratio in _RATIOS},
-        "quantiles": curvature["quantile"].values,
-        "curvature": curvature.transpose("taper", "station", "quantile").values,
-        **{name: grid[name].values for name in (*_SCALARS, "exact_volume_error")},
     }
+    found["revolution_deg"] = np.degrees(turns).round(6)
+    found["taper_deg"] = np.degrees(tapers).round(6)
+    found |= {"alpha": atlas["volume"].attrs["alpha_over_length"]}
+    found |= shapes(turns, tapers, settings.accuracy)
+    found |= {"best_taper_deg": {ratio: _best_taper(ratio, *wound) for ratio in _RATIOS}}
+    found |= {"quantiles": curvature["quantile"].values}
+    found |= {"curvature": curvature.transpose("taper", "station", "quantile").values}
+    return found | {name: grid[name].values for name in (*_SCALARS, "exact_volume_error")}
 
 
 def size(n: Numbers) -> Finding:
@@ -193,7 +192,6 @@ def _place_of_max(n: Numbers, values: Array) -> str:
 
 
 def _curvatures(n: Numbers, quantile: float) -> Array:
-    """Without and with taper, at each station."""
     return n.curvature[..., n.quantiles.tolist().index(quantile)]
 
 

@@ -26,8 +26,7 @@ from typing import Any
 from softreach.support.errors import InvalidInput, NotWritten, warn
 
 StrPath = str | os.PathLike[str]
-Foreign = Callable[[Path], str]
-"""Names the first thing in a folder that softreach did not write; empty if there is none."""
+Foreign = Callable[[Path], str]  # The first thing in a folder that is not ours; "" if none is
 MARK = ".softreach-"  # Beginning of names of what is being written, and of its two at the end
 _PATIENCE = 5.0  # s, in which threads of libraries end that still write there after Ctrl-C
 

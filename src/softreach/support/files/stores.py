@@ -205,7 +205,9 @@ class CheckedStore(WrapperStore[Any]):
             raise StoreFailed(f"{key} of {opened.location} was written by another Zarr release")
         await super().set(key, value)
         if opened.durable and isinstance(self._store, LocalStore):
-            await asyncio.to_thread(_sync_in, self._store.root / key, self._store.root)
+            root, path = self._store.root, self._store.root / key  # with its name and its folders'
+            places = (path, *path.parents[: len(path.relative_to(root).parts)])
+            await asyncio.to_thread(lambda: [sync(place) for place in places])
 
     async def list_dir(self, prefix: str) -> AsyncIterator[str]:
         """The arrays of the root, without what killed writers or others left beside them."""
@@ -234,12 +236,6 @@ class CheckedStore(WrapperStore[Any]):
         checksum = google_crc32c.value(numbers[:-_CHECKSUM]).to_bytes(_CHECKSUM, "little")
         whole = len(numbers) > _CHECKSUM and numbers[-_CHECKSUM:].tobytes() == checksum
         return "" if whole else "of a wrong checksum"
-
-
-def _sync_in(path: Path, root: Path) -> None:
-    """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
-    for place in (path, *path.parents[: len(path.relative_to(root).parts)]):
-        sync(place)
 
 
 def sha256(text: bytes) -> str:
