@@ -69,8 +69,13 @@ def cloud_dataset(
     """A reachability cloud: tips and activations with everything needed to make them again."""
     import xarray as xr
 
-    attrs = {**provenance(arm, frame), "seed": seed, "sampler": sampler, "tol": tol}
-    attrs |= {"device": device}
+    attrs = {
+        **provenance(arm, frame),
+        "seed": seed,
+        "sampler": sampler,
+        "tol": tol,
+        "device": device,
+    }
     variables = _variables(_CLOUD, arm, {"tip": tip, "activation": activation})
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length

@@ -285,8 +285,13 @@ class _Reader(FaultReader):
                 self._refuse(key, self._document[key], words[block.shape])
         if self._document.get("rings") == []:
             self._refuse("rings", [], "must not be empty")
-        homes = {"[profile]": LinearTaper, "[section]": Section, "[[rings]]": Ring}
-        homes |= {"[materials.NAME]": Material, "[loads]": Loads}
+        homes = {
+            "[profile]": LinearTaper,
+            "[section]": Section,
+            "[[rings]]": Ring,
+            "[materials.NAME]": Material,
+            "[loads]": Loads,
+        }
         for key in (key for key in self._document if key not in LAYOUT):
             home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
             said = f"unknown key; it belongs in {home}"

@@ -268,8 +268,13 @@ def _muscles() -> Iterator[Actuator]:
     for group, ring, (start, end), angle in _TRUNK_GROUPS:
         middle, extent = (start + end) / 2, math.radians(end - start)
         for side, offset, hand in (("right", middle, 1), ("left", (180.0 - middle) % 360.0, -1)):
-            sector: dict[str, Any] = {"name": f"{group} {side}", "ring": ring, "extent": extent}
-            sector |= {"offset": math.radians(offset), "activation_bounds": (-0.5, 0.0)}
+            sector: dict[str, Any] = {
+                "name": f"{group} {side}",
+                "ring": ring,
+                "extent": extent,
+                "offset": math.radians(offset),
+                "activation_bounds": (-0.5, 0.0),
+            }
             if angle is None:
                 yield RadialMuscle(**sector)
             else:

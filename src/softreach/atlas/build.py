@@ -269,11 +269,14 @@ def build_atlas(
     progress = None if progress is None else as_progress(progress)
     check_sampler(sampler, n, 0, seed)
     check_memory("n", n, _SAMPLE_MEMORY * n)
-    known: Any = {"tol": check_tol(tol), "device": device}
-    known |= {"alpha_over_length": as_number("alpha_over_length", alpha_over_length, POSITIVE)}
-    known |= {"accuracy": as_number("accuracy", accuracy, ACCURACIES)}
-    known |= {"metrics": chosen_metrics(metrics)}
-    known |= {"keep_clouds": as_flag("keep_clouds", keep_clouds)}
+    known: Any = {
+        "tol": check_tol(tol),
+        "device": device,
+        "alpha_over_length": as_number("alpha_over_length", alpha_over_length, POSITIVE),
+        "accuracy": as_number("accuracy", accuracy, ACCURACIES),
+        "metrics": chosen_metrics(metrics),
+        "keep_clouds": as_flag("keep_clouds", keep_clouds),
+    }
     command = Command(space=space, n=n, seed=seed, sampler=sampler, **known)
     if space.gaps:
         index, reason = next(iter(space.gaps.items()))

@@ -60,8 +60,12 @@ def array_plans(command: Command) -> Iterator[Plan]:
     designs = dict(zip(space.dims, space.shape, strict=True))
     for name, entries in space.parameters:
         parameter, values = varied[name], np.array(entries)
-        about: dict[str, Any] = {"units": parameter.unit, "long_name": parameter.meaning}
-        about |= {"symbol": parameter.symbol, "part": parameter.owner}
+        about: dict[str, Any] = {
+            "units": parameter.unit,
+            "long_name": parameter.meaning,
+            "symbol": parameter.symbol,
+            "part": parameter.owner,
+        }
         dim = name if space.layout == "grid" else "design"
         fill = 0 if values.dtype == int else np.nan
         yield plan(name, values.dtype, {dim: len(values)}, about, fill, values)
@@ -104,10 +108,15 @@ def _plan(
         chunks = [1 if dim in command.space.dims else size for dim, size in sizes.items()]
     else:
         chunks = [min(size, _CHUNK) for size in sizes.values()]
-    options = {"shape": tuple(sizes.values()), "dtype": dtype, "fill_value": fill}
-    options |= {"chunks": tuple(max(size, 1) for size in chunks)}
-    options |= {"compressors": (Crc32cCodec(),), "dimension_names": tuple(sizes)}
-    options |= {"attributes": attrs | {OF: stores.sha256(command.to_json().encode())}}
+    options = {
+        "shape": tuple(sizes.values()),
+        "dtype": dtype,
+        "fill_value": fill,
+        "chunks": tuple(max(size, 1) for size in chunks),
+        "compressors": (Crc32cCodec(),),
+        "dimension_names": tuple(sizes),
+        "attributes": attrs | {OF: stores.sha256(command.to_json().encode())},
+    }
     if name == "tip":  # activations are random bits, and the same bytes anywhere
         blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
         options["compressors"] = blosc, Crc32cCodec()
@@ -283,9 +292,12 @@ def _attributes(command: Command) -> dict[str, Any]:
         group.create_array(name, **options)
         digests[name] = stores.sha256(memory[f"{name}/{stores.ROOT}"].to_bytes())
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
-    about: dict[str, Any] = {"title": "reachability cloud atlas"}
-    about |= {"design": command.space.base.to_toml(), CUBE_DIGEST: drawn_cube(command)[1]}
-    about |= {"versions": ", ".join(f"{name} {number}" for name, number in versions.items())}
+    about: dict[str, Any] = {
+        "title": "reachability cloud atlas",
+        "design": command.space.base.to_toml(),
+        CUBE_DIGEST: drawn_cube(command)[1],
+        "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
+    }
     return about | {
         "command": command.to_json(),
         stores.ARRAYS: digests,

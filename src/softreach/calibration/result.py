@@ -289,8 +289,13 @@ class Calibration(Reported):
         values |= over(place, "m", measured=data.places, residual=self.residuals)
         values |= over("sample", held_out=self.held, run=data.runs, rank=np.argsort(data.order))
         values |= over(("sample", "input"), input_value=data.inputs)
-        names = {"number": list(self.names), "other": list(self.names), "axis": ["x", "y", "z"]}
-        names |= {"marker": list(data.marker_names), "input": list(self.arm.input_names)}
+        names = {
+            "number": list(self.names),
+            "other": list(self.names),
+            "axis": ["x", "y", "z"],
+            "marker": list(data.marker_names),
+            "input": list(self.arm.input_names),
+        }
         names |= over("input", input_unit=list(self.arm.input_units))
         names |= over("number", unit=[number.unit for number in free.numbers])
         return xr.Dataset(values, names, {**self.provenance, "length": self.arm.length})
@@ -298,9 +303,13 @@ class Calibration(Reported):
     @property
     def provenance(self) -> dict[str, str]:
         """Version, date and data behind the result."""
-        about = {"softreach_version": str(versions()["softreach_version"]), "date": self.date}
-        about |= {"data": self.data.source, "data_sha256": self.data.digest}
-        about |= {"samples": f"{len(self.data)}, of which {self._held_text}"}
+        about = {
+            "softreach_version": str(versions()["softreach_version"]),
+            "date": self.date,
+            "data": self.data.source,
+            "data_sha256": self.data.digest,
+            "samples": f"{len(self.data)}, of which {self._held_text}",
+        }
         error = misses(self.residuals[self._judged]).text(self.start.length)
         about |= {"free": ", ".join(self.names), "error": error}
         return about | {"verdict": self.verdict.sentence}

@@ -74,8 +74,13 @@ def build(
     groups = tuple(sr.atlas.METRIC_GROUPS if metrics is None else metrics.split(","))
     if "concave" not in groups:
         options.refuse("without the metrics concave", alpha=alpha)
-    how: Any = {"metrics": groups, "keep_clouds": keep_clouds, "durable": durable}
-    how |= {"shard": (int(first), int(count)), "device": device}
+    how: Any = {
+        "metrics": groups,
+        "keep_clouds": keep_clouds,
+        "durable": durable,
+        "shard": (int(first), int(count)),
+        "device": device,
+    }
     alpha = "0.05L" if alpha is None else alpha  # in m it would not suit designs of every length
     bare = alpha[:-1] if alpha.endswith("L") else ""
     allowed = "a radius > 0 over the length of each design, like 0.05L"

@@ -87,8 +87,15 @@ def calibrate(
     outputs = [pair for pair in ((out, DESIGN_FILE), (report, REPORT), (table, TABLES)) if pair[0]]
     for path, formats in outputs or [(None, {})]:
         options.check_output(path, formats, output.overwrite)
-    known: Any = {"hold_out": hold_out, "hold_out_runs": hold_out_runs, "robust": robust}
-    known |= {"rivals": rivals, "run": run, "order": order, "seed": seed}
+    known: Any = {
+        "hold_out": hold_out,
+        "hold_out_runs": hold_out_runs,
+        "robust": robust,
+        "rivals": rivals,
+        "run": run,
+        "order": order,
+        "seed": seed,
+    }
     with progress.bar("fitting", None) as step:
         known |= {"free": free_names(arm, free), "prior": priors(arm, prior or ())}
         known |= {"noise": None if noise is None else _noise(noise)}
@@ -118,13 +125,22 @@ def _record(result: sr.calibration.Calibration) -> dict[str, Any]:
     """All of it for machines: lengths in m, angles in degrees."""
     held, data, again = result.held, result.data, result.repeatability
     errors = [{"law": law, "samples": on, **_errors(each)} for law, on, each in result.errors]
-    record = {"samples": len(data), "held_out": int(held.sum()), "errors": errors}
-    record |= {"markers": {name: _errors(each) for name, each in result.by_marker.items()}}
-    record |= {"numbers": _numbers(result.to_dataset()), "correlated": result.correlated}
-    record |= {"doubts": result.doubts, "outlier_rows": result.outliers}
-    record |= {"repeatability_rms_m": again.rms, "repeated_samples": again.pairs}
-    record |= {"limit": result.verdict.limit, "verdict": result.verdict.sentence}
-    record |= {"converged": result.fit.converged, "seconds": result.seconds}
+    record = {
+        "samples": len(data),
+        "held_out": int(held.sum()),
+        "errors": errors,
+        "markers": {name: _errors(each) for name, each in result.by_marker.items()},
+        "numbers": _numbers(result.to_dataset()),
+        "correlated": result.correlated,
+        "doubts": result.doubts,
+        "outlier_rows": result.outliers,
+        "repeatability_rms_m": again.rms,
+        "repeated_samples": again.pairs,
+        "limit": result.verdict.limit,
+        "verdict": result.verdict.sentence,
+        "converged": result.fit.converged,
+        "seconds": result.seconds,
+    }
     return record | {"data": data.source, "data_sha256": data.digest}
 
 

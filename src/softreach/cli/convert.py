@@ -64,9 +64,14 @@ def design(
 
 def _for_machines(facts: "sr.rod.DesignSummary") -> dict[str, Any]:
     arm = facts.arm
-    bundles: Any = {"name": arm.bundle_names, "unit": arm.bundle_units, "bounds": arm.bounds}
-    bundles |= {"strain": facts.bundle_strain, "extension": facts.bundle_extension}
-    bundles |= {"bending_times_R2": facts.bundle_bending}
+    bundles: Any = {
+        "name": arm.bundle_names,
+        "unit": arm.bundle_units,
+        "bounds": arm.bounds,
+        "strain": facts.bundle_strain,
+        "extension": facts.bundle_extension,
+        "bending_times_R2": facts.bundle_bending,
+    }
     drives = {"name": arm.input_names, "unit": arm.input_units, "bounds": arm.input_bounds}
     texts = {name: getattr(facts, name) for name in ("lacking", "validity", "warnings")}
     inputs = {"inputs": _records(drives)} if arm.drives else {}

@@ -32,10 +32,12 @@ Kind = Literal[
     "designs", "examples", "materials", "actuators", "metrics", "objectives", "parameters"
 ]
 Table = Iterator[tuple[Any, ...]]  # names of the columns, then rows
-_FILES = {"tentacle": ("tentacle.toml", "tentacle.csv")}
-_FILES |= {"three_fibers": ("three_fibers.toml", "five_places.toml")}
-_FILES |= {"tendon_arm": ("tendon_arm.toml", "tendon_arm.sh", "requirement_check.py")}
-_FILES |= {"spine": ("spine.toml", "magnets.py", "own_actuator.sh")}
+_FILES = {
+    "tentacle": ("tentacle.toml", "tentacle.csv"),
+    "three_fibers": ("three_fibers.toml", "five_places.toml"),
+    "tendon_arm": ("tendon_arm.toml", "tendon_arm.sh", "requirement_check.py"),
+    "spine": ("spine.toml", "magnets.py", "own_actuator.sh"),
+}
 
 
 def demo(
@@ -60,8 +62,13 @@ def demo(
 
     start = perf_counter()
     arm = design_from("minimal_trunk", unit=output.unit)
-    formats = {"design.toml": DESIGN_FILE, "cloud.zarr": CLOUD_STORE, "cloud.png": PICTURES}
-    formats |= {"cloud.ply": CLOUD_FILES, "hull.ply": CLOUD_FILES}
+    formats = {
+        "design.toml": DESIGN_FILE,
+        "cloud.zarr": CLOUD_STORE,
+        "cloud.png": PICTURES,
+        "cloud.ply": CLOUD_FILES,
+        "hull.ply": CLOUD_FILES,
+    }
     for name, kinds in formats.items():
         options.check_output(out / name, kinds, output.overwrite)
     check_memory("n", n, HULL_BYTES * n)
@@ -211,8 +218,14 @@ def _parameters(arm: "sr.Manipulator") -> Table:
         yield written_name(name, one.unit), value, unit, one.symbol, one.meaning
 
 
-_TABLES = {"designs": _designs, "examples": _examples, "materials": _materials}
-_TABLES |= {"actuators": _actuators, "metrics": _metrics, "objectives": _objectives}
+_TABLES = {
+    "designs": _designs,
+    "examples": _examples,
+    "materials": _materials,
+    "actuators": _actuators,
+    "metrics": _metrics,
+    "objectives": _objectives,
+}
 
 
 def paper(*, quick: bool = False, out: Place = Path("paper"), overwrite: Overwrite = False) -> None:
@@ -346,9 +359,14 @@ def doctor(*, json: options.AsJson = False) -> None:
     names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
     has_screen = platform.system() in ("Windows", "Darwin")
     has_screen = has_screen or bool({"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ})
-    named = {"softreach": sr.__version__, "installed in": str(Path(sr.__file__).parent)}
-    named |= {"Python": platform.python_version(), "system": platform.platform()}
-    named |= {"cores": os.cpu_count(), "threads used": parallel.thread_count()}
+    named = {
+        "softreach": sr.__version__,
+        "installed in": str(Path(sr.__file__).parent),
+        "Python": platform.python_version(),
+        "system": platform.platform(),
+        "cores": os.cpu_count(),
+        "threads used": parallel.thread_count(),
+    }
     rows = fields_of(named) | {"free memory": (round(free_memory() / 1e9, 1), "GB")}
     screen = "yes" if has_screen else "none: headless"
     rows |= fields_of({"kernels are kept in": kept, "screen": screen})

@@ -220,8 +220,12 @@ def cloud(
     dataset = sr.compute_cloud(arm, **arguments, tol=tol, device=device)
     seconds = perf_counter() - start
     sr.save_cloud(dataset, out, overwrite=output.overwrite)
-    named = {"samples": arguments["n"], "sampler": arguments["sampler"], "seed": arguments["seed"]}
-    named |= {"steps per arm": sr.rod.as_tip_map(arm, tol).steps}
+    named = {
+        "samples": arguments["n"],
+        "sampler": arguments["sampler"],
+        "seed": arguments["seed"],
+        "steps per arm": sr.rod.as_tip_map(arm, tol).steps,
+    }
     rows = fields_of(named | {"device": dataset.attrs["device"]})
     rows |= {"time to compute": (round(seconds, 3), "s"), **load_rows(arm)}
     for status in sr.rod.TipStatus if "status" in dataset else ():
@@ -288,8 +292,12 @@ def volume(
 def volume_rows(concave: sr.volume.Hull, convex: sr.volume.Hull) -> Rows:
     """The size of a cloud and the trust that it deserves."""
     share = 1 - concave.volume / convex.volume if convex.volume else None
-    rows: Rows = {"points": (concave.n, ""), "alpha": (concave.alpha, "m")}
-    rows |= {"mean spacing": (concave.spacing, "m"), "regions": (concave.regions, "")}
+    rows: Rows = {
+        "points": (concave.n, ""),
+        "alpha": (concave.alpha, "m"),
+        "mean spacing": (concave.spacing, "m"),
+        "regions": (concave.regions, ""),
+    }
     rows["volume"] = concave.volume, "m³"
     rows["volume without sampling bias (estimate)"] = concave.volume_corrected, "m³"
     return rows | {"convex volume": (convex.volume, "m³"), "unreachability": (share, "")}

@@ -65,9 +65,11 @@ def _checked(result: sr.requirements.Check) -> dict[str, Any]:
     names = ("met", "verdict", "excess", "places", "gaps", "poses", "effort")
     fields = fields_of({name: getattr(result, name) for name in names}, "places", "gaps")
     fields["direction_errors"] = to_degrees(result.direction_errors), "deg"
-    known: Any = {"payloads_kg": result.payloads}
-    known |= {"findings": [{**vars(each), "met": each.met} for each in result.findings]}
-    known |= {"coverages": [coverage._asdict() for coverage in result.coverages]}
+    known: Any = {
+        "payloads_kg": result.payloads,
+        "findings": [{**vars(each), "met": each.met} for each in result.findings],
+        "coverages": [coverage._asdict() for coverage in result.coverages],
+    }
     return for_machines(fields, result.arm.length) | known
 
 
@@ -126,9 +128,12 @@ def search(
         "minimize": None if minimize is None else minimize.split(","),
         "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2") or None,
         "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4") or None,
+        "polish": polish,
+        "designs": designs,
+        "seed": seed,
+        "accuracy": accuracy,
+        "sampler": sampler,
     }
-    asked_for |= {"polish": polish, "designs": designs, "seed": seed}
-    asked_for |= {"accuracy": accuracy, "sampler": sampler}
     given = {name: value for name, value in asked_for.items() if value is not None}
     text = read_text("requirements", needs, LONGEST)
     designs_from = partial(design_from, changes=Changes(point=point))

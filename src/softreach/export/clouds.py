@@ -218,7 +218,11 @@ def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
     write_vtu(file, table.tip, cells, compression=None, point_data=data)
 
 
-CLOUD_FILES = {".ply": FileFormat(write=_write_ply), ".csv": FileFormat(write=_write_csv)}
-CLOUD_FILES |= {".parquet": FileFormat(("pyarrow",), _write_parquet)}
-CLOUD_FILES |= {".npz": FileFormat(write=_write_npz), ".mat": FileFormat(write=_write_mat)}
-CLOUD_FILES |= {".vtu": FileFormat(("meshio",), _write_vtu)}
+CLOUD_FILES = {
+    ".ply": FileFormat(write=_write_ply),
+    ".csv": FileFormat(write=_write_csv),
+    ".parquet": FileFormat(("pyarrow",), _write_parquet),
+    ".npz": FileFormat(write=_write_npz),
+    ".mat": FileFormat(write=_write_mat),
+    ".vtu": FileFormat(("meshio",), _write_vtu),
+}

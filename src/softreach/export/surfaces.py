@@ -178,9 +178,13 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     # as a node and not in the numbers, so that a reader gets back the vertices we have
     meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
     for part in scene.parts:
-        look = {"metallicFactor": 0.0, "roughnessFactor": 0.6, "doubleSided": True}
-        look |= {"baseColorFactor": [*part.color, part.opacity]}
-        look |= {"alphaMode": "BLEND" if part.opacity < 1 else None}
+        look = {
+            "metallicFactor": 0.0,
+            "roughnessFactor": 0.6,
+            "doubleSided": True,
+            "baseColorFactor": [*part.color, part.opacity],
+            "alphaMode": "BLEND" if part.opacity < 1 else None,
+        }
         material = trimesh.visual.material.PBRMaterial(name=part.name, **look)
         visual = trimesh.visual.TextureVisuals(material=material)
         mesh = trimesh.Trimesh(part.vertices, part.faces, visual=visual, process=False)

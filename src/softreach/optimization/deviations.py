@@ -129,9 +129,11 @@ class Spread:
         levels = np.clip([self.level - off, self.level, self.level + off], 0.0, 1.0)
         low, quantile, high = np.quantile(values, levels).tolist()
         numbers = {"made_mean": mean, "made_deviation": deviation, "made_quantile": quantile}
-        errors = {"made_error": math.hypot(deviation / math.sqrt(count), error)}
-        errors |= {"deviation_error": math.sqrt(spread)}
-        errors |= {"quantile_error": math.hypot(0.5 * (high - low), error)}
+        errors = {
+            "made_error": math.hypot(deviation / math.sqrt(count), error),
+            "deviation_error": math.sqrt(spread),
+            "quantile_error": math.hypot(0.5 * (high - low), error),
+        }
         return replace(self, made=count, **numbers, **errors)
 
     def __str__(self) -> str:

@@ -133,10 +133,12 @@ class Search(Reported):
         """Version, objectives and numbers of designs behind the result."""
         judged = ", ".join(f"{count} {word}" for word, count in self.judged.items())
         goals = [f"{'max' if goal.sense > 0 else 'min'}imize {goal.name}" for goal in self.goals]
-        about = {"softreach_version": str(versions()["softreach_version"])}
-        about |= {"objectives": ", ".join(goals) or "none"}
-        about |= {"designs": f"{self.designs}, judged by {judged}"}
-        about |= {"accuracy": f"{self.problem.accuracy:g}, on the way {self.problem.coarse:g}"}
+        about = {
+            "softreach_version": str(versions()["softreach_version"]),
+            "objectives": ", ".join(goals) or "none",
+            "designs": f"{self.designs}, judged by {judged}",
+            "accuracy": f"{self.problem.accuracy:g}, on the way {self.problem.coarse:g}",
+        }
         return about | {
             "sampler": self.sampler,
             "seed": str(self.seed),
@@ -158,8 +160,13 @@ class Search(Reported):
 
         every, free, goals = self.every, self.problem.parameters.free, self.goals
         arm, numbers = self.shown, self._numbers(every)
-        about = {**provenance(arm), "length": arm.length, "display_unit": arm.display_unit or ""}
-        about |= {**self.provenance, "finalists": len(self.finalists)}
+        about = {
+            **provenance(arm),
+            "length": arm.length,
+            "display_unit": arm.display_unit or "",
+            **self.provenance,
+            "finalists": len(self.finalists),
+        }
         places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
         coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
         looked_at = np.cumsum([each.designs for each in self.candidates], dtype=int)

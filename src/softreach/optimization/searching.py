@@ -146,8 +146,13 @@ class _Run:
         others = study.others()
         every = [*study.candidates, *others]
         finalists = self._at_full_accuracy(every)
-        found: Any = {"front": tuple(self.problem.front(finalists)), "finalists": tuple(finalists)}
-        found |= {"candidates": tuple(every), "seed": study.seed, "sampler": study.kind}
+        found: Any = {
+            "front": tuple(self.problem.front(finalists)),
+            "finalists": tuple(finalists),
+            "candidates": tuple(every),
+            "seed": study.seed,
+            "sampler": study.kind,
+        }
         spent, seconds = sum(each.designs for each in others), time.perf_counter() - self._begun
         spent += self._spent
         return Search(problem=self.problem, designs=spent, seconds=seconds, **found)

@@ -173,11 +173,17 @@ def sensitivity(
         if n and variance:
             variance = _variances(problem, n, seed, progress)
     parameters, goals = problem.parameters, [goal.objective for goal in problem.goals]
-    found: Any = {"gradient": gradient, "gradient_error": error, "variance": variance}
-    found |= {"multipliers": multipliers, "residual": residual}
-    found |= {"goals": tuple(goal.name for goal in goals), "parameters": parameters.names}
-    found |= {"goal_units": tuple(goal.unit for goal in goals)}
-    found |= {"reals": tuple(each.name for each in parameters.real)}
+    found: Any = {
+        "gradient": gradient,
+        "gradient_error": error,
+        "variance": variance,
+        "multipliers": multipliers,
+        "residual": residual,
+        "goals": tuple(goal.name for goal in goals),
+        "parameters": parameters.names,
+        "goal_units": tuple(goal.unit for goal in goals),
+        "reals": tuple(each.name for each in parameters.real),
+    }
     units = tuple(each.unit for each in parameters.real)
     return Sensitivity(units=units, designs=n * (len(parameters) + 2), **found)
 

@@ -165,8 +165,10 @@ class Tolerance:
         fields += ("made_quantile", "quantile_error")
         numbers = {x: [getattr(each, x) for each in self.spreads] for x in fields}
         names = [target.name for target in self.targets for _ in target.probability]
-        shares = {"probability": [[], *(target.probability for target in self.targets)]}
-        shares |= {"made_share": [[], *(target.made for target in self.targets)]}
+        shares = {
+            "probability": [[], *(target.probability for target in self.targets)],
+            "made_share": [[], *(target.made for target in self.targets)],
+        }
         values = over("number", **numbers) | over("parameter", sigma=self.sigmas)
         values |= over("parameter", "1", cost=self.costs)
         values |= over("place", target=np.array(names, dtype=str))
@@ -221,8 +223,14 @@ def _tolerance(first: FirstOrder, checked: int, seed: int, progress: Progress) -
         targets.append(TargetTolerance(target.name, first.probability(target), share, len(made)))
     own, units = first.deviations, tuple(each.unit for each in first.deviations.parameters)
     of_arm: Any = {"arm": own.arm, "parameters": own.names, "units": units, "sigmas": own.sigmas}
-    of_sets: Any = {"kept": kept, "volume": volume, "unreachability": unreachability}
-    of_sets |= {"targets": tuple(targets), "regions": tuple(regions), "costs": first.costs()}
+    of_sets: Any = {
+        "kept": kept,
+        "volume": volume,
+        "unreachability": unreachability,
+        "targets": tuple(targets),
+        "regions": tuple(regions),
+        "costs": first.costs(),
+    }
     return Tolerance(made=len(made), impossible=checked - len(made), **of_arm, **of_sets)
 
 

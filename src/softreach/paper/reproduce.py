@@ -25,8 +25,14 @@ from softreach.support.files.atomic import MARK, check_place
 from softreach.support.files.text import write_text
 from softreach.support.report import Report, Section
 
-SECTIONS: dict[str, Any] = {"model": model, "misprints": model, "redundancy": redundancy}
-SECTIONS |= {"volume": sweep, "sweep": sweep, "uniqueness": redundancy}
+SECTIONS: dict[str, Any] = {
+    "model": model,
+    "misprints": model,
+    "redundancy": redundancy,
+    "volume": sweep,
+    "sweep": sweep,
+    "uniqueness": redundancy,
+}
 """Name of a part -> module whose function of that name computes its numbers; short ones first."""
 
 

@@ -90,9 +90,16 @@ def web_page(
     `more` is HTML at the end, whose scripts know the names of the page's own; `scripts` says where
     else scripts may come from, as a Content-Security-Policy has it.
     """
-    content = {"box": box.tolist(), "unit": unit.name, "labels": [unit.label(x) for x in "xyz"]}
-    content |= {"views": [(name, *VIEWS[name]) for name in _BUTTONS], "start": view_angles(view)}
-    content |= {"keys": [key._asdict() for key in keys], "caption": caption, "note": note}
+    content = {
+        "box": box.tolist(),
+        "unit": unit.name,
+        "labels": [unit.label(x) for x in "xyz"],
+        "views": [(name, *VIEWS[name]) for name in _BUTTONS],
+        "start": view_angles(view),
+        "keys": [key._asdict() for key in keys],
+        "caption": caption,
+        "note": note,
+    }
     content["parts"] = [part if isinstance(part, dict) else packed(part, box) for part in parts]
     page = files("softreach.picture").joinpath("page.html").read_text(encoding="utf-8")
     title = html.escape(caption.partition("\n")[0] or "softreach")

@@ -8,8 +8,14 @@ from softreach.support.errors import InvalidInput
 
 View = str | tuple[float, float]
 
-VIEWS = {"front": (-np.pi / 2, 0.0), "side": (0.0, 0.0), "top": (-np.pi / 2, np.pi / 2)}
-VIEWS |= {"oblique": (-np.pi / 3, np.pi / 9), "back": (np.pi / 2, 0.0), "left": (np.pi, 0.0)}
+VIEWS = {
+    "front": (-np.pi / 2, 0.0),
+    "side": (0.0, 0.0),
+    "top": (-np.pi / 2, np.pi / 2),
+    "oblique": (-np.pi / 3, np.pi / 9),
+    "back": (np.pi / 2, 0.0),
+    "left": (np.pi, 0.0),
+}
 """Azimuth and elevation of the camera [rad].
 
 The front is at -y, where the longitudinal fiber lies; "side" is seen from the right, +x, and "left"

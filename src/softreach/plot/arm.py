@@ -321,9 +321,12 @@ def plot_equilibria(
         for k, shape in enumerate(shapes):
             follows, ring = k == equilibria.followed, " ring" * bool(equilibria.is_ring[k])
             kind = ("stable" if stable[k] else "unstable") + ring
-            look = {"color": _FOLLOWED if follows else _STABLE if stable[k] else _UNSTABLE}
-            look |= {"linestyle": "-" if stable[k] else "--", "solid_capstyle": "round"}
-            look |= {"label": f"{kind}, the posture" if follows else kind}
+            look = {
+                "color": _FOLLOWED if follows else _STABLE if stable[k] else _UNSTABLE,
+                "linestyle": "-" if stable[k] else "--",
+                "solid_capstyle": "round",
+                "label": f"{kind}, the posture" if follows else kind,
+            }
             wide = 1.4 if stable[k] or follows else 1.0
             panel.plot(counted.of(shape["position"].values), linewidth=wide, **look)
         panel.plot(rim, color="0.2", linewidth=2.0, solid_capstyle="round")

@@ -35,9 +35,14 @@ _METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
 _UNITS = {"rad": "°", "1": ""}
 _INDEXED = re.compile(r"(?<![a-z])[ERZaρθγ][0-9]+")
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
-_NAMES = {"volume": "V/L³ (α-shape)", "exact_volume": "V/L³ (exact)"}
-_NAMES |= {"convex_volume": "convex V/L³", "exact_convex_volume": "convex V/L³ (exact)"}
-_NAMES |= {"unreachability": "UNR (α-shape)", "exact_unreachability": "UNR (exact)"}
+_NAMES = {
+    "volume": "V/L³ (α-shape)",
+    "exact_volume": "V/L³ (exact)",
+    "convex_volume": "convex V/L³",
+    "exact_convex_volume": "convex V/L³ (exact)",
+    "unreachability": "UNR (α-shape)",
+    "exact_unreachability": "UNR (exact)",
+}
 _RELATIVE = {"m": " / L", "m2": " / L²", "m3": " / L³", "1/m": " · L"}
 
 

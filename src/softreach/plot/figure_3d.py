@@ -231,10 +231,13 @@ class Scene:
 
 
 _CLASSES = {"AllEquilibria": "equilibria", "ReachableSet": "set", "Hull": "hull"}
-_LENGTHS = {"arm": attrgetter("length"), "set": attrgetter("arm.length")}
-_LENGTHS |= {"equilibria": attrgetter("rod.arm.length")}
-_LENGTHS |= {"cloud": lambda thing: thing["tip"].attrs.get("length")}
-_LENGTHS |= {"configuration": lambda thing: design_of(thing).length}
+_LENGTHS = {
+    "arm": attrgetter("length"),
+    "set": attrgetter("arm.length"),
+    "equilibria": attrgetter("rod.arm.length"),
+    "cloud": lambda thing: thing["tip"].attrs.get("length"),
+    "configuration": lambda thing: design_of(thing).length,
+}
 """L [m] of the arm that a thing is of, by its kind."""
 
 

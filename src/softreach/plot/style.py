@@ -23,9 +23,18 @@ from softreach.support.units import METER, LengthUnit, as_unit
 
 Unit = str | LengthUnit | None  # one asked for, "m", "cm", "mm" or "L"; None for L if known, else m
 DPI = 250  # pixels per inch of images inside figures, and of saved PNG files
-_RC: dict[str, Any] = {"figure.facecolor": "white", "font.family": "sans-serif", "font.size": 8}
-_RC |= {"axes.facecolor": "white", "axes.edgecolor": "0.35", "axes.linewidth": 0.6}
-_RC |= {"axes.labelsize": 8, "axes.titlesize": 8, "legend.fontsize": 7, "legend.frameon": False}
+_RC: dict[str, Any] = {
+    "figure.facecolor": "white",
+    "font.family": "sans-serif",
+    "font.size": 8,
+    "axes.facecolor": "white",
+    "axes.edgecolor": "0.35",
+    "axes.linewidth": 0.6,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+}
 _TICKS = {"labelsize": 7, "color": "0.25", "major.width": 0.6, "major.size": 2.5}
 _RC |= {f"{axis}tick.{name}": value for axis in "xy" for name, value in _TICKS.items()}
 # names that others gave, such as $x_1$ or 50 %, are no mathematics and no LaTeX
@@ -106,9 +115,14 @@ def place_panels(
     scale = (width - left - right - beside * (len(columns) - 1)) / sum(columns)
     wide, high = scale * sum(columns), scale * sum(rows)
     height = bottom + high + between * (len(rows) - 1) + top
-    place = {"left": left / width, "right": 1 - right / width}
-    place |= {"bottom": bottom / height, "top": 1 - top / height}
-    place |= {"wspace": beside * len(columns) / wide, "hspace": between * len(rows) / high}
+    place = {
+        "left": left / width,
+        "right": 1 - right / width,
+        "bottom": bottom / height,
+        "top": 1 - top / height,
+        "wspace": beside * len(columns) / wide,
+        "hspace": between * len(rows) / high,
+    }
     figure = new_figure(figsize=(width, height))
     ratios = {"height_ratios": rows, "width_ratios": columns}
     grid = figure.add_gridspec(len(rows), len(columns), **ratios, **place)

@@ -389,8 +389,13 @@ def _ends(
     """Ends of descents to places, and angles from the directions wanted there [rad]; 0 if none."""
     if not goals.directed.any():
         return nearest_tips(rod, start, goals.places, enough), np.zeros(len(start))
-    options: Any = {"residual": enough, "reach_tol": enough, "direction_weight": weight}
-    options |= {"cone": float(goals.cones[0]), "within": float(goals.within[0])}
+    options: Any = {
+        "residual": enough,
+        "reach_tol": enough,
+        "direction_weight": weight,
+        "cone": float(goals.cones[0]),
+        "within": float(goals.within[0]),
+    }
     near = np.zeros_like(start)
     request = Request(targets=goals.places, near=near, direction=goals.directions, **options)
     gamma = compromises(rod, request, start).gamma

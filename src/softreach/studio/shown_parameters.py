@@ -50,9 +50,17 @@ _MORE = {
     "lower": "; the most that a bundle contracts",
     "upper": "; the most that a bundle extends",
 }
-_WORDS = {"L": "length", "R0/R2": "bore / outer radius", "E": "modulus", "ρ": "density"}
-_WORDS |= {"ν": "Poisson's ratio", "min τ": "least tension", "max τ": "largest tension"}
-_WORDS |= {"min P": "least pressure", "max P": "largest pressure"}
+_WORDS = {
+    "L": "length",
+    "R0/R2": "bore / outer radius",
+    "E": "modulus",
+    "ρ": "density",
+    "ν": "Poisson's ratio",
+    "min τ": "least tension",
+    "max τ": "largest tension",
+    "min P": "least pressure",
+    "max P": "largest pressure",
+}
 _HALVINGS = 14
 
 

@@ -138,8 +138,16 @@ class InvalidDesign(SoftreachError, ValueError):
         super().__init__(("\n  " if source else "\n").join([*head, *map(str, self.faults)]))
 
 
-_EXTRAS = {"matplotlib": "plot", "skimage": "surface", "distributed": "cluster", "viser": "studio"}
-_EXTRAS |= {"numba_cuda": "cuda", "jinja2": "report", "optuna": "search", "cmaes": "search"}
+_EXTRAS = {
+    "matplotlib": "plot",
+    "skimage": "surface",
+    "distributed": "cluster",
+    "viser": "studio",
+    "numba_cuda": "cuda",
+    "jinja2": "report",
+    "optuna": "search",
+    "cmaes": "search",
+}
 _EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")  # module -> extra with it
 
 

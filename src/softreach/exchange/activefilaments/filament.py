@@ -167,8 +167,12 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
     shared = Counter(places)
     for k, ring in enumerate(section.rings):
         share = max(shared[k], 1)
-        known: Any = {"young_modulus": _modulus(ring.material) / share, "scale": float(share)}
-        known |= {"poisson_ratio": ring.material.poisson_ratio, "name": ring.name}
+        known: Any = {
+            "young_modulus": _modulus(ring.material) / share,
+            "scale": float(share),
+            "poisson_ratio": ring.material.poisson_ratio,
+            "name": ring.name,
+        }
         radii = ring.inner_ratio * base, ring.outer_ratio * base
         body = FilamentRing(radii=radii, **known)
         if not shared[k]:
@@ -178,9 +182,14 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
                 continue
             angle: Any = fiber.helical_angle_on(arm.profile, arm.section)
             angle = angle if isinstance(angle, Pieces) else float(angle)
-            own: Any = {"angle": angle, "extent": fiber.extent, "offset": fiber.offset}
-            own |= {"bounds": tuple(map(tuple, (fiber.bounds * body.scale).tolist()))}
-            own |= {"bundles": tuple(range(first, first + fiber.bundles)), "name": fiber.name}
+            own: Any = {
+                "angle": angle,
+                "extent": fiber.extent,
+                "offset": fiber.offset,
+                "bounds": tuple(map(tuple, (fiber.bounds * body.scale).tolist())),
+                "bundles": tuple(range(first, first + fiber.bundles)),
+                "name": fiber.name,
+            }
             yield replace(body, **own)
 
 
@@ -338,8 +347,13 @@ def _fibers(definition: _Value, rings: list[_Value], length: float) -> Iterator[
     for k, (ring, sectors, own) in enumerate(zip(rings, activation, bounds, strict=True)):
         angle = _read_angle(ring.of("fiberArchitecture", "α2"), length)
         extent, offset = sectors.of("σ").number(), sectors.of("θ0").number()
-        known: Any = {"helical_angle": angle, "extent": extent, "offset": offset}
-        known |= {"name": f"ring {k + 1}", "ring": k}
+        known: Any = {
+            "helical_angle": angle,
+            "extent": extent,
+            "offset": offset,
+            "name": f"ring {k + 1}",
+            "ring": k,
+        }
         yield FiberArchitecture(bundles=len(own), activation_bounds=own, **known)
 
 

@@ -78,11 +78,17 @@ def misprints(settings: Settings, notes: Notebook) -> dict[str, Any]:
     around, along = facts.base_radius * (end - start), 1e-6 / np.cos(_TAPER)
     *both, _, corrected = errors.max(axis=0)
     third = _errors(ratio, _TAPER, angle)[2]
-    found: dict[str, Any] = {"deltas": both, "delta3": third, "delta3_corrected": corrected}
-    found |= {**_rotation_errors(arm, angle), "refusal": _refusal(arm), "ratio": ratio}
-    found |= {"volumes": {r: reached.volume for r, reached in sets.items()}}
-    found |= {"helical_angle_deg": np.degrees(angle)}
-    found |= {"from_axis_deg": np.degrees(np.arctan2(around, along))}
+    found: dict[str, Any] = {
+        "deltas": both,
+        "delta3": third,
+        "delta3_corrected": corrected,
+        **_rotation_errors(arm, angle),
+        "refusal": _refusal(arm),
+        "ratio": ratio,
+        "volumes": {r: reached.volume for r, reached in sets.items()},
+        "helical_angle_deg": np.degrees(angle),
+        "from_axis_deg": np.degrees(np.arctan2(around, along)),
+    }
     return found | {"from_circle_deg": np.degrees(np.arctan2(along, around))}
 
 

@@ -129,9 +129,14 @@ def uniqueness(settings: Settings, notes: Notebook) -> dict[str, Any]:
     # two fibers, and one: areas and lengths for L = 1 m
     fewer = [arms[0].replace(actuators=arms[0].actuators[:count]) for count in (2, 1)]
     surface, curve = (reachable_set(arm) for arm in fewer)
-    found: Any = {"share": share.transpose("revolution", "taper").values, "worst": float(worst)}
-    found |= {"revolution_deg": np.degrees(turn), "taper_deg": np.degrees(taper)}
-    found |= {"paper_share": 1 - paper.multiplicity[1] / paper.volume, "tip": tip}
+    found: Any = {
+        "share": share.transpose("revolution", "taper").values,
+        "worst": float(worst),
+        "revolution_deg": np.degrees(turn),
+        "taper_deg": np.degrees(taper),
+        "paper_share": 1 - paper.multiplicity[1] / paper.volume,
+        "tip": tip,
+    }
     return found | {"activations": activations, "area": surface.area, "curve": curve.curve_length}
 
 
