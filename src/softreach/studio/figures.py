@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed
+from softreach.arm.parameters import changed, parameters
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, plane_of
 from softreach.plot.reach import plot_slice
 from softreach.studio import markup
 from softreach.studio.reach import Quality, Reach, exact_set
-from softreach.studio.shown_parameters import ShownParameter, known_parameters, slider_parameters
+from softreach.studio.shown_parameters import ShownParameter, slider_parameters
 from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.widgets import unit_in
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
@@ -216,7 +216,7 @@ class VolumeSlopes(NamedTuple):
 
 def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSlopes:
     """Slopes of a design whose set is known, for all sliders that move continuously."""
-    arm, solid, known = reach.arm, reach.exact, known_parameters(reach.arm)
+    arm, solid, known = reach.arm, reach.exact, parameters(reach.arm)
     slopes = dict[str, Slope]()
     if solid is None or solid.dimension < 3 or not solid.volume > 0:
         return VolumeSlopes(arm, reach.volume, slopes)
@@ -241,15 +241,28 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
     return VolumeSlopes(arm, reach.volume, slopes)
 
 
+class SlopeBar(NamedTuple):
+    """Change of the volume over `PART` of the range of a slider."""
+
+    share: float  # of the largest change of all sliders
+    text: str
+    meaning: str
+
+    def html(self, *, old: bool) -> str:
+        """The bar; that of a design before is faded."""
+        before = "of the design before; " * old
+        return markup.bar(self.share, self.text, before + self.meaning, faded=old)
+
+
 def slope_bars(
-    found: VolumeSlopes, sliders: Mapping[str, tuple[ShownParameter, float]], *, old: bool
-) -> dict[str, str]:
-    """A bar for each slider as HTML: by how much V changes over `PART` of its range."""
+    found: VolumeSlopes, sliders: Mapping[str, tuple[ShownParameter, float]]
+) -> dict[str, SlopeBar]:
+    """A bar for each slider, by its name."""
     part = {name: PART * ends for name, (_, ends) in sliders.items() if name in found.slopes}
     percent = {name: 100 * step / found.volume for name, step in part.items()}  # per ∂V/∂p
     changes = {name: per * found.slopes[name].value for name, per in percent.items()}
     most, unit = max(map(abs, changes.values()), default=0.0) or 1.0, found.arm.length_unit
-    bars, before = {}, "of the design before; " if old else ""
+    bars = {}
     for name, change in changes.items():
         slope, label = found.slopes[name], unit_in(sliders[name][0].label)
         text = quantity(change, "%", max(percent[name] * slope.error, _FINEST))
@@ -257,8 +270,8 @@ def slope_bars(
         per = f"{unit.symbol(3)} per {label}" if label else unit.symbol(3)
         value, error = (number / unit.scale(3) for number in slope)
         meaning = (
-            f"{before}change of V by one hundredth of this slider, "
+            f"change of V by one hundredth of this slider, "
             f"{f'{part[name]:.3g} {label}'.rstrip()}; ∂V/∂({name}) = {quantity(value, per, error)}"
         )
-        bars[name] = markup.bar(change / most, text, meaning, faded=old)
+        bars[name] = SlopeBar(change / most, text, meaning)
     return bars

@@ -85,20 +85,22 @@ class Job:
 
     def is_stale(self, old: Known, new: Known) -> bool:
         """True if a change decides another result: of what is known, any other object."""
-        was, wanted = self.is_wanted(old), self.is_wanted(new)
+        was, wanted = (self.is_wanted(old), self.is_wanted(new)) if self.wanted else (True, True)
         if not (was and wanted):
             return was != wanted
-        read = attrgetter("__class__", *map(in_session, self.depends_on.split()))
-        for a, b in zip(read(old), read(new), strict=True):
-            if a is not b and (isinstance(b, np.ndarray) or a != b):
+        for path in self.depends_on.split():
+            read = attrgetter(in_session(path))
+            before, now = read(old), read(new)
+            if before is not now and (path.startswith("found.") or before != now):
                 return True
         return False
 
 
 def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job]:
     """The jobs whose results a change makes stale; if all is new, those that are of use."""
-    is_due = lambda job: job.is_wanted(new) if old is None else job.is_stale(old, new)
-    return [job for job in jobs if job.depends_on and is_due(job)]
+    if old is None:
+        return [job for job in jobs if job.depends_on and job.is_wanted(new)]
+    return [job for job in jobs if job.depends_on and job.is_stale(old, new)]
 
 
 def _compute_reach(given: Given) -> Results:
@@ -165,7 +167,8 @@ def _draw_surface(given: Given) -> Mapping[str, Any] | None:
 def _differentiate(given: Given) -> Results:
     design, check = given.state.design, given.check
     if (reach := given.found.complete_reach(design)) is not None:
-        yield Learned({"ends": slider_ends(design, given.found.ends, check)})
+        before, ends = given.found.ends, slider_ends(design, given.found.ends, check)
+        yield Learned({"ends": before if ends == before else ends})
         yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 

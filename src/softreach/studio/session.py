@@ -112,11 +112,11 @@ class Session:
         first = self.start.state
         self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
 
-    def restore(self, state: StudioState) -> None:
+    def restore(self, saved: Change) -> None:
         """Take up a state that was saved, and its view."""
-        self.update(lambda _: state)
-        if state.camera is not None:
-            self.look_as(state.camera)
+        self.update(saved)
+        if (camera := self.state.camera) is not None:
+            self.look_as(camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""
