@@ -11,13 +11,13 @@ import pytest
 from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
+from softreach.geometry.surface import section_area
 from softreach.studio import figures
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
 from softreach.studio.figures import (
     Slope,
     VolumeSlopes,
-    enclosed_area,
     section_curves,
     slope_bars,
     swept_volumes,
@@ -240,7 +240,7 @@ def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
     edges = np.linspace(heights.min(), heights.max(), 41)
     middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
     cuts = (Slice(axis="z", center=float(at)) for at in middles)
-    areas = [enclosed_area(section_curves(reach, cut), 2) for cut in cuts]
+    areas = [section_area(section_curves(reach, cut), 2) for cut in cuts]
     assert sum(areas) * width == pytest.approx(reach.volume / trunk.length**3, rel=0.02)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
-from softreach.geometry.surface import plane_cut
+from softreach.geometry.surface import plane_cut, section_area
 from softreach.picture.projection import View, plane_of
 from softreach.plot.reach import plot_slice
 from softreach.studio import markup
@@ -136,22 +136,9 @@ def _described(curves: list[Array], plane: Slice, arm: Manipulator) -> str:
         return "nothing is reached"
     if not all(np.array_equal(curve[0], curve[-1]) for curve in curves):
         return f"{len(curves)} curves"
-    area = enclosed_area(curves, "xyz".index(plane.axis)) * arm.length**2
+    area = section_area(curves, "xyz".index(plane.axis)) * arm.length**2
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     return f"{parts}, {arm.length_unit.rounded(area, 2)}"
-
-
-def enclosed_area(curves: list[Array], axis: int) -> float:
-    """Area within closed curves in a plane across an axis, holes left out."""
-    from matplotlib.path import Path
-
-    flat = [np.delete(curve, axis, axis=1) for curve in curves]
-    total = 0.0
-    for k, curve in enumerate(flat):
-        around = sum(Path(other).contains_point(curve[0]) for j, other in enumerate(flat) if j != k)
-        (x, y), sign = curve.T, -1.0 if around % 2 else 1.0
-        total += sign * abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
-    return total
 
 
 def swept_parameter(state: StudioState) -> ShownParameter | None:

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from softreach.geometry.rays import is_behind
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Found, Known, in_session
 from softreach.studio.reach import Quality, Reach, count_activations, shown_samples, stages
-from softreach.studio.scene.camera import TabCamera, is_behind
+from softreach.studio.scene.camera import TabCamera
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.serve import theme

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.geometry.rays import picked_point
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Known
 from softreach.studio.jobs import Given, Job, News, what_follows
 from softreach.studio.reach import cloud_points, shown_samples
-from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, picked_point
+from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing
 from softreach.studio.scene.scene import Scene, in_slice, shows_cloud
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
