@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
 from softreach.studio.widgets import Ends
 from softreach.studio.work import StaleCheck
+from softreach.support.bisection import last_value
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.units import METER, LengthUnit
 
@@ -53,7 +54,6 @@ _MORE = {
 _WORDS = {"L": "length", "R0/R2": "bore / outer radius", "E": "modulus", "ρ": "density"}
 _WORDS |= {"ν": "Poisson's ratio", "min τ": "least tension", "max τ": "largest tension"}
 _WORDS |= {"min P": "least pressure", "max P": "largest pressure"}
-_HALVINGS = 14
 
 
 class ShownParameter(NamedTuple):
@@ -205,47 +205,9 @@ def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck)
 
         limit = slider.limits[which]
         near = before[slider.name][which] if slider.name in before else None
-        return limit if near == limit else _last(slider.shown, limit, near, exists)
+        return limit if near == limit else last_value(slider.shown, limit, near, exists)
 
     return {each.name: (end(each, 0), end(each, 1)) for each in slider_parameters(arm)}
-
-
-def _last(start: float, limit: float, near: float | None, exists: Callable[[float], bool]) -> float:
-    """The last value from a start toward a limit that exists, of three digits but for the start."""
-    inside, outside = start, limit
-    if near is not None and min(start, limit) < near < max(start, limit):
-        inside, outside = _around(near, start, limit, exists)
-    if outside == limit and exists(limit):
-        return limit
-    for _ in range(_HALVINGS):
-        middle = (inside + outside) / 2
-        middle = round(middle, _decimals(middle))
-        if not min(inside, outside) < middle < max(inside, outside):
-            break
-        inside, outside = (middle, outside) if exists(middle) else (inside, middle)
-    return inside
-
-
-def _around(near: float, start: float, limit: float, exists: Callable[[float], bool]) -> Ends:
-    """A value that exists and one toward the limit that does not, ever farther from `near`.
-
-    The first may be the start, and the second the limit, of which it is not known.
-    """
-    here, digits = exists(near), _decimals(near)
-    last, end = near, limit if here else start
-    step = math.copysign(10.0**-digits, end - near)
-    while abs(step) < abs(end - last):
-        tried = round(last + step, digits)
-        if exists(tried) != here:
-            end = tried
-            break
-        last, step = tried, 2 * step
-    return (last, end) if here else (end, last)
-
-
-def _decimals(value: float) -> int:
-    """Digits after the point that a value of three digits has."""
-    return max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
 
 
 class Part(NamedTuple):
