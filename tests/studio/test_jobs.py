@@ -5,7 +5,6 @@ from itertools import permutations
 
 import numpy as np
 from hypothesis import given
-from numba import njit
 
 from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
@@ -16,7 +15,7 @@ from softreach.studio.reach import Reach
 from softreach.studio.session import Session
 from softreach.studio.state import Camera, Slice, StudioState
 from softreach.studio.tabs import JOBS
-from softreach.studio.work import CompilationWatch, Latest
+from softreach.studio.work import Latest
 from softreach.support.errors import InvalidInput
 from tests.studio.sockets import page
 from tests.studio.test_state import states
@@ -142,21 +141,3 @@ def test_trouble_is_told_the_next_work_is_done_and_none_after_closing():
     assert latest.join(600)
     assert isinstance(told[0], ZeroDivisionError)
     assert done == ["next"]
-
-
-# Compilation is noticed while it lasts
-
-
-def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
-    told = []
-    watch = CompilationWatch(lambda: told.append(bool(watch.running)))
-    inner = njit(lambda x: x + 1)
-    outer = njit(lambda x: 2 * inner(x))
-    assert outer(1) == 4
-    assert told == [True, False]
-    assert outer(2) == 6
-    assert told == [True, False]  # compiled already
-    assert watch.done == 1
-    watch.close()
-    outer(1.5)
-    assert told == [True, False]

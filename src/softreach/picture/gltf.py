@@ -11,6 +11,8 @@ from softreach.support.arrays import Array
 
 _UNLIT = "KHR_materials_unlit"
 _LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
+_LIGHT = np.array([0.35, -0.55, 0.76])  # from the front, the right and above
+_SHADE = 0.38  # of what looks away from it
 
 
 class ColoredSkin(NamedTuple):
@@ -53,3 +55,9 @@ def _linear(colors: Array) -> NDArray[np.uint8]:
     colors = (colors / 255).clip(0, 1)
     colors[:, :3] **= 2.2
     return np.rint(255 * colors).astype(np.uint8)
+
+
+def shaded(colors: NDArray[Any], outward: Array) -> NDArray[np.uint8]:
+    """Colors of a surface, shape (n, 3), as a lamp lights what looks outward, shape (n, 3)."""
+    facing = np.clip(outward @ _LIGHT, -1.0, 1.0)
+    return np.rint(colors * (1.0 - _SHADE * 0.5 * (1.0 - facing))[:, None]).astype(np.uint8)

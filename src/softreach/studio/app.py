@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
+from softreach.kernels.compiler import CompilationWatch
 from softreach.plot.style import pyplot
 from softreach.studio import serve
 from softreach.studio.scene.camera import UPRIGHT, VIEWS
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.tabs import JOBS, furnish
-from softreach.studio.work import CompilationWatch, Latest
+from softreach.studio.work import Latest
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:

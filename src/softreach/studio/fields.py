@@ -14,14 +14,13 @@ from typing import Any, NamedTuple
 
 from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part, paragraph
-from softreach.studio.session import Session
+from softreach.studio.session import Change, Session
 from softreach.studio.state import LARGEST, StudioState
 from softreach.studio.widgets import Ends, Line, Slider, TextKind, TypedField, number_kind, unit_in
 from softreach.support.errors import SoftreachError
 from softreach.support.files.text import text_of
 
 Action = Callable[[], object]
-Change = Callable[[StudioState], StudioState]
 Names = Mapping[Any, str]
 Options = Callable[[StudioState], Names]
 Kind = Callable[[str, Callable[[], float]], TextKind]

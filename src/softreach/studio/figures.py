@@ -15,6 +15,7 @@ from softreach.arm.parameters import changed, parameters
 from softreach.geometry.surface import plane_cut, section_area
 from softreach.picture.projection import View, plane_of
 from softreach.plot.reach import plot_slice
+from softreach.plot.style import inked
 from softreach.studio import markup
 from softreach.studio.reach import Quality, Reach, exact_set
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
@@ -55,17 +56,6 @@ def _axes(height: float) -> Axes:
     from matplotlib.figure import Figure  # away from pyplot, which belongs to one thread
 
     return Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained").subplots()
-
-
-def inked(figure: Figure, color: str) -> None:
-    """Write all words of a figure in a color, and those of legends without a frame."""
-    from matplotlib.legend import Legend
-    from matplotlib.text import Text
-
-    for text in figure.findobj(Text):
-        text.set_color(color)
-    for legend in figure.findobj(Legend):
-        legend.set_frame_on(False)
 
 
 def _pixels(ax: Axes) -> NDArray[np.uint8]:

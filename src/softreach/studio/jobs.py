@@ -260,6 +260,8 @@ def _beside(name: str) -> Job:
 
 _CLOUD: Any = {"draw": _draw_cloud, "draws": "/cloud /unstable", "at_once": False}
 _LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color"
+_OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
+_IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
 _PLANE = "appearance.slice.axis appearance.slice.center"
 _EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged"
 
@@ -270,14 +272,7 @@ SCENE_JOBS = (
     Job("slopes", "design found.reach", _differentiate),
     Job("cloud", f"appearance.level {_LOOKS}", _color_cloud, doing="coloring points", **_CLOUD),
     # The exact boundary
-    Job(
-        "surface",
-        f"found.reach appearance.dark {_LOOKS}",
-        _color_surface,
-        _draw_surface,
-        wanted="appearance.surface",
-        at_once=False,
-    ),
+    Job("surface", _OF_SURFACE, _color_surface, _draw_surface, **_IF_SHOWN),
     Job("section", f"found.reach {_PLANE}", _cut, wanted="appearance.section"),
     Job("sweep", f"{DESIGN} appearance.swept", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),

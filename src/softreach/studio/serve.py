@@ -27,6 +27,7 @@ from softreach.support.errors import InvalidInput, check_installed
 if TYPE_CHECKING:
     from viser import GuiApi, ViserServer
 
+Arrives = Callable[[bool], object]  # hears of a tab, and whether its system is dark
 LOOPBACK, LOCAL = "127.0.0.1", ("localhost", "127.0.0.1", "::1")
 ANYWHERE = ("0.0.0.0", "::")
 _LAST_PORT = 65535
@@ -53,12 +54,9 @@ def start_server(
     host: str = LOOPBACK,
     port: int | None = None,
     token: str = "",
-    arrives: Callable[[bool], object] = lambda dark: None,
+    arrives: Arrives = lambda dark: None,
 ) -> ViserServer:
-    """Start serving the page; no port is for a free one, no token for pages that know none.
-
-    `arrives` hears of each tab before it connects, and whether its system is dark.
-    """
+    """Start serving the page; no port is for a free one, no token for pages that know none."""
     check_installed("viser")
     import viser
 
@@ -139,9 +137,7 @@ def page_headers(host: str) -> dict[str, str]:
 
 
 @contextmanager
-def guarding(
-    host: str, token: str, arrives: Callable[[bool], object] = lambda dark: None
-) -> Iterator[list[Any]]:
+def guarding(host: str, token: str, arrives: Arrives) -> Iterator[list[Any]]:
     """Servers that start in the block check each request; yields those that do."""
     import websockets.asyncio.server as sockets
 

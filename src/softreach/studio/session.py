@@ -29,7 +29,7 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-    from softreach.studio.work import CompilationWatch
+    from softreach.kernels.compiler import CompilationWatch
 
 Change = Callable[[StudioState], StudioState]
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error

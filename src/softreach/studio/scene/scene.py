@@ -14,14 +14,14 @@ from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import Centerline, arm_surface, bundle_skins, inside, marker_points
 from softreach.geometry.rays import way_to
-from softreach.picture.gltf import ColoredSkin, glb
+from softreach.picture.gltf import ColoredSkin, glb, shaded
 from softreach.picture.zbuffer import vertex_normals
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
 from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import NumberedBox
-from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
+from softreach.studio.scene.colors import FAINT, sample_colors, surface_colors
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import bundle_color, eight_bit

@@ -14,10 +14,10 @@ from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
 from softreach.plot.coloring import draw_figure_key
+from softreach.plot.style import inked
 from softreach.rod.kinematics import configuration
 from softreach.studio.captions import legend_text, picture_text, reach_text
 from softreach.studio.fields import GRAY, Change, Fields, file_text
-from softreach.studio.figures import inked
 from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER

@@ -103,10 +103,7 @@ def _numbers(state: StudioState, found: Found) -> tuple[list[Part], list[str]]:
 
 def _status(session: Session, numbers: list[Part], below: list[str]) -> str:
     work = _work(session)
-    if not numbers:
-        first: list[Part] = [session.found.refusal or work]
-    else:
-        first = [*numbers, *([f" · {work}"] * bool(work))]
+    first = [*numbers, f" · {work}" * bool(work)] if numbers else [session.found.refusal or work]
     return markup.status(markup.paragraph(*first), *below)
 
 
