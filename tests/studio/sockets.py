@@ -44,9 +44,8 @@ def connected(studio: Studio, cookie: str = "") -> Iterator[Callable[[object], N
 
     address = studio.url.replace("http", "ws", 1)
     version = [f"viser-v{viser.__version__}"]
-    headers = {"Cookie": cookie}
-    options = {"subprotocols": version, "max_size": None, "additional_headers": headers}
-    with connect(address, **options) as socket:
+    options = {"subprotocols": version, "max_size": None}
+    with connect(address, **options, additional_headers={"Cookie": cookie}) as socket:
 
         def read() -> None:
             with suppress(ConnectionClosed):

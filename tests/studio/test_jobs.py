@@ -63,9 +63,8 @@ def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(t
     ]
     for old, new, jobs in changes:
         assert stale(old, new) == jobs
-    tips = [Found(tip=tip) for tip in (np.zeros(3), np.ones(3), None)]
-    for one, other in permutations(tips, 2):  # of an arm that moves, or loses its equilibrium
-        assert stale(bare, bare, one, other) == {"camera"}
+    for tip, other in permutations((np.zeros(3), np.ones(3), None), 2):  # None: no equilibrium
+        assert stale(bare, bare, Found(tip=tip), Found(tip=other)) == {"camera"}
     reach = Found(reach=object.__new__(Reach))
     assert stale(full, full, NOTHING, reach) == {"axes", "surface", "slopes", "section"}
     assert stale(full, full, reach, reach) == set()
