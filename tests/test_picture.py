@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from softreach.geometry.hull import convex_hull
 from softreach.picture import Dots, Skin, html_card, thumbnail
 from softreach.picture.axes_box import axes_box, seen_from
+from softreach.picture.gltf import ColoredSkin, glb
 from softreach.picture.projection import VIEWS, is_mirrored, project, sight_axis, view_axes
 from softreach.picture.thumbnail import png_bytes
 from softreach.picture.zbuffer import Extent, ZBuffer, shade
@@ -294,3 +295,17 @@ def test_numbers_stand_outside_and_the_name_of_an_axis_keeps_its_distance_from_t
         axis = "xyz".index(box.labels[k][0][0])
         near = ~is_name & (np.abs(texts - texts[k])[:, axis] < 1e-9)
         assert (np.abs(seen[near] - seen[k]) > (19, 11)).any(axis=1).all()
+
+
+def test_a_surface_is_read_back_from_its_file():
+    import trimesh
+
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])
+    skin = ColoredSkin(vertices, np.array([[0, 1, 2]]), np.full((3, 3), 255.0))
+    data = glb(skin, 0.5, vertices[[[0, 1]]], (0, 0, 0), both_sides=False)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
+    surface, lines = scene.geometry.values()
+    np.testing.assert_allclose(surface.vertices, vertices)
+    color = surface.visual.vertex_attributes["color"][0]
+    np.testing.assert_array_equal(color, (255, 255, 255, 128))
+    np.testing.assert_allclose(lines.vertices, vertices[:2])

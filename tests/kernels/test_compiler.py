@@ -28,7 +28,7 @@ import softreach.kernels.compiler
 from softreach import kernels
 from softreach.cli.console import console
 from softreach.kernels import parts
-from softreach.kernels.compiler import FAST, kernel, strict
+from softreach.kernels.compiler import FAST, CompilationWatch, kernel, strict
 
 SCRIPT = """
 import hashlib
@@ -254,3 +254,18 @@ def test_without_any_folder_to_cache_in_kernels_work(monkeypatch):
     monkeypatch.setattr(caching.CacheImpl, "_locator_classes", [])
     assert not was_loaded(in_a_new_process())
     assert not was_loaded(in_a_new_process())
+
+
+def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
+    told = []
+    watch = CompilationWatch(lambda: told.append(bool(watch.running)))
+    inner = njit(lambda x: x + 1)
+    outer = njit(lambda x: 2 * inner(x))
+    assert outer(1) == 4
+    assert told == [True, False]
+    assert outer(2) == 6
+    assert told == [True, False]  # compiled already
+    assert watch.done == 1
+    watch.close()
+    outer(1.5)
+    assert told == [True, False]

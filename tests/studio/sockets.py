@@ -31,7 +31,7 @@ def until(condition: Callable[[], object]) -> None:
 
 
 @contextmanager
-def connected(studio: Studio) -> Iterator[Callable[[object], None]]:
+def connected(studio: Studio, cookie: str = "") -> Iterator[Callable[[object], None]]:
     """What a tab is to the server: a socket that reads all it is sent and has told its camera.
 
     Yields:
@@ -44,7 +44,8 @@ def connected(studio: Studio) -> Iterator[Callable[[object], None]]:
 
     address = studio.url.replace("http", "ws", 1)
     version = [f"viser-v{viser.__version__}"]
-    with connect(address, subprotocols=version, max_size=None) as socket:
+    options = {"subprotocols": version, "max_size": None}
+    with connect(address, **options, additional_headers={"Cookie": cookie}) as socket:
 
         def read() -> None:
             with suppress(ConnectionClosed):
@@ -59,10 +60,10 @@ def connected(studio: Studio) -> Iterator[Callable[[object], None]]:
 
 
 @contextmanager
-def page(studio: Studio) -> Iterator[Session]:
+def page(studio: Studio, cookie: str = "") -> Iterator[Session]:
     """A tab that shows what it has to."""
     known = set(studio.sessions)
-    with connected(studio):
+    with connected(studio, cookie):
         until(lambda: set(studio.sessions) - known)
         session = studio.sessions[max(studio.sessions)]
         until(lambda: session.panels and session.found.reach is not None and not session.busy)

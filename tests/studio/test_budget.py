@@ -11,13 +11,13 @@ import pytest
 from softreach import reachable_set, tip_positions
 from softreach.arm import designs
 from softreach.arm.parameters import changed, parameters
+from softreach.geometry.surface import section_area
 from softreach.studio import figures
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
 from softreach.studio.figures import (
     Slope,
     VolumeSlopes,
-    enclosed_area,
     section_curves,
     slope_bars,
     swept_volumes,
@@ -177,7 +177,8 @@ def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
     sliders = {each.name: (each, each.high - each.low) for each in slider_parameters(trunk)}
     slopes = {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
     found = VolumeSlopes(trunk, 0.7, slopes)
-    bars = slope_bars(found, sliders, old=False)
+    told = slope_bars(found, sliders)
+    bars = {name: each.html(old=False) for name, each in told.items()}
     assert list(bars) == [name for name in sliders if name in found.slopes]
     changes = np.array([found.slopes[name].value * sliders[name][1] for name in bars])
     shares = np.array([share_of(html) for html in bars.values()])
@@ -186,7 +187,7 @@ def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
     of_taper = "\N{MINUS SIGN}1.00 ± 0.01 %", "∂V/∂(taper) = -0.100 ± 0.001 m³ per deg", "0.07 deg"
     assert all(text in bars["taper"] for text in of_taper)  # of V for 0.07 of its 7 degrees
     assert "+1.686 ± 0.001 %" in bars["extent"]
-    old = slope_bars(found, sliders, old=True)["taper"]
+    old = told["taper"].html(old=True)
     assert "of the design before" in old
     assert "opacity:0.4" in old
 
@@ -239,7 +240,7 @@ def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
     edges = np.linspace(heights.min(), heights.max(), 41)
     middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
     cuts = (Slice(axis="z", center=float(at)) for at in middles)
-    areas = [enclosed_area(section_curves(reach, cut), 2) for cut in cuts]
+    areas = [section_area(section_curves(reach, cut), 2) for cut in cuts]
     assert sum(areas) * width == pytest.approx(reach.volume / trunk.length**3, rel=0.02)
 
 

@@ -19,7 +19,7 @@ from softreach.studio.scene.colors import sample_values
 from softreach.studio.scene.scene import in_slice
 from softreach.studio.start import start_on_cloud, start_on_design, start_on_state
 from softreach.studio.state import Slice, StudioState
-from softreach.studio.tabs.export import FILES, content_of, state_from
+from softreach.studio.tabs.export import FILES, content_of, saved
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
@@ -69,7 +69,7 @@ HOSTILE = {
 @pytest.mark.parametrize("name", HOSTILE)
 def test_a_hostile_file_is_refused_in_a_few_words(name):
     with pytest.raises(SoftreachError) as caught:
-        state_from(name, HOSTILE[name].encode(), STATE)
+        saved(name, HOSTILE[name].encode())
     assert len(str(caught.value)) < 6000
     assert "Traceback" not in str(caught.value)
 
@@ -84,7 +84,7 @@ def fine(trunk):
     return [*stages(trunk, 10, SMALL, lambda: None)][-1]
 
 
-def saved(fine, state, kind: str, name: str) -> bytes:
+def written(fine, state, kind: str, name: str) -> bytes:
     tab = SimpleNamespace(state=state, found=Found(reach=fine))
     return content_of(tab, *FILES[kind][name])
 
@@ -100,8 +100,8 @@ def test_files_are_those_of_the_command_line_in_the_unit_of_the_page(fine, tmp_p
         assert run(["export", str(tmp_path / "design.toml"), *out]) == 0
     for name in ("design.toml", "cloud.ply", "surface.3mf", "arm.stl", "arm.3mf", "arm.glb"):
         label = next(k for k, (file, _) in FILES["data"].items() if file == name)
-        assert saved(fine, pulled, "data", label) == (tmp_path / name).read_bytes()
-    assert saved(fine, pulled, "picture", "four views (.png)").startswith(b"\x89PNG")
+        assert written(fine, pulled, "data", label) == (tmp_path / name).read_bytes()
+    assert written(fine, pulled, "picture", "four views (.png)").startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
@@ -117,7 +117,7 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     monkeypatch.setattr(plot, "plot_views", watched)
     cut = Slice(axis="y", center=0.1, thickness=0.3)
     state = StudioState(design=fine.arm).showing(level=14, color=color, slice=cut)
-    saved(fine, state, "picture", "four views (.png)")
+    written(fine, state, "picture", "four views (.png)")
     kept = in_slice(fine.cloud.tip.values / fine.arm.length, cut)
     np.testing.assert_array_equal(plotted["cloud"].tip, fine.cloud.tip[kept])
     wanted = sample_values(fine, 14, color)
@@ -128,7 +128,7 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
 
 
 def test_a_saved_page_holds_everything_itself(fine):
-    page = saved(fine, StudioState(design=fine.arm), "picture", "web page (.html)").decode()
+    page = written(fine, StudioState(design=fine.arm), "picture", "web page (.html)").decode()
     assert size_text(fine.size, fine.arm) in page
     assert "taper φ [deg] 2" in page
     assert "src=" not in page
@@ -138,13 +138,13 @@ def test_a_saved_page_holds_everything_itself(fine):
 def test_a_design_file_changes_the_design_alone(trunk):
     state = StudioState(design=trunk, target=(0.0, 0.1, 0.5))
     other = changed(trunk, {"taper": 0.01})
-    assert state_from("x.TOML", other.to_toml().encode(), state) == state.replace(design=other)
-    assert state_from("x.json", state.to_json().encode(), StudioState(design=other)) == state
+    assert saved("x.TOML", other.to_toml().encode())(state) == state.replace(design=other)
+    assert saved("x.json", state.to_json().encode())(StudioState(design=other)) == state
     with pytest.raises(InvalidInput, match="UTF-8"):
-        state_from("x.toml", b"\xff\xfe", state)
+        saved("x.toml", b"\xff\xfe")
     tight = trunk.with_bounds((-30.0, 0.0))
     with pytest.raises(InvalidDesign, match=r"x\.toml: 1 problem\n.*must keep ζ > 0"):
-        state_from("x.toml", tight.to_toml().encode(), state)
+        saved("x.toml", tight.to_toml().encode())
 
 
 def test_a_design_is_begun_with_at_rest_and_a_saved_state_as_it_is_but_not_a_large_file(

@@ -1,10 +1,10 @@
 """What follows from a change of the state."""
 
 import threading
+from itertools import permutations
 
 import numpy as np
 from hypothesis import given
-from numba import njit
 
 from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
@@ -15,7 +15,7 @@ from softreach.studio.reach import Reach
 from softreach.studio.session import Session
 from softreach.studio.state import Camera, Slice, StudioState
 from softreach.studio.tabs import JOBS
-from softreach.studio.work import CompilationWatch, Latest
+from softreach.studio.work import Latest
 from softreach.support.errors import InvalidInput
 from tests.studio.sockets import page
 from tests.studio.test_state import states
@@ -63,6 +63,8 @@ def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(t
     ]
     for old, new, jobs in changes:
         assert stale(old, new) == jobs
+    for tip, other in permutations((np.zeros(3), np.ones(3), None), 2):  # None: no equilibrium
+        assert stale(bare, bare, Found(tip=tip), Found(tip=other)) == {"camera"}
     reach = Found(reach=object.__new__(Reach))
     assert stale(full, full, NOTHING, reach) == {"axes", "surface", "slopes", "section"}
     assert stale(full, full, reach, reach) == set()
@@ -138,21 +140,3 @@ def test_trouble_is_told_the_next_work_is_done_and_none_after_closing():
     assert latest.join(600)
     assert isinstance(told[0], ZeroDivisionError)
     assert done == ["next"]
-
-
-# Compilation is noticed while it lasts
-
-
-def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():
-    told = []
-    watch = CompilationWatch(lambda: told.append(bool(watch.running)))
-    inner = njit(lambda x: x + 1)
-    outer = njit(lambda x: 2 * inner(x))
-    assert outer(1) == 4
-    assert told == [True, False]
-    assert outer(2) == 6
-    assert told == [True, False]  # compiled already
-    assert watch.done == 1
-    watch.close()
-    outer(1.5)
-    assert told == [True, False]

@@ -70,6 +70,12 @@ def test_arm_and_axes_are_drawn_and_libraries_loaded_before_anything_is_computed
     assert seen[0] == (True, True, True, True)
 
 
+def test_a_tab_is_dark_where_its_system_is(studio):
+    for dark in (True, False):
+        with page(studio, f"softreach_dark={int(dark)}") as session:
+            assert session.state.appearance.dark is dark
+
+
 @pytest.mark.large
 def test_memory_is_returned_once_a_tab_rests_and_of_those_that_are_gone_nothing_stays(
     studio, monkeypatch

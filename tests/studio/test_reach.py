@@ -1,6 +1,5 @@
 """What a design can reach, coarse and fine, and how points are colored, thinned, cut and picked."""
 
-import io
 import math
 from dataclasses import replace
 
@@ -12,6 +11,7 @@ from softreach import schema
 from softreach.arm import designs
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.cloud.clouds import compute_cloud
+from softreach.picture.gltf import ColoredSkin
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import TipStatus, has_tip
@@ -27,7 +27,6 @@ from softreach.studio.reach import (
     shown_samples,
     stages,
 )
-from softreach.studio.scene.camera import is_behind, picked_point
 from softreach.studio.scene.colors import (
     color_names,
     key_html,
@@ -35,7 +34,7 @@ from softreach.studio.scene.colors import (
     sample_values,
     surface_colors,
 )
-from softreach.studio.scene.scene import Scene, Skin, glb, in_slice, sliced
+from softreach.studio.scene.scene import Scene, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.studio.tabs.design import (
     base_field,
@@ -104,16 +103,9 @@ def test_a_slice_shows_what_lies_within_its_thickness(rng):
     np.testing.assert_array_equal(kept, np.abs(points[:, 1] - 0.2) <= 0.15)
 
 
-def test_a_ray_picks_the_nearest_of_the_points_on_it():
-    eye, points = np.zeros(3), np.array([[0, 0, 5.0], [0, 0, 2.0], [1, 0, 1.0], [0, 0, -1.0]])
-    assert picked_point(points, eye, (0, 0, 3)) == 1
-    assert picked_point(points, eye, (1, 0, 1)) == 2
-    assert picked_point(points, eye, (0, 1, 0)) is None
-
-
 def test_a_slice_cuts_a_surface_at_its_planes_and_its_colors_with_it():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 3.0]])
-    skin = Skin(vertices, np.array([[0, 1, 2], [0, 1, 3]]), 100.0 * vertices)
+    skin = ColoredSkin(vertices, np.array([[0, 1, 2], [0, 1, 3]]), 100.0 * vertices)
     cut = Slice(axis="z", center=0.25, thickness=0.5)
     part = sliced(skin, cut)
     corners = part.vertices[part.faces]
@@ -149,27 +141,6 @@ def test_samples_without_a_tip_tell_nothing_of_a_boundary():
     others = replace(reach, cloud=reach.cloud.isel(sample=~lost))
     wanted = others.boundary.cloud.activation.values
     np.testing.assert_array_equal(marked.boundary.cloud.activation.values, wanted)
-
-
-def test_a_surface_is_read_back_from_its_file():
-    import trimesh
-
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])
-    skin = Skin(vertices, np.array([[0, 1, 2]]), np.full((3, 3), 255.0))
-    data = glb(skin, 0.5, vertices[[[0, 1]]], (0, 0, 0), both_sides=False)
-    scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
-    surface, lines = scene.geometry.values()
-    np.testing.assert_allclose(surface.vertices, vertices)
-    color = surface.visual.vertex_attributes["color"][0]
-    np.testing.assert_array_equal(color, (255, 255, 255, 128))
-    np.testing.assert_allclose(lines.vertices, vertices[:2])
-
-
-def test_a_ball_hides_what_is_behind_it_and_nothing_that_it_touches():
-    eye, balls, radii = np.zeros(3), np.array([[0, 0, 2.0], [0, 0, -2.0]]), np.array([0.1, 0.1])
-    places = np.array([[0, 0, 3], [0, 0.09, 3], [0, 0.2, 3], [0, 0, 2.1], [0, 0, 1]])
-    hidden = [is_behind(place, eye, balls, radii) for place in places]
-    assert hidden == [True, True, False, False, False]
 
 
 # Loads as they are typed, and what is computed of a loaded arm

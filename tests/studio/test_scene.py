@@ -19,7 +19,6 @@ from softreach.rod.kinematics import marker_positions
 from softreach.studio.found import Found
 from softreach.studio.reach import Size, stages
 from softreach.studio.scene.camera import NumberedBox
-from softreach.studio.scene.drag import along_axis
 from softreach.studio.scene.scene import Scene
 from softreach.studio.state import Appearance, Slice, StudioState, TipPath
 from softreach.studio.tabs import JOBS
@@ -192,18 +191,6 @@ def test_a_ghost_is_met_by_a_ray_to_it_but_not_behind_the_arm_or_where_all_meet(
         assert scene.ghost_under(behind, middle - behind) is None
     scene.remove("/ghosts")
     assert scene.ghost_under(eye, middle - eye) is None
-
-
-def test_the_place_on_an_axis_is_nearest_to_the_line_of_sight():
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        origin, eye, seen, axis = rng.normal(size=(4, 3))
-        axis /= np.linalg.norm(axis)
-        place = origin + along_axis(origin, axis, eye, seen) * axis
-        sight = (seen - eye) / np.linalg.norm(seen - eye)
-        gap = place - eye - (place - eye) @ sight * sight
-        assert gap @ axis == pytest.approx(0.0, abs=1e-9)
-    assert along_axis(origin, axis, origin - 3.0 * axis, origin) == 0.0
 
 
 # Two designs compared, without a server

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from softreach.arm.parameters import changed
 from softreach.cli.studio import begun
 from softreach.inverse import solve_inverse
 from softreach.rod.rods import as_tip_map
+from softreach.studio.fields import Attribute, Fields
 from softreach.studio.reach import (
     Quality,
     Reach,
@@ -25,6 +27,7 @@ from softreach.studio.start import KeptWork, work_on
 from softreach.studio.state import StudioState
 from softreach.studio.tabs import click
 from softreach.studio.work import Dropped
+from softreach.support.units import UNITS
 from tests.sets import trunk_at
 from tests.studio.sockets import page
 
@@ -62,6 +65,27 @@ def test_a_tab_at_rest_is_told_again_without_looking_up_any_parameter_of_its_des
     finally:
         sys.setprofile(None)
     assert len(calls) < 10  # all sliders took a hundred
+
+
+class Menu(SimpleNamespace):
+    """What a binding sees of a menu, and when the page reports a choice."""
+
+    def on_update(self, report):
+        self.report = report
+
+
+def test_a_choice_is_kept_while_a_new_design_loads(session):
+    unit = Attribute(lambda s: s.design.length_unit.name, lambda s, name: s.showing(unit=name))
+    names = {name: name for name in UNITS}
+    panel, menu = Fields(session), Menu(value="m", options=tuple(names))
+    panel.bind(menu, unit, lambda _: names)
+    session.panels.append(panel.show)
+    session.update(lambda state: state.replace(design=designs.lce_arm()))
+    assert menu.value == session.state.design.length_unit.name == "mm"
+    menu.value = "in"  # by hand, while the next design is made
+    session.update(lambda state: state.replace(design=designs.minimal_trunk()))
+    menu.report(SimpleNamespace(client_id=0))
+    assert menu.value == session.state.design.length_unit.name == "in"
 
 
 # How many activations reach a shown point: what the inverse finds, and the volume tells

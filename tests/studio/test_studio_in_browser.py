@@ -7,10 +7,11 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed, find_parameter
+from softreach.geometry.surface import section_area
 from softreach.studio import Quality, Studio
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
-from softreach.studio.figures import enclosed_area, section_curves
+from softreach.studio.figures import section_curves
 from softreach.studio.start import KeptWork
 from softreach.studio.state import Slice
 from softreach.studio.work import all_cores
@@ -173,7 +174,7 @@ def test_plots_follow_the_slice_and_the_design(tab):
         return {image.get_attribute("src") for image in images}
 
     def area() -> float:
-        return enclosed_area(section_curves(tab.session.found.reach, cut), 2)
+        return section_area(section_curves(tab.session.found.reach, cut), 2)
 
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
     tab.page.get_by_text(f"{area():.4g} m²").wait_for()

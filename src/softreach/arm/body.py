@@ -187,7 +187,7 @@ class Body:
         """A copy with some fields changed, checked like a new design."""
         return replace(self, **changes)
 
-    @property
+    @lazy
     def length(self) -> float:
         """L, from base to tip before activation [m]."""
         return self.profile.length

@@ -293,7 +293,7 @@ class Manipulator(Body):
         """Text of its file: that of `to_toml`, and the unit that it is shown in."""
         return self.to_toml() + design_file.display_text(self.display_unit)
 
-    @property
+    @lazy
     def length_unit(self) -> LengthUnit:
         """Unit of lengths that it is shown in: `display_unit`, or one that is handy."""
         return as_unit(self.display_unit or handy_unit(self.length), self.length)

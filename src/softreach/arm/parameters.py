@@ -188,8 +188,14 @@ def _revolved(arm: Manipulator, new: Rule) -> dict[Address, float]:
 # The list.
 
 
-def parts(arm: Manipulator) -> dict[PartKey, Any]:
-    """Every part that has numbers, by its key."""
+def parts(arm: Manipulator) -> Mapping[PartKey, Any]:
+    """Every part that has numbers, by its key; kept with the arm."""
+    if (known := vars(arm).get("_parts")) is None:
+        known = vars(arm)["_parts"] = _keyed(arm)
+    return known
+
+
+def _keyed(arm: Manipulator) -> dict[PartKey, Any]:
     section = arm.section
     keyed: dict[PartKey, Any] = {("profile",): arm.profile, ("section",): section}
     given = {
@@ -239,6 +245,12 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
     their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
     """
     arm = a_manipulator("arm", arm)
+    if (known := vars(arm).get("_parameters")) is None:
+        known = vars(arm)["_parameters"] = _listed(arm)
+    return dict(known)
+
+
+def _listed(arm: Manipulator) -> dict[str, Parameter]:
     own: dict[Address, Parameter] = {}
     for key, part in parts(arm).items():
         for called, number in part.numbers.items():
@@ -375,14 +387,15 @@ def with_values(arm: Manipulator, values: Mapping[Parameter, float]) -> Manipula
     edits: _Edits = {}
     for each, value in new.items():
         _add_edits(edits, arm, each, lambda _, value=value: value)
-    return _made(arm, edits, {each.name: x for each, x in new.items()}) if edits else arm
+    named = {each.name: value for each, value in new.items()}
+    return _made(arm, edits, lambda: named) if edits else arm
 
 
 def shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
     """The design with an amount [unit] added to one parameter, in each part to its own value."""
     edits: _Edits = {}
     _add_edits(edits, arm, parameter, lambda old: old + amount)
-    return _made(arm, edits, {parameter.name: parameter.value(arm) + amount})
+    return _made(arm, edits, lambda: {parameter.name: parameter.value(arm) + amount})
 
 
 def _add_edits(edits: _Edits, arm: Manipulator, by: Parameter, new: Rule) -> None:
@@ -398,7 +411,7 @@ def _add_edits(edits: _Edits, arm: Manipulator, by: Parameter, new: Rule) -> Non
         numbers[called] = value, by
 
 
-def _made(arm: Manipulator, edits: _Edits, given: Mapping[str, float]) -> Manipulator:
+def _made(arm: Manipulator, edits: _Edits, given: Callable[[], Mapping[str, float]]) -> Manipulator:
     """The arm with changed parts; faults under the names and with the values that were given."""
     new, faults = dict(parts(arm)), list[Fault]()
     changes = {key: {name: x for name, (x, _) in each.items()} for key, each in edits.items()}
@@ -412,7 +425,8 @@ def _made(arm: Manipulator, edits: _Edits, given: Mapping[str, float]) -> Manipu
     if not faults:
         with gathered(faults):
             return _assembled(arm, new, changes, inside)
-    named = [_as_given(fault, edits, given) for fault in faults]
+    values = given()
+    named = [_as_given(fault, edits, values) for fault in faults]
     raise InvalidDesign([*{(fault.path, str(fault.allowed)): fault for fault in named}.values()])
 
 

@@ -211,6 +211,19 @@ def plane_cut(surface: Surface, axis: int, at: float) -> list[Array]:
     return [places[curve] for curve in _chained(ends.reshape(-1, 2), len(edges))]
 
 
+def section_area(curves: list[Array], axis: int) -> float:
+    """Area within closed curves in a plane across an axis, holes left out."""
+    from matplotlib.path import Path
+
+    flat = [np.delete(curve, axis, axis=1) for curve in curves]
+    total = 0.0
+    for k, curve in enumerate(flat):
+        around = sum(Path(other).contains_point(curve[0]) for j, other in enumerate(flat) if j != k)
+        (x, y), sign = curve.T, -1.0 if around % 2 else 1.0
+        total += sign * abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
+    return total
+
+
 def _chained(pieces: NDArray[np.integer], count: int) -> list[list[int]]:
     """Curves through places that pieces connect; open ones first, from an end to the other."""
     touching: list[list[int]] = [[] for _ in range(count)]

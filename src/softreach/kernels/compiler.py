@@ -9,6 +9,7 @@ them, and compiled alone only when Python calls them.
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -20,6 +21,7 @@ from numba.core.dispatcher import Dispatcher
 from softreach.support.interruption import check_stopped
 
 _LOG = logging.getLogger(__name__)
+_COMPILING = "numba:compile"
 
 not_kept: list[str] = []
 """Reasons for which what this process compiled is compiled again by the next."""
@@ -159,4 +161,32 @@ class _Log(event.Listener):
         pass
 
 
-event.register("numba:compile", _Log())
+event.register(_COMPILING, _Log())
+
+
+class CompilationWatch(event.Listener):
+    """Calls back when compilation begins and when all of it has ended, on a compiling thread."""
+
+    def __init__(self, changed: Callable[[], object]) -> None:
+        self._changed, self._lock = changed, threading.Lock()
+        self.running = 0  # compilations under way, one within another
+        self.done = 0  # times that all of it has ended: of the kernels of a studio, each once
+        event.register(_COMPILING, self)
+
+    def close(self) -> None:
+        """Watch no longer."""
+        event.unregister(_COMPILING, self)
+
+    def on_start(self, event: event.Event) -> None:
+        self._count(1)
+
+    def on_end(self, event: event.Event) -> None:
+        self._count(-1)
+
+    def _count(self, change: int) -> None:
+        with self._lock:
+            before, self.running = self.running, self.running + change
+            is_turn = bool(before) != bool(self.running)
+            self.done += not self.running
+        if is_turn:
+            self._changed()

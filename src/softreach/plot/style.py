@@ -183,6 +183,17 @@ def write_note(ax: Axes, text: str, right: float, up: float) -> None:
     ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)
 
 
+def inked(figure: Figure, color: str) -> None:
+    """Write all words of a figure in a color, and those of legends without a frame."""
+    from matplotlib.legend import Legend
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set_color(color)
+    for legend in figure.findobj(Legend):
+        legend.set_frame_on(False)
+
+
 def a_result(name: str, value: Any, kind: str, maker: str) -> Any:
     """What a function returned, of a class of that name, which need not be loaded."""
     if kind in [base.__name__ for base in type(value).__mro__]:

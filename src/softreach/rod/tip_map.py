@@ -322,7 +322,8 @@ class TipMap(ABC):
             out = TipOutputs(**{name: values[block] for name, values in room.items()})
             tasks.append(partial(self.fill, gamma[block], out))
         parallel.run(tasks)
-        drop(lost, room.get("status"), *(room[name] for name in room if name != "status"))
+        if len(lost):
+            drop(lost, room.get("status"), *(room[name] for name in room if name != "status"))
         return tuple(room.values())
 
     def radius(self, stations: ArrayLike) -> Array:

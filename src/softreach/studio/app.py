@@ -5,18 +5,20 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import AbstractContextManager, suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from softreach.inverse.prepared import forget_prepared
+from softreach.kernels.compiler import CompilationWatch
 from softreach.plot.style import pyplot
 from softreach.studio import serve
 from softreach.studio.scene.camera import UPRIGHT, VIEWS
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.tabs import JOBS, furnish
-from softreach.studio.work import CompilationWatch, Latest
+from softreach.studio.work import Latest
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -61,7 +63,9 @@ class Studio(AbstractContextManager["Studio"]):
         self._compilation = CompilationWatch(lambda: notice.submit(show))
         self._libraries = threading.Thread(target=load_libraries, daemon=True)
         self._libraries.start()
-        self.server = serve.start_server(host, port, token)
+        self._dark = False  # true if the system of the latest tab is dark
+        arrives = lambda dark: setattr(self, "_dark", dark)
+        self.server = serve.start_server(host, port, token, arrives)
         arm, camera, eye = start.state.design, start.state.camera, self.server.initial_camera
         look_at = arm.base.to_world(arm.length * _LOOK_AT) / arm.length
         eye.look_at = camera.look_at if camera else look_at
@@ -95,8 +99,11 @@ class Studio(AbstractContextManager["Studio"]):
         self.stop()
 
     def _connected(self, client: ClientHandle) -> None:
+        start = self.start
+        if self._dark:
+            start = replace(start, state=start.state.showing(dark=True))
         self._libraries.join()
-        session = Session(client, self.start, JOBS, work=self.work, compilation=self._compilation)
+        session = Session(client, start, JOBS, work=self.work, compilation=self._compilation)
         goes_on = session.is_touched
         with self._lock:
             self.sessions[client.client_id] = session

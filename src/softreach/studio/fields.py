@@ -14,14 +14,13 @@ from typing import Any, NamedTuple
 
 from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part, paragraph
-from softreach.studio.session import Session
+from softreach.studio.session import Change, Session
 from softreach.studio.state import LARGEST, StudioState
 from softreach.studio.widgets import Ends, Line, Slider, TextKind, TypedField, number_kind, unit_in
 from softreach.support.errors import SoftreachError
 from softreach.support.files.text import text_of
 
 Action = Callable[[], object]
-Change = Callable[[StudioState], StudioState]
 Names = Mapping[Any, str]
 Options = Callable[[StudioState], Names]
 Kind = Callable[[str, Callable[[], float]], TextKind]
@@ -69,7 +68,7 @@ class Fields:
         self.words: Callable[[SoftreachError], str] = str  # says a refusal in words
         self._followers: list[list[Any]] = []
         """Each reads what it follows, what that was when it was shown last, and shows it."""
-        self._anew: list[Callable[[], Fields]] = []
+        self._anew: list[Fields] = []
         self._bindings: list[_Binding] = []
         self._widgets: list[Any] = []
         self._depth = 0
@@ -85,7 +84,7 @@ class Fields:
                 follower[1] = now
                 show(session.state, session.found)
         for fields in self._anew:
-            fields().show()
+            fields.show()
 
     def remove(self) -> None:
         """Take all widgets away."""
@@ -124,20 +123,20 @@ class Fields:
         self, label: str, *paths: str, key: Shown = lambda *_: object(), build: Build, **looks: Any
     ) -> None:
         """A folder whose fields are made anew where their key differs, by default always."""
-        fields, known = Fields(self.session), object()
+        known, number = object(), len(self._anew)
+        self._anew.append(Fields(self.session))
         with self.folder(label, **looks) as folder:
             pass
 
         def fit(state: StudioState, found: Found) -> None:
-            nonlocal fields, known
+            nonlocal known
             if (now := key(state, found)) != known:
-                fields.remove()
-                fields, known = Fields(self.session), now
+                self._anew[number].remove()
+                self._anew[number], known = Fields(self.session), now
                 with folder:
-                    build(fields, now)
+                    build(self._anew[number], now)
 
         self.follow(*paths, show=fit)
-        self._anew.append(lambda: fields)
 
     def checkbox(self, label: str, at: Attribute, hint: str) -> Any:
         """Add a check box."""
@@ -261,11 +260,13 @@ class _Binding:
         self._session, self._widget, self._at, self._options = session, widget, at, options
         self._revision = session.revision
         self._seen = at.read(getattr(session, at.of))
-        """Where widget and state last agreed; the hand may be ahead of both."""
+        """Value of the state when the widget last showed it."""
+        self._held = widget.value  # value of the widget when it was last read or set
 
     def write(self, owner: Any) -> Any:
         """The state with what the widget holds; what it only shows rounded is left as it is."""
         value, known = self._widget.value, self._at.read(owner)
+        self._held = value
         if self._options is not None:
             names = self._options(self._session.state)
             value = {name: value for value, name in names.items()}.get(value, known)
@@ -279,14 +280,18 @@ class _Binding:
         session, widget = self._session, self._widget
         value = shown = self._at.read(getattr(session, self._at.of))
         anyway = anyway or value != self._seen or session.revision != self._revision
+        is_ahead = widget.value != self._held  # of a hand whose event waits for another change
         if self._options is not None:
             names = self._options(session.state)
             shown = names[value]
             if tuple(widget.options) != tuple(names.values()):
+                is_ahead = is_ahead and widget.value in names.values()
                 widget.options, anyway = tuple(names.values()), True
         self._seen, self._revision = value, session.revision
-        if anyway and widget.value != shown:
-            widget.value = shown
+        if anyway and not is_ahead:
+            if widget.value != shown:
+                widget.value = shown
+            self._held = widget.value
 
 
 def attempt(session: Session, action: Action) -> None:

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed
-from softreach.geometry.surface import plane_cut
+from softreach.arm.parameters import changed, parameters
+from softreach.geometry.surface import plane_cut, section_area
 from softreach.picture.projection import View, plane_of
 from softreach.plot.reach import plot_slice
+from softreach.plot.style import inked
 from softreach.studio import markup
 from softreach.studio.reach import Quality, Reach, exact_set
-from softreach.studio.shown_parameters import ShownParameter, known_parameters, slider_parameters
+from softreach.studio.shown_parameters import ShownParameter, slider_parameters
 from softreach.studio.state import Slice, StudioState, solvable_rod
 from softreach.studio.widgets import unit_in
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
@@ -55,17 +56,6 @@ def _axes(height: float) -> Axes:
     from matplotlib.figure import Figure  # away from pyplot, which belongs to one thread
 
     return Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained").subplots()
-
-
-def inked(figure: Figure, color: str) -> None:
-    """Write all words of a figure in a color, and those of legends without a frame."""
-    from matplotlib.legend import Legend
-    from matplotlib.text import Text
-
-    for text in figure.findobj(Text):
-        text.set_color(color)
-    for legend in figure.findobj(Legend):
-        legend.set_frame_on(False)
 
 
 def _pixels(ax: Axes) -> NDArray[np.uint8]:
@@ -136,22 +126,9 @@ def _described(curves: list[Array], plane: Slice, arm: Manipulator) -> str:
         return "nothing is reached"
     if not all(np.array_equal(curve[0], curve[-1]) for curve in curves):
         return f"{len(curves)} curves"
-    area = enclosed_area(curves, "xyz".index(plane.axis)) * arm.length**2
+    area = section_area(curves, "xyz".index(plane.axis)) * arm.length**2
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     return f"{parts}, {arm.length_unit.rounded(area, 2)}"
-
-
-def enclosed_area(curves: list[Array], axis: int) -> float:
-    """Area within closed curves in a plane across an axis, holes left out."""
-    from matplotlib.path import Path
-
-    flat = [np.delete(curve, axis, axis=1) for curve in curves]
-    total = 0.0
-    for k, curve in enumerate(flat):
-        around = sum(Path(other).contains_point(curve[0]) for j, other in enumerate(flat) if j != k)
-        (x, y), sign = curve.T, -1.0 if around % 2 else 1.0
-        total += sign * abs(float(x[:-1] @ y[1:] - x[1:] @ y[:-1])) / 2
-    return total
 
 
 def swept_parameter(state: StudioState) -> ShownParameter | None:
@@ -216,7 +193,7 @@ class VolumeSlopes(NamedTuple):
 
 def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSlopes:
     """Slopes of a design whose set is known, for all sliders that move continuously."""
-    arm, solid, known = reach.arm, reach.exact, known_parameters(reach.arm)
+    arm, solid, known = reach.arm, reach.exact, parameters(reach.arm)
     slopes = dict[str, Slope]()
     if solid is None or solid.dimension < 3 or not solid.volume > 0:
         return VolumeSlopes(arm, reach.volume, slopes)
@@ -241,15 +218,28 @@ def volume_slopes(reach: Reach, quality: Quality, check: StaleCheck) -> VolumeSl
     return VolumeSlopes(arm, reach.volume, slopes)
 
 
+class SlopeBar(NamedTuple):
+    """Change of the volume over `PART` of the range of a slider."""
+
+    share: float  # of the largest change of all sliders
+    text: str
+    meaning: str
+
+    def html(self, *, old: bool) -> str:
+        """The bar; that of a design before is faded."""
+        before = "of the design before; " * old
+        return markup.bar(self.share, self.text, before + self.meaning, faded=old)
+
+
 def slope_bars(
-    found: VolumeSlopes, sliders: Mapping[str, tuple[ShownParameter, float]], *, old: bool
-) -> dict[str, str]:
-    """A bar for each slider as HTML: by how much V changes over `PART` of its range."""
+    found: VolumeSlopes, sliders: Mapping[str, tuple[ShownParameter, float]]
+) -> dict[str, SlopeBar]:
+    """A bar for each slider, by its name."""
     part = {name: PART * ends for name, (_, ends) in sliders.items() if name in found.slopes}
     percent = {name: 100 * step / found.volume for name, step in part.items()}  # per ∂V/∂p
     changes = {name: per * found.slopes[name].value for name, per in percent.items()}
     most, unit = max(map(abs, changes.values()), default=0.0) or 1.0, found.arm.length_unit
-    bars, before = {}, "of the design before; " if old else ""
+    bars = {}
     for name, change in changes.items():
         slope, label = found.slopes[name], unit_in(sliders[name][0].label)
         text = quantity(change, "%", max(percent[name] * slope.error, _FINEST))
@@ -257,8 +247,8 @@ def slope_bars(
         per = f"{unit.symbol(3)} per {label}" if label else unit.symbol(3)
         value, error = (number / unit.scale(3) for number in slope)
         meaning = (
-            f"{before}change of V by one hundredth of this slider, "
+            f"change of V by one hundredth of this slider, "
             f"{f'{part[name]:.3g} {label}'.rstrip()}; ∂V/∂({name}) = {quantity(value, per, error)}"
         )
-        bars[name] = markup.bar(change / most, text, meaning, faded=old)
+        bars[name] = SlopeBar(change / most, text, meaning)
     return bars

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from softreach.geometry.rays import is_behind
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Found, Known, in_session
 from softreach.studio.reach import Quality, Reach, count_activations, shown_samples, stages
-from softreach.studio.scene.camera import TabCamera, is_behind
+from softreach.studio.scene.camera import TabCamera
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import Scene, shows_cloud
 from softreach.studio.serve import theme
@@ -85,20 +86,22 @@ class Job:
 
     def is_stale(self, old: Known, new: Known) -> bool:
         """True if a change decides another result: of what is known, any other object."""
-        was, wanted = self.is_wanted(old), self.is_wanted(new)
+        was, wanted = (self.is_wanted(old), self.is_wanted(new)) if self.wanted else (True, True)
         if not (was and wanted):
             return was != wanted
-        read = attrgetter("__class__", *map(in_session, self.depends_on.split()))
-        for a, b in zip(read(old), read(new), strict=True):
-            if a is not b and (isinstance(b, np.ndarray) or a != b):
+        for path in self.depends_on.split():
+            read = attrgetter(in_session(path))
+            before, now = read(old), read(new)
+            if before is not now and (path.startswith("found.") or before != now):
                 return True
         return False
 
 
 def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job]:
     """The jobs whose results a change makes stale; if all is new, those that are of use."""
-    is_due = lambda job: job.is_wanted(new) if old is None else job.is_stale(old, new)
-    return [job for job in jobs if job.depends_on and is_due(job)]
+    if old is None:
+        return [job for job in jobs if job.depends_on and job.is_wanted(new)]
+    return [job for job in jobs if job.depends_on and job.is_stale(old, new)]
 
 
 def _compute_reach(given: Given) -> Results:
@@ -165,7 +168,8 @@ def _draw_surface(given: Given) -> Mapping[str, Any] | None:
 def _differentiate(given: Given) -> Results:
     design, check = given.state.design, given.check
     if (reach := given.found.complete_reach(design)) is not None:
-        yield Learned({"ends": slider_ends(design, given.found.ends, check)})
+        before, ends = given.found.ends, slider_ends(design, given.found.ends, check)
+        yield Learned({"ends": before if ends == before else ends})
         yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
@@ -256,6 +260,8 @@ def _beside(name: str) -> Job:
 
 _CLOUD: Any = {"draw": _draw_cloud, "draws": "/cloud /unstable", "at_once": False}
 _LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color"
+_OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
+_IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
 _PLANE = "appearance.slice.axis appearance.slice.center"
 _EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged"
 
@@ -266,14 +272,7 @@ SCENE_JOBS = (
     Job("slopes", "design found.reach", _differentiate),
     Job("cloud", f"appearance.level {_LOOKS}", _color_cloud, doing="coloring points", **_CLOUD),
     # The exact boundary
-    Job(
-        "surface",
-        f"found.reach appearance.dark {_LOOKS}",
-        _color_surface,
-        _draw_surface,
-        wanted="appearance.surface",
-        at_once=False,
-    ),
+    Job("surface", _OF_SURFACE, _color_surface, _draw_surface, **_IF_SHOWN),
     Job("section", f"found.reach {_PLANE}", _cut, wanted="appearance.section"),
     Job("sweep", f"{DESIGN} appearance.swept", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),

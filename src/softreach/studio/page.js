@@ -24,6 +24,10 @@ listen("keydown", event => {
   }
 });
 
+// A new tab is dark where the system is: the request for its socket says so.
+const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+document.cookie = `softreach_dark=${Number(dark)}; path=/; SameSite=Lax`;
+
 // viser turns its camera with every key that is not typed into a field. Keys of a slider, a tab or a
 // button are its own, as are arrows where they scroll; those with Ctrl are commands.
 document.documentElement.addEventListener("keydown", event => {

@@ -12,7 +12,7 @@ import hmac
 import io
 import re
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from functools import lru_cache
 from http import HTTPStatus
@@ -27,10 +27,11 @@ from softreach.support.errors import InvalidInput, check_installed
 if TYPE_CHECKING:
     from viser import GuiApi, ViserServer
 
+Arrives = Callable[[bool], object]  # hears of a tab, and whether its system is dark
 LOOPBACK, LOCAL = "127.0.0.1", ("localhost", "127.0.0.1", "::1")
 ANYWHERE = ("0.0.0.0", "::")
 _LAST_PORT = 65535
-_COOKIE = "softreach_token"
+_COOKIE, _DARK = "softreach_token", "softreach_dark"
 _NO_TOKEN = "The address lacks the token that softreach printed with it.\n"
 _FOREIGN = "This page is for its own server alone.\n"
 _ELSEWHERE = "This address names another server, to which the page may not connect.\n"
@@ -49,14 +50,19 @@ _POLICY = {
 }
 
 
-def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
+def start_server(
+    host: str = LOOPBACK,
+    port: int | None = None,
+    token: str = "",
+    arrives: Arrives = lambda dark: None,
+) -> ViserServer:
     """Start serving the page; no port is for a free one, no token for pages that know none."""
     check_installed("viser")
     import viser
 
     _check_address(host, port or 0)
     # viser prints a banner; we print our own line.
-    with redirect_stdout(io.StringIO()), guarding(host, token) as guards:
+    with redirect_stdout(io.StringIO()), guarding(host, token, arrives) as guards:
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
     if not guards:
         stop_server(server)
@@ -96,10 +102,8 @@ def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str
     Browsers let any web page open a socket to this machine; they say where it came from. On
     loopback the name must be local too, as foreign names can be made to point here.
     """
-    query, cookies = parse_qs(urlsplit(path).query), SimpleCookie()
-    with suppress(CookieError):
-        cookies.load(headers.get("Cookie", ""))
-    shown = [*query.get("token", []), *(c.value for name, c in cookies.items() if name == _COOKIE)]
+    query = parse_qs(urlsplit(path).query)
+    shown = [*query.get("token", []), *_cookie(headers, _COOKIE)]
     if token and not any(hmac.compare_digest(each.encode(), token.encode()) for each in shown):
         return _NO_TOKEN
     own, origin = headers.get("Host", ""), headers.get("Origin")
@@ -109,6 +113,13 @@ def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str
         return _FOREIGN
     sockets = [_SOCKET.match(each) for each in query.get("websocket", [])]
     return "" if all(each and each[1] == own for each in sockets) else _ELSEWHERE
+
+
+def _cookie(headers: Mapping[str, str], name: str) -> list[str]:
+    cookies = SimpleCookie()
+    with suppress(CookieError):
+        cookies.load(headers.get("Cookie", ""))
+    return [cookies[name].value] if name in cookies else []
 
 
 def page_headers(host: str) -> dict[str, str]:
@@ -126,7 +137,7 @@ def page_headers(host: str) -> dict[str, str]:
 
 
 @contextmanager
-def guarding(host: str, token: str) -> Iterator[list[Any]]:
+def guarding(host: str, token: str, arrives: Arrives) -> Iterator[list[Any]]:
     """Servers that start in the block check each request; yields those that do."""
     import websockets.asyncio.server as sockets
 
@@ -148,6 +159,8 @@ def guarding(host: str, token: str) -> Iterator[list[Any]]:
         def admit(connection: Any, request: Any) -> Any:
             if reason := refusal(host, token, request.path, request.headers):
                 return connection.respond(HTTPStatus.FORBIDDEN, reason)
+            if "Upgrade" in request.headers:
+                arrives("1" in _cookie(request.headers, _DARK))
             return process_request(connection, request) if process_request else None
 
         guarded.append(plain(*arguments, process_request=admit, process_response=add, **options))

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.geometry.rays import picked_point
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.found import Found, Known
 from softreach.studio.jobs import Given, Job, News, what_follows
 from softreach.studio.reach import cloud_points, shown_samples
-from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing, picked_point
+from softreach.studio.scene.camera import UPRIGHT, VIEWS, TabCamera, framing
 from softreach.studio.scene.scene import Scene, in_slice, shows_cloud
 from softreach.studio.start import KeptWork, Start
 from softreach.studio.state import Camera, History, StudioState, vector
@@ -28,7 +29,7 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-    from softreach.studio.work import CompilationWatch
+    from softreach.kernels.compiler import CompilationWatch
 
 Change = Callable[[StudioState], StudioState]
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
@@ -112,11 +113,11 @@ class Session:
         first = self.start.state
         self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
 
-    def restore(self, state: StudioState) -> None:
+    def restore(self, saved: Change) -> None:
         """Take up a state that was saved, and its view."""
-        self.update(lambda _: state)
-        if state.camera is not None:
-            self.look_as(state.camera)
+        self.update(saved)
+        if (camera := self.state.camera) is not None:
+            self.look_as(camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""

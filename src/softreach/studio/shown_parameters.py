@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
 from softreach.studio.widgets import Ends
 from softreach.studio.work import StaleCheck
+from softreach.support.bisection import last_value
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.units import METER, LengthUnit
 
@@ -61,7 +62,6 @@ _WORDS = {
     "min P": "least pressure",
     "max P": "largest pressure",
 }
-_HALVINGS = 14
 
 
 class ShownParameter(NamedTuple):
@@ -84,23 +84,22 @@ class ShownParameter(NamedTuple):
 
     def read(self, arm: Manipulator) -> float:
         """The value of a design, in the shown unit; 0 where it leaves the number out."""
-        value = shown_value(known_parameters(arm)[self.name], arm, self.scale)
+        value = _rounded(values_of(arm)[self.name] / self.scale)
         return 0.0 if math.isnan(value) else value
 
     def write(self, arm: Manipulator, shown: float) -> Manipulator:
         """The design with another value; InvalidDesign if no such arm can exist."""
-        return with_values(arm, {known_parameters(arm)[self.name]: shown * self.scale})
+        return with_values(arm, {parameters(arm)[self.name]: shown * self.scale})
 
 
 @lru_cache(maxsize=16)
-def known_parameters(arm: Manipulator) -> dict[str, Parameter]:
-    """As `parameters`, kept for the next call."""
-    return parameters(arm)
+def values_of(arm: Manipulator) -> dict[str, float]:
+    """Values of all parameters by their names; NaN where the design leaves one out."""
+    return {name: each.value(arm) for name, each in parameters(arm).items()}
 
 
-def shown_value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
-    """The value over a scale, to twelve digits."""
-    return float(f"{parameter.value(arm) / scale:.12g}")
+def _rounded(value: float) -> float:
+    return float(f"{value:.12g}")
 
 
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
@@ -114,7 +113,7 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
 @lru_cache(maxsize=16)
 def _slider_parameters(arm: Manipulator, unit: LengthUnit) -> tuple[ShownParameter, ...]:
     del unit  # that of the arm: of equal arms each may have its own
-    known, arm_parts = known_parameters(arm), parts_of(arm)
+    known, values, arm_parts = parameters(arm), values_of(arm), parts_of(arm)
     own = {  # what a kind of part outside softreach declares
         name
         for name, each in known.items()
@@ -127,8 +126,8 @@ def _slider_parameters(arm: Manipulator, unit: LengthUnit) -> tuple[ShownParamet
         names += [name for name in known if name in own and known[name].owner == owner]
         for parameter in (known[name] for name in dict.fromkeys(names) if name in known):
             is_own = parameter.name in own
-            offered = is_own or _is_offered(arm, known, parameter)
-            if offered and not math.isnan(parameter.value(arm)):
+            offered = is_own or _is_offered(values, parameter)
+            if offered and not math.isnan(values[parameter.name]):
                 shown.append(_on_slider(arm, parameter, is_own=is_own))
     return tuple(slider for slider in shown if slider is not None)
 
@@ -147,7 +146,7 @@ def _on_slider(arm: Manipulator, parameter: Parameter, *, is_own: bool) -> Shown
 def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     """The slider of the tables, if its unit and its ends suit the number."""
     fixed = (_OF_PART if parameter.owner else _OF_ARM).get(parameter.field)
-    outside_arm = parameter.field == "distance_ratio" and parameter.value(arm) > 1
+    outside_arm = parameter.field == "distance_ratio" and values_of(arm)[parameter.name] > 1
     if fixed is None or parameter.unit not in ("1", "rad", "m") or outside_arm:
         return None
     if parameter.unit != "m":
@@ -160,7 +159,7 @@ def _fixed(arm: Manipulator, parameter: Parameter) -> _Slider | None:
 def _around_value(arm: Manipulator, parameter: Parameter) -> _Slider | None:
     """From zero to twice the value, or all angles, within the range; None for a zero of no size."""
     unit, scale = _unit(parameter, arm.length_unit)
-    value, allowed = parameter.value(arm) / scale, parameter.range
+    value, allowed = values_of(arm)[parameter.name] / scale, parameter.range
     low, high = allowed.low / scale, allowed.high / scale
     size = float(f"{2 * abs(value):.3g}") or high - low
     ends = (-size if value <= 0 else 0.0, size if value >= 0 else 0.0)
@@ -186,16 +185,14 @@ def owner_label(path: str) -> str:
     return path.removesuffix(".material").replace("rings[", "ring ").replace("]", "")
 
 
-def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Parameter) -> bool:
-    """True if a parameter changes this arm, and no other slider does the same."""
-    if parameter.owner and parameter.field in _ONE_FOR_ALL:
-        of_all = known.get(parameter.field)
-        if of_all is not None and not math.isnan(of_all.value(arm)):
-            return False
-    if parameter.field == "revolution":
-        return parameter.value(arm) != 0
-    turn = known.get(f"{parameter.owner}.revolution")
-    return parameter.field != "bundles" or turn is None or turn.value(arm) == 0
+def _is_offered(values: Mapping[str, float], parameter: Parameter) -> bool:
+    """True if a parameter changes an arm of these values, and no other slider does the same."""
+    owner, field = parameter.owner, parameter.field
+    if owner and field in _ONE_FOR_ALL and not math.isnan(values.get(field, math.nan)):
+        return False
+    if field == "revolution":
+        return values[parameter.name] != 0
+    return field != "bundles" or values.get(f"{owner}.revolution", 0.0) == 0
 
 
 def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck) -> dict[str, Ends]:
@@ -203,7 +200,7 @@ def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck)
 
     An end is looked for near that of a design before: each trial makes an arm, in a millisecond.
     """
-    known = known_parameters(arm)
+    known = parameters(arm)
 
     def end(slider: ShownParameter, which: int) -> float:
         def exists(shown: float) -> bool:
@@ -216,47 +213,9 @@ def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck)
 
         limit = slider.limits[which]
         near = before[slider.name][which] if slider.name in before else None
-        return limit if near == limit else _last(slider.shown, limit, near, exists)
+        return limit if near == limit else last_value(slider.shown, limit, near, exists)
 
     return {each.name: (end(each, 0), end(each, 1)) for each in slider_parameters(arm)}
-
-
-def _last(start: float, limit: float, near: float | None, exists: Callable[[float], bool]) -> float:
-    """The last value from a start toward a limit that exists, of three digits but for the start."""
-    inside, outside = start, limit
-    if near is not None and min(start, limit) < near < max(start, limit):
-        inside, outside = _around(near, start, limit, exists)
-    if outside == limit and exists(limit):
-        return limit
-    for _ in range(_HALVINGS):
-        middle = (inside + outside) / 2
-        middle = round(middle, _decimals(middle))
-        if not min(inside, outside) < middle < max(inside, outside):
-            break
-        inside, outside = (middle, outside) if exists(middle) else (inside, middle)
-    return inside
-
-
-def _around(near: float, start: float, limit: float, exists: Callable[[float], bool]) -> Ends:
-    """A value that exists and one toward the limit that does not, ever farther from `near`.
-
-    The first may be the start, and the second the limit, of which it is not known.
-    """
-    here, digits = exists(near), _decimals(near)
-    last, end = near, limit if here else start
-    step = math.copysign(10.0**-digits, end - near)
-    while abs(step) < abs(end - last):
-        tried = round(last + step, digits)
-        if exists(tried) != here:
-            end = tried
-            break
-        last, step = tried, 2 * step
-    return (last, end) if here else (end, last)
-
-
-def _decimals(value: float) -> int:
-    """Digits after the point that a value of three digits has."""
-    return max(0, 2 - math.floor(math.log10(abs(value)))) if value else 0
 
 
 class Part(NamedTuple):
@@ -310,8 +269,8 @@ def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
     unit = typed_unit(arm)
     return tuple(
         _shown(arm, each, _word(each), f"{each.meaning}: {each.name}", unit)
-        for each in known_parameters(arm).values()
-        if each.owner in part.owners and (each.owner or not math.isnan(each.value(arm)))
+        for each in parameters(arm).values()
+        if each.owner in part.owners and (each.owner or not math.isnan(values_of(arm)[each.name]))
     )
 
 
@@ -322,14 +281,14 @@ def typed_unit(arm: Manipulator) -> LengthUnit:
 
 def named_parameters(arm: Manipulator) -> list[ShownParameter]:
     """All parameters of an arm under their own names, angles in degrees."""
-    return [_shown(arm, one, one.name, one.meaning) for one in known_parameters(arm).values()]
+    return [_shown(arm, one, one.name, one.meaning) for one in parameters(arm).values()]
 
 
 def _shown(
     arm: Manipulator, parameter: Parameter, name: str, hint: str, lengths: LengthUnit | None = None
 ) -> ShownParameter:
     unit, scale = _unit(parameter, lengths)
-    value, label = shown_value(parameter, arm, scale), _titled(name, unit)
+    value, label = _rounded(values_of(arm)[parameter.name] / scale), _titled(name, unit)
     return ShownParameter(parameter.name, label, hint, scale, value, whole=parameter.whole)
 
 

@@ -7,9 +7,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextvars import ContextVar
-from typing import Any
-
-from numba.core import event
 
 from softreach.inverse.prepared import forget_prepared
 from softreach.support.memory import free_memory, return_memory
@@ -20,7 +17,6 @@ _PATIENCE = 0.1  # [s], after which work that waits checks whether it is still w
 _SHARE = 0.2  # of the free memory that one computation may plan with: others hold their results
 _LEFT = 0.4  # of the memory that was free in the beginning: with less a computation ends
 _GLANCE = 0.2  # [s] between looks at the memory
-_KIND = "numba:compile"
 _REST, LONG_REST = 1.0, 60.0  # [s] without an end of any work, until memory is returned
 
 
@@ -176,31 +172,3 @@ class Budget:
             if free_memory() < self._least:
                 raise OverBudget("more memory than is free")
             self._report(self._done)
-
-
-class CompilationWatch(event.Listener):
-    """Calls back when compilation begins and when all of it has ended, on a compiling thread."""
-
-    def __init__(self, changed: Callable[[], object]) -> None:
-        self._changed, self._lock = changed, threading.Lock()
-        self.running = 0  # compilations under way, one within another
-        self.done = 0  # times that all of it has ended: of the kernels of a studio, each once
-        event.register(_KIND, self)
-
-    def close(self) -> None:
-        """Watch no longer."""
-        event.unregister(_KIND, self)
-
-    def on_start(self, event: Any) -> None:
-        self._count(1)
-
-    def on_end(self, event: Any) -> None:
-        self._count(-1)
-
-    def _count(self, change: int) -> None:
-        with self._lock:
-            before, self.running = self.running, self.running + change
-            is_turn = bool(before) != bool(self.running)
-            self.done += not self.running
-        if is_turn:
-            self._changed()

@@ -16,7 +16,7 @@ from softreach.arm.tables import check_extension
 from softreach.rod.rods import in_steps
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.lazy import lazy
 from softreach.support.progress import Progress, silent
@@ -34,6 +34,7 @@ class TipDerivatives:
 
     All neighbors have as many steps along the arm, so that what these err by is differentiated too
     and does not become noise. At the end of a parameter's range both neighbors are on one side.
+    Bounds of activations need no neighbors: they move γ at a place of the cube, and nothing else.
     """
 
     def __init__(
@@ -47,30 +48,70 @@ class TipDerivatives:
 
         The progress is called with 0 before each parameter, from any thread.
         """
-        self._progress = progress
+        self._progress, self._tip_map = progress, tip_map
         relative = _LOADED_STEP if tip_map.supports_unstable else _STEP
-        self._shifts = [shifts_along(tip_map.arm, each, 1, relative) for each in parameters]
         steps = tip_map.steps
         if tol > tip_map.tol and not tip_map.supports_unstable:
             steps = math.ceil(steps * (tip_map.tol / tol) ** (1.0 / 6.0))
-        self._rods = [_neighbors(tip_map, each, steps) for each in self._shifts]
+        self._moves = [_moves_of_bounds(tip_map, each) for each in parameters]
+        self._rods = [
+            _neighbors(tip_map, shifts_along(tip_map.arm, each, 1, relative), steps)
+            if moves is None
+            else []
+            for each, moves in zip(parameters, self._moves, strict=True)
+        ]
         # A parameter may change by as much as itself before it is another design.
-        scales = np.array([each.step for each in self._shifts]) / relative
+        scales = np.array([_size(tip_map.arm, each) for each in parameters])
         noise = (tip_map.tol if tip_map.supports_unstable else _ROUNDING) / relative
         self.error = (_SAFETY * max(tip_map.tol, tol) + noise) * tip_map.length / scales
         """Error of a derivative by each parameter [m per unit], shape (parameters,)."""
 
     def at(self, cube: Array) -> Array:
         """Derivatives (n, 3, parameters) [m per unit] at places of the cube of the free bundles."""
-        out = np.zeros((len(cube), 3, len(self._shifts)))
+        out, rod = np.zeros((len(cube), 3, len(self._rods))), self._tip_map
+        by_bounds, slopes = [moves for moves in self._moves if moves is not None], np.empty(0)
+        if by_bounds:
+            _, slopes = rod.tips_and_slopes(rod.box.from_free_cube(cube))
 
         def task(k: int) -> None:
             self._progress(0)
+            if (moves := self._moves[k]) is not None:
+                (low, high), free = moves[:, rod.box.free], slopes[:, :, rod.box.free]
+                out[:, :, k] = np.einsum("nij,nj->ni", free, low + cube * (high - low))
             for weight, tip_map in self._rods[k]:
                 out[:, :, k] += weight * tip_map.tips(tip_map.box.from_free_cube(cube))
 
-        parallel.run(partial(task, k) for k in range(len(self._shifts)))
+        parallel.run(partial(task, k) for k in range(len(self._rods)))
         return out
+
+
+def _moves_of_bounds(tip_map: TipMap, parameter: Parameter) -> Array | None:
+    """How far the bounds of each bundle move with a parameter, shape (2, bundles).
+
+    None for a parameter of another kind, and where bounds are not those of the activations.
+    """
+    arm = tip_map.arm
+    fields = [called.partition("[")[0] for _, called in parameter.places]
+    if not {*fields} <= {"lower", "upper"} or not arm.is_direct or tip_map.supports_unstable:
+        return None
+    moves, bounds = np.zeros((2, arm.bundles)), list[float]()
+    for ((_, *name), called), field in zip(parameter.places, fields, strict=True):
+        own, side = [each.name for each in arm.bundle_actuators], int(field == "upper")
+        rows = [k for k, each in enumerate(own) if [each] == name]
+        rows = [rows[int(called[6:-1])]] if called != field else rows
+        moves[side, rows] = 1.0
+        bounds += arm.bounds[rows, side].tolist()
+    if not bounds or tuple(bounds) != parameter.values(arm):
+        return None
+    _check_free(parameter, np.ptp(arm.bounds, axis=1)[moves.any(axis=0)] > 0)
+    return moves
+
+
+def _check_free(parameter: Parameter, stays: Mask) -> None:
+    """Refuse a parameter whose change holds a bundle, or frees one that does not stay as it is."""
+    if not stays.all():
+        allowed = "one that neither holds a bundle nor frees one"
+        raise InvalidInput("parameter", parameter.name, allowed)
 
 
 def _neighbors(tip_map: TipMap, shifts: Shifts, fewest: int) -> list[tuple[float, TipMap]]:
@@ -124,7 +165,7 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
     if not np.isfinite(values).all():
         allowed = "a parameter that the design gives as one number"
         raise InvalidInput("parameter", parameter.name, allowed)
-    step = relative * min(filter(None, map(abs, values)), default=_scale(arm, parameter))
+    step = relative * _size(arm, parameter)
     extends = min(map(check_extension, (arm, inner_arm(arm)))) > _ROOM * reach * relative
     ways = np.arange(-reach, reach + 1), np.arange(2 * reach + 1), -np.arange(2 * reach + 1)
     faults = list[InvalidDesign]()
@@ -139,8 +180,10 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
     raise faults[0]
 
 
-def _scale(arm: Manipulator, parameter: Parameter) -> float:
-    """Scale of a parameter that is 0: an offset or a bound of another one."""
+def _size(arm: Manipulator, parameter: Parameter) -> float:
+    """Size of a parameter, of the smallest where parts differ; of one that is 0, its scale."""
+    if sizes := [abs(value) for value in parameter.values(arm) if value]:
+        return min(sizes)
     if parameter.field.startswith(("lower", "upper")):
         return float(np.ptp(arm.input_bounds, axis=1).max()) or 1.0
     return {"m": 0.1 * arm.length, "rad": 0.1}.get(parameter.unit, 1.0)
@@ -149,7 +192,5 @@ def _scale(arm: Manipulator, parameter: Parameter) -> float:
 def _shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
     made = shifted(arm, parameter, float(amount))
     free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.input_bounds, arm.input_bounds))
-    if not np.array_equal(free, before):
-        allowed = "one that neither holds a bundle nor frees one"
-        raise InvalidInput("parameter", parameter.name, allowed)
+    _check_free(parameter, free == before)
     return made

@@ -1,4 +1,4 @@
-"""Camera of a tab and the axes that it sees; what hides the arm from it, what a click hits."""
+"""Camera of a tab and the axes that it sees."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.picture.axes_box import axes_box, round_box, seen_from
@@ -33,9 +33,6 @@ _PATIENCE = 30.0  # [s] for a picture
 LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
 _LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
-_TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
-_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
-_POINTER = 0.012  # radius of what is clicked [L]
 _ROOM, _ROOM_UPRIGHT = 1.12, 1.22  # times what would just fill the picture, with its numbers
 _GRAY = 170, 170, 175  # of the axes
 
@@ -173,37 +170,3 @@ class NumberedBox:
 def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
     """Words at a place [L], as large on the screen wherever the camera is."""
     api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
-
-
-def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
-    """True if one of the balls, (n, 3) and (n,) [L], hides a point that it does not touch."""
-    distance = float(np.linalg.norm(point - camera))
-    ahead, aside = _beside(centers, camera, (point - camera) / distance)
-    return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
-
-
-def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
-    """Way along a ray to the first ball, no thinner than a pointer [L]; infinite without one."""
-    ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
-    met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
-    return float(ahead[met].min(initial=np.inf))
-
-
-def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
-    """Distances of points along a ray whose direction `way` has length 1, and from it."""
-    offset = points - origin
-    ahead = offset @ way
-    return ahead, np.linalg.norm(offset - ahead[:, None] * way, axis=1)
-
-
-def picked_point(points: Array, origin: ArrayLike, direction: ArrayLike) -> int | None:
-    """Number of the first of the points (n, 3) that a ray from the camera hits, if any."""
-    direction = np.asarray(direction, float) / np.linalg.norm(direction)
-    depth, aside = _beside(points, np.asarray(origin, float), direction)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        angle = np.where(depth > 0, aside / depth, np.inf)
-    near = np.flatnonzero(angle <= _CLICK)
-    if not len(near):
-        return None
-    # A little deeper but under the cursor is better than in front and beside it.
-    return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / _CLICK))])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,12 +144,3 @@ _SCALES = {
     "multiplicity": ("multiplicity", lambda *shown: np.maximum(count_activations(*shown), 1.0)),
 }
 """Colors that are numbers: label of the key, and values of samples."""
-
-_LIGHT = np.array([0.35, -0.55, 0.76])  # from the front, the right and above
-_SHADE = 0.38  # of what looks away from it
-
-
-def shaded(colors: NDArray[Any], outward: Array) -> NDArray[np.uint8]:
-    """Colors of a surface, shape (n, 3), as a lamp lights what looks outward, shape (n, 3)."""
-    facing = np.clip(outward @ _LIGHT, -1.0, 1.0)
-    return np.rint(colors * (1.0 - _SHADE * 0.5 * (1.0 - facing))[:, None]).astype(np.uint8)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.geometry.rays import along_axis
 from softreach.studio.scene.camera import add_label
 from softreach.support.arrays import Array
 
@@ -23,7 +24,6 @@ _AXES = {"x": (200, 55, 55), "y": (45, 140, 60), "z": (55, 90, 210)}
 _ARROW = np.array([[0, 0.03], [5e-3, 0.03], [5e-3, 0.1], [0.012, 0.1], [0, 0.13]])
 """Radii and heights of half of an arrow [L]."""
 _LETTER = 0.15  # of an axis, from the ball [L]
-_STEEPEST = 0.03  # sin² between axis and line of sight, below which a drag tells no distance
 
 
 class DragBall:
@@ -90,11 +90,3 @@ class DragBall:
                 pressed = place(begin, np.array(event.start_position))
             reached = place(begin, np.array(event.end_position))
             self._on_drag(event.phase, begin + reached - pressed)
-
-
-def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:
-    """Way along an axis of length 1 to where a line of sight is nearest; 0 if seen end on."""
-    sight = (seen - eye) / np.linalg.norm(seen - eye)
-    across = axis - (axis @ sight) * sight
-    steepness = float(across @ across)
-    return float((eye - origin) @ across) / steepness if steepness > _STEEPEST else 0.0

@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import Centerline, arm_surface, bundle_skins, inside, marker_points
+from softreach.geometry.rays import way_to
+from softreach.picture.gltf import ColoredSkin, glb, shaded
 from softreach.picture.zbuffer import vertex_normals
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
 from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.studio.reach import Reach, cloud_points, shown_samples
-from softreach.studio.scene.camera import NumberedBox, way_to
-from softreach.studio.scene.colors import FAINT, sample_colors, shaded, surface_colors
+from softreach.studio.scene.camera import NumberedBox
+from softreach.studio.scene.colors import FAINT, sample_colors, surface_colors
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import bundle_color, eight_bit
@@ -30,8 +32,6 @@ if TYPE_CHECKING:
 
 Color = tuple[int, int, int]
 
-_UNLIT = "KHR_materials_unlit"
-_LINES, _TRIANGLES = 1, 4  # ways to draw in glTF
 MOST_BUNDLES = 100  # with more the body alone is drawn: skins of hundreds take a minute
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
@@ -170,7 +170,7 @@ class Scene:
         faces, vertices = reach.sheets.faces, reach.sheets.vertices / reach.arm.length
         colors = np.broadcast_to(np.asarray(rgb, float), vertices.shape)
         colors = shaded(colors, vertex_normals(vertices, faces)).astype(float)
-        skin = sliced(Skin(vertices, faces, colors), cut)
+        skin = sliced(ColoredSkin(vertices, faces, colors), cut)
         self.remove(path)
         if not len(skin.faces):
             return
@@ -304,14 +304,6 @@ def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
     return [_CLEAR if hidden else None, *[None] * (meshes - 1)]
 
 
-class Skin(NamedTuple):
-    """A surface and the color of its vertices."""
-
-    vertices: Array  # [L], shape (v, 3)
-    faces: NDArray[Any]
-    colors: Array  # RGB from 0 to 255, shape (v, 3)
-
-
 def in_slice(points: Array, cut: Slice) -> Mask:
     """Mask of the points [L], shape (n, 3), that a slice shows."""
     if cut.axis == "none":
@@ -319,7 +311,7 @@ def in_slice(points: Array, cut: Slice) -> Mask:
     return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
 
 
-def sliced(skin: Skin, cut: Slice) -> Skin:
+def sliced(skin: ColoredSkin, cut: Slice) -> ColoredSkin:
     """The part of a surface that a slice shows, cut at its planes."""
     if cut.axis == "none":
         return skin
@@ -333,38 +325,4 @@ def sliced(skin: Skin, cut: Slice) -> Skin:
             np.concatenate([values, values[inside] * (1 - at) + values[outside] * at])
             for values in (vertices, colors)
         )
-    return Skin(vertices, faces, colors)
-
-
-def glb(
-    skin: Skin, opacity: float, lines: Array, ink: tuple[int, int, int], *, both_sides: bool
-) -> bytes:
-    """A surface and lines, ends [L] of shape (n, 2, 3), as binary glTF in their colors as they are.
-
-    viser's own meshes have one color each, its lines are slow, and so is light without a graphics
-    card. A surface that is seen from inside too takes a page twice as long.
-    """
-    from trimesh import Scene, Trimesh
-    from trimesh.exchange.gltf import export_glb
-
-    colors = _linear(np.column_stack([skin.colors, np.full(len(skin.colors), 255.0 * opacity)]))
-    parts = [Trimesh(skin.vertices, skin.faces, vertex_colors=colors, process=False)]
-    if count := len(lines):  # pairs of corners, which trimesh takes for triples
-        pairs = np.resize(np.arange(2 * count), (2 * -(-count // 3), 3))
-        colors = _linear(np.tile([*ink, 255.0], (2 * count, 1)))
-        parts.append(Trimesh(lines.reshape(-1, 3), pairs, vertex_colors=colors, process=False))
-
-    def unlit(tree: dict[str, Any]) -> None:
-        look = {"alphaMode": "BLEND", "doubleSided": both_sides, "extensions": {_UNLIT: {}}}
-        tree |= {"extensionsUsed": [_UNLIT], "materials": [look]}
-        for mesh, mode in zip(tree["meshes"], (_TRIANGLES, _LINES), strict=False):
-            mesh["primitives"][0] |= {"material": 0, "mode": mode}
-
-    return export_glb(Scene(parts), include_normals=False, tree_postprocessor=unlit)
-
-
-def _linear(colors: Array) -> NDArray[np.uint8]:
-    """Colors as glTF has them, shape (n, 4), from 0 to 255."""
-    colors = (colors / 255).clip(0, 1)
-    colors[:, :3] **= 2.2
-    return np.rint(255 * colors).astype(np.uint8)
+    return ColoredSkin(vertices, faces, colors)

@@ -16,7 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.section import material_names
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
-from softreach.studio.figures import NO_BAR, slope_bars
+from softreach.studio.figures import NO_BAR, SlopeBar, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import (
     Part,
@@ -65,7 +65,7 @@ def design(panel: Fields) -> None:
     names = {"": "this design"} | {name: name for name in designs.__all__}
     read = lambda state: next((name for name, arm in _designs().items() if arm == state.design), "")
     write = lambda state, name: state.replace(design=_designs()[name]) if name else state
-    panel.dropdown("start from", names, Attribute(read, write), _ABOUT_START)
+    panel.dropdown("start from", names, Attribute(read, write, follows="design"), _ABOUT_START)
 
 
 def _numbers(panel: Fields, label: str, shown: Numbers, build: Build) -> None:
@@ -94,7 +94,7 @@ def _typed(panel: Fields, numbers: Sequence[ShownParameter]) -> None:
 def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
     about = lambda state, found: [_ABOUT_BARS] * _has_bars(state, found)
     panel.text("design", "found.slopes", content=about)
-    rows, bars = dict[str, Slider](), dict[str, Line]()
+    rows, bars, told = dict[str, Slider](), dict[str, Line](), dict[str, SlopeBar]()
     before = panel.session.found.ends  # of a design with other sliders
     for each in shown:
         at = of_design(each.read, each.write)
@@ -108,17 +108,23 @@ def _sliders(panel: Fields, shown: Sequence[ShownParameter]) -> None:
             if (low, high) != row.ends and low < high:
                 row.ends = low, high
 
-    def draw_bars(state: StudioState, found: Found) -> None:
-        slopes, drawn = found.slopes, dict.fromkeys(bars, NO_BAR * _has_bars(state, found))
-        if slopes is not None:
+    def tell(_: StudioState, found: Found) -> None:
+        told.clear()
+        if found.slopes is not None:
             ranges = {name: row.ends[1] - row.ends[0] for name, row in rows.items()}
             sliders = {each.name: (each, ranges[each.name]) for each in shown}
-            drawn |= slope_bars(slopes, sliders, old=slopes.arm != state.design)
+            told.update(slope_bars(found.slopes, sliders))
+
+    def draw(state: StudioState, found: Found) -> None:
+        old = found.slopes is not None and found.slopes.arm != state.design
+        drawn = dict.fromkeys(bars, NO_BAR * _has_bars(state, found))
+        drawn |= {name: each.html(old=old) for name, each in told.items()}
         for name, line in bars.items():
             line.show(drawn[name])
 
     panel.follow("found.ends", show=end)
-    panel.follow("design", "found.slopes", "found.ends", show=draw_bars)
+    panel.follow("found.slopes", "found.ends", show=tell)
+    panel.follow("design", "found.slopes", "found.ends", show=draw)
 
 
 def _has_bars(state: StudioState, found: Found) -> bool:
@@ -178,7 +184,9 @@ def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, 
 def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     session, part, labels = panel.session, known[label], tuple(known)
     read = lambda found: min(found.part, len(labels) - 1)
-    chosen = Attribute(read, lambda found, number: replace(found, part=number), "found")
+    chosen = Attribute(
+        read, lambda found, number: replace(found, part=number), "found", "found.part"
+    )
     hint = "The part whose numbers are below"
     panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
     own = part.ring is not None or bool(part.actuator)

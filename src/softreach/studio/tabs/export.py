@@ -14,10 +14,10 @@ from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
 from softreach.plot.coloring import draw_figure_key
+from softreach.plot.style import inked
 from softreach.rod.kinematics import configuration
 from softreach.studio.captions import legend_text, picture_text, reach_text
-from softreach.studio.fields import GRAY, Fields, file_text
-from softreach.studio.figures import inked
+from softreach.studio.fields import GRAY, Change, Fields, file_text
 from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
@@ -56,7 +56,7 @@ def export(panel: Fields) -> None:
         state = lambda: session.state_now().to_json().encode()
         keep = lambda: session.send("softreach-studio.json", state)
         panel.button("Save this work", keep, about)
-        read = lambda file: session.restore(state_from(file.name, file.content, session.state))
+        read = lambda file: session.restore(saved(file.name, file.content))
         hint = "A state (.json) or a design (.toml) that was saved"
         panel.upload("Load state or design", read, hint, **GRAY)
     for folder, kind in (("design and data", "data"), ("pictures", "picture")):
@@ -70,12 +70,14 @@ def export(panel: Fields) -> None:
             panel.button(f"Save {kind}", save, "As a file of this type")
 
 
-def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
-    """The state in a file that was saved, or the present one with the design of a TOML file."""
+def saved(name: str, content: bytes) -> Change:
+    """The change to the state in a file that was saved, or to the design of a TOML file."""
     text = file_text(name, content)
     if name.lower().endswith(".toml"):
-        return state.replace(design=design_of_text(text, name))
-    return StudioState.from_json(text)
+        design = design_of_text(text, name)
+        return lambda state: state.replace(design=design)
+    state = StudioState.from_json(text)
+    return lambda _: state
 
 
 def content_of(session: Session, name: str, write: Write) -> bytes:

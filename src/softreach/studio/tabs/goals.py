@@ -280,7 +280,7 @@ def _is_free(name: str) -> Attribute:
         return replace(found, bench=replace(found.bench, free=free))
 
     read = lambda found: name in (found.bench.free if found.bench else ("pose",))
-    return Attribute(read, write, "found")
+    return Attribute(read, write, "found", "found.bench")
 
 
 def _read_poses(session: Session, file: UploadedFile) -> None:

@@ -57,11 +57,10 @@ _NOTHING = np.zeros((1, 1, 4), np.uint8)
 
 def status(panel: Fields) -> None:
     """Numbers, key and notes above all tabs; keys of the page press undo and redo."""
-    session, colors = panel.session, [""]
-    known = "found.reach", "found.free", "found.check", "found.key", "found.refusal"
-    panel.follow("found.key", show=lambda _, found: colors.__setitem__(0, key_html(found.key)))
-    numbers = lambda _, found: _numbers(session, found, colors[0])
-    panel.html("design", *known, *_WORK, content=numbers)
+    session, numbers = panel.session, list[Any]()
+    known = "design", "found.reach", "found.free", "found.check", "found.key", "found.refusal"
+    panel.follow(*known, show=lambda *now: numbers.__setitem__(slice(None), _numbers(*now)))
+    panel.html(*known, *_WORK, content=lambda *_: _status(session, *numbers))
     act = lambda: (session.cancel if session.busy else session.resume)()
     cancel = panel.button(_CANCEL, act, _ABOUT_CANCEL, visible=False)
 
@@ -87,31 +86,30 @@ def status(panel: Fields) -> None:
     panel.choices("history", actions, _HISTORY_HINT)
 
 
-def _numbers(session: Session, found: Found, colors: str) -> str:
+def _numbers(state: StudioState, found: Found) -> tuple[list[Part], list[str]]:
+    """Numbers of the reach, and the lines below them as HTML."""
     check, reach = found.check, found.reach
-    above = [_reach_line(session), [verdict_text(check)] if check is not None else []]
-    below: list[list[Part]] = []
-    if reach is not None:
-        refusal: list[Part] = [f"No exact volume: {reach.refusal}"] * bool(reach.refusal)
-        words = "; ".join(reach.notes if reach.fine else ())
-        notes: list[Part] = [f"{words[:1].upper()}{words[1:]}."] * bool(words)
-        below = [legend_text(reach, free=found.free is not None), refusal, notes]
-    lines = lambda lines: [markup.paragraph(*line) for line in lines]
-    return markup.status(*lines(above), colors, *lines(below))
+    lines = [markup.paragraph(verdict_text(check))] if check is not None else []
+    if reach is None:
+        return [], [*lines, key_html(found.key)]
+    refusal: list[Part] = [f"No exact volume: {reach.refusal}"] * bool(reach.refusal)
+    words = "; ".join(reach.notes if reach.fine else ())
+    notes: list[Part] = [f"{words[:1].upper()}{words[1:]}."] * bool(words)
+    below = legend_text(reach, free=found.free is not None), refusal, notes
+    before = [Strong("of the design before: ")] * (reach.arm != state.design)
+    numbers = [*before, *reach_text(reach, loaded_share(found, state.design))]
+    return numbers, [*lines, key_html(found.key), *(markup.paragraph(*parts) for parts in below)]
+
+
+def _status(session: Session, numbers: list[Part], below: list[str]) -> str:
+    work = _work(session)
+    first = [*numbers, f" · {work}" * bool(work)] if numbers else [session.found.refusal or work]
+    return markup.status(markup.paragraph(*first), *below)
 
 
 def is_behind(session: Session) -> bool:
     """True if results of the design in the fields are missing."""
     return session.found.complete_reach(session.state.design) is None
-
-
-def _reach_line(session: Session) -> list[Part]:
-    found, design, work = session.found, session.state.design, _work(session)
-    if found.reach is None:
-        return [found.refusal or work]
-    before = [Strong("of the design before: ")] * (found.reach.arm != design)
-    numbers = reach_text(found.reach, loaded_share(found, design))
-    return [*before, *numbers, *([f" · {work}"] if work else [])]
 
 
 def _work(session: Session) -> str:

@@ -1,0 +1,58 @@
+"""Lines of sight: what they meet first, what hides a place, how far along an axis they point.
+
+All lengths are in that of the arm.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.support.arrays import Array
+
+_TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
+_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
+_POINTER = 0.012  # radius of what is clicked [L]
+_STEEPEST = 0.03  # sin² between axis and line of sight, below which a drag tells no distance
+
+
+def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
+    """True if one of the balls, (n, 3) and (n,) [L], hides a point that it does not touch."""
+    distance = float(np.linalg.norm(point - camera))
+    ahead, aside = _beside(centers, camera, (point - camera) / distance)
+    return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
+
+
+def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
+    """Way along a ray to the first ball, no thinner than a pointer [L]; infinite without one."""
+    ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
+    met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
+    return float(ahead[met].min(initial=np.inf))
+
+
+def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:
+    """Distances of points along a ray whose direction `way` has length 1, and from it."""
+    offset = points - origin
+    ahead = offset @ way
+    return ahead, np.linalg.norm(offset - ahead[:, None] * way, axis=1)
+
+
+def picked_point(points: Array, origin: ArrayLike, direction: ArrayLike) -> int | None:
+    """Number of the first of the points (n, 3) that a ray from the camera hits, if any."""
+    direction = np.asarray(direction, float) / np.linalg.norm(direction)
+    depth, aside = _beside(points, np.asarray(origin, float), direction)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.where(depth > 0, aside / depth, np.inf)
+    near = np.flatnonzero(angle <= _CLICK)
+    if not len(near):
+        return None
+    # A little deeper but under the cursor is better than in front and beside it.
+    return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / _CLICK))])
+
+
+def along_axis(origin: Array, axis: Array, eye: Array, seen: Array) -> float:
+    """Way along an axis of length 1 to where a line of sight is nearest; 0 if seen end on."""
+    sight = (seen - eye) / np.linalg.norm(seen - eye)
+    across = axis - (axis @ sight) * sight
+    steepness = float(across @ across)
+    return float((eye - origin) @ across) / steepness if steepness > _STEEPEST else 0.0
