@@ -87,7 +87,7 @@ def test_a_posed_arm_is_no_filament_of_the_other_program(hanging, tmp_path):
         activefilaments.write_design(hanging, tmp_path / "arm.jl")
 
 
-# Files of released versions open as docs/compatibility.md says
+# Files of released versions open as docs/platforms.md says
 
 
 KEPT = Path(__file__).parent / "data" / "kept"

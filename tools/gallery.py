@@ -28,14 +28,25 @@ _INTRODUCTION = """\
 
 <!-- Written by `python -m tools.gallery`. -->
 
-Designs from the literature, each with its source, as functions of `softreach.designs` and as
-[files](design-files.md). Every name is also a design on the [command line](command-line.md), as in
-`softreach design lce_arm`.
+Designs from the literature, each with its source. A name is a design on the
+[command line](command-line.md), `softreach design lce_arm`; a function,
+`sr.designs.lce_arm()`; and a [file](design-files.md), `softreach example lce_arm`.
 
-Each picture shows the arm at rest with its bundles, the cloud of its tips from the front and from
-above with some shapes of the arm in it (one bundle, or a group, at its strongest), and the section
-at the base. Volume and the share of the convex hull that is out of reach are those of the
-[exact reachable set](reachable-set.md), unloaded, each with its error.
+```python
+import softreach as sr
+
+print(sr.designs.lce_arm())
+```
+
+```text
+Manipulator: L = 0.09 m, R2 = 0.0045 to 0.0045 m
+  bundles: left, right, longitudinal
+```
+
+Pictures, from the left: the arm at rest; the cloud of its tips from the front and from above, with
+shapes of the arm at the strongest activation of a bundle or a group; the section at the base.
+Volume and share of the convex hull out of reach are those of the
+[exact reachable set](reachable-set.md) without loads, with their errors.
 
 """
 _HEAD = """\
@@ -133,28 +144,11 @@ def _table_row(name: str, row: Row) -> str:
 
 
 def _section(name: str) -> str:
-    arm, function = getattr(designs, name)(), getattr(designs, name)
-    summary, _, rest = (inspect.getdoc(function) or "").partition("\n\n")
-    told = rest.partition("\nArgs:")[0].partition("\nRaises:")[0].strip()
+    summary, _, rest = (inspect.getdoc(getattr(designs, name)) or "").partition("\n\n")
+    notes = rest.partition("\nArgs:")[0].partition("\nRaises:")[0].strip()
     picture = f"![{name}: section, arm at rest, cloud with shapes](images/gallery/{name}.png)"
-    code = f"arm = sr.designs.{name}()\nprint(arm)"
-    return "\n".join(
-        [
-            "",
-            f"## {name}",
-            "",
-            *_linked(summary),
-            "",
-            picture,
-            "",
-            *_linked(told),
-            "",
-            f"```python\nimport softreach as sr\n\n{code}\n```",
-            "",
-            f"```text\n{arm!r}\n```",
-            "",
-        ]
-    )
+    lines = ["", f"## {name}", "", *_linked(summary), "", picture, "", *_linked(notes), ""]
+    return "\n".join(lines)
 
 
 def _linked(text: str) -> Iterator[str]:

@@ -1,19 +1,14 @@
-"""Writes the table of docs/materials.md from the library: `python -m tools.materials`."""
+"""Writes the table of materials in docs/design-files.md: `python -m tools.materials`."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
 from pathlib import Path
 
 from softreach.arm.section import MaterialRecord, material_names, material_record
 
-PAGE = Path(__file__).parent.parent / "docs" / "materials.md"
+PAGE = Path(__file__).parent.parent / "docs" / "design-files.md"
 BEGIN, END = "<!-- table: python -m tools.materials -->\n", "<!-- end of the table -->\n"
-_HEAD = (
-    "| name | E | what E is | ν [-] | ρ [kg/m³] | sources | note |\n|---|---|---|---|---|---|---|\n"
-)
-_SYMBOLS = {"young_modulus": "E", "poisson_ratio": "ν", "density": "ρ"}
+_HEAD = "| name | E | what E is | ν [-] | ρ [kg/m³] | sources |\n|---|---|---|---|---|---|\n"
 _UNITS = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"))
 
 
@@ -30,6 +25,7 @@ def page_with_table(text: str) -> str:
 
 def _row(record: MaterialRecord) -> str:
     material = record.material
+    sources = dict.fromkeys(record.sources.values())
     density = "not given" if material.density is None else f"{material.density:g}"
     cells = (
         f"`{material.name}`",
@@ -37,8 +33,7 @@ def _row(record: MaterialRecord) -> str:
         record.modulus,
         f"{material.poisson_ratio:g}",
         density,
-        "; ".join(_sources(record)),
-        re.sub(r"\[(\w+)\]", lambda match: _link(match[1]), record.note),
+        ", ".join(f"[{key}](references.md#{key.lower()})" for key in sources),
     )
     return "| " + " | ".join(cells) + " |\n"
 
@@ -46,17 +41,6 @@ def _row(record: MaterialRecord) -> str:
 def _pressure(value: float) -> str:
     scale, unit = next(pair for pair in _UNITS if value >= pair[0])
     return f"{value / scale:.4g} {unit}"
-
-
-def _sources(record: MaterialRecord) -> Iterator[str]:
-    """Every source once, with the symbols of the numbers it gives."""
-    for key in dict.fromkeys(record.sources.values()):
-        symbols = [_SYMBOLS[field] for field, source in record.sources.items() if source == key]
-        yield f"{', '.join(symbols)}: {_link(key)}"
-
-
-def _link(key: str) -> str:
-    return f"[{key}](references.md#{key.lower()})"
 
 
 if __name__ == "__main__":

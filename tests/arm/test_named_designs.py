@@ -248,6 +248,6 @@ def test_the_library_cannot_be_changed():
         material_record("pla").sources["density"] = "hearsay"  # type: ignore[index]
 
 
-def test_the_page_of_materials_is_written_from_the_library():
-    page = (DOCS / "materials.md").read_text("utf-8")
+def test_the_table_of_materials_is_written_from_the_library():
+    page = (DOCS / "design-files.md").read_text("utf-8")
     assert page_with_table(page) == page

@@ -103,3 +103,35 @@ def test_bending_turns_a_tendon_on_a_solid_rod_by_the_radius_and_poisson_s_ratio
     bend = radius * np.hypot(*linear[:2])
     turn = bend * slope / (1 + slope**2) * ((outer / (2 * radius)) ** 2 - nu)
     assert exact[2] / linear[2] - 1 == pytest.approx(turn / slope, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("outer", "radius", "bend", "turns", "percent"),
+    [
+        (0.01, 0.005, 0.02, 0.5, 0.03),
+        (0.01, 0.005, 0.1, 0.5, 0.47),
+        (0.01, 0.005, 0.1, 1, 0.58),
+        (0.002, 0.008, 0.1, 0.5, 0.43),
+        (0.002, 0.008, 0.1, 1, 0.77),
+        (0.002, 0.008, 0.1, 0, 0.00),
+    ],
+)
+def test_the_linear_law_is_off_by_the_shares_that_the_theory_prints(
+    outer, radius, bend, turns, percent
+):
+    length, area, nu = 0.3, np.pi * outer**2 * 1e6, 0.4
+    bending = area * outer**2 / 4
+    rod = Rod(
+        length=length,
+        axial=lambda z: area + 0 * z,
+        bending=lambda z: bending + 0 * z,
+        torsion=lambda z: bending / (1 + nu) + 0 * z,
+    )
+    tendon = Tendon(
+        radius=lambda z: radius + 0 * z,
+        angle=lambda z: 2 * np.pi * turns * z / length,
+        tension=bend * bending / radius**2,
+        anchor=length,
+    )
+    deviation = linear_law_deviation(rod, [tendon], stations=3)
+    assert 100 * deviation.relative == pytest.approx(percent, abs=0.006)

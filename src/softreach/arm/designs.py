@@ -43,9 +43,8 @@ def minimal_trunk(
 ) -> Manipulator:
     """The paper's minimal design: two helical bundles of opposite hand and a longitudinal one.
 
-    [Kaczmarski2024], section 2. The paper prints R1(0) = L/12, which exceeds its R2(0) = L/16;
-    12/16 of R2(0) is our reading of that misprint, so `radius_ratio` is a parameter and not the
-    paper's value.
+    [Kaczmarski2024], section 2. The paper prints R1(0) = L/12, which exceeds its R2(0) = L/16. We
+    read 12/16 of R2(0); `radius_ratio` changes this reading, which is not the paper's value.
 
     Args:
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
@@ -119,11 +118,10 @@ _LCE_FAMILIES = (("left", -108, 66), ("right", 108, 114), ("longitudinal", 0, 27
 def lce_arm() -> Manipulator:
     """The laboratory's arm: three fibers of liquid-crystal elastomer on a soft core.
 
-    [Veil2025], its released code; the robot itself is that of [Leanza2024]. The laboratory models
-    the three families of fibers in one layer by three rings in the same place, each with the share
-    48°/360° of the fibers' Young's modulus, and multiplies its activations in [-5/3, 0] by 3 to
-    make up for it. The activations here are the multiplied ones, in [-5, 0]. The source has one
-    density, 1000 kg/m³, for all of the arm; here a third of it goes to each of the three rings.
+    The released code of [Veil2025]; the robot is that of [Leanza2024]. Three rings in the same
+    place stand for the three families of fibers in one layer, each with 48°/360° of their Young's
+    modulus. The code multiplies activations in [-5/3, 0] by 3 to compensate; here they are in
+    [-5, 0]. A third of the one density, 1000 kg/m³, goes to each ring.
     """
     fibers = named_material("liquid_crystal_elastomer")
     share = math.radians(48) / (2 * math.pi)
@@ -165,8 +163,8 @@ def three_tendon_robot(*, segments: int = 1) -> Manipulator:
 
     The numbers are those of the code published with [Rao2021], whose robot has two segments: wire
     of radius 0.7 mm, tendons at 10 mm from its axis and at 90°, 210° and 330°. Its spacer disks add
-    neither stiffness nor weight here. The tension of its example is 8 N; that [0, 8] N is the range
-    of each tendon is our choice.
+    neither stiffness nor weight here. Its example has a tension of 8 N; the range [0, 8] N of each
+    tendon is our choice.
 
     Args:
         segments: 1 or 2; the tendons of the first end where the second begins.
@@ -195,8 +193,8 @@ def helical_tendon_robot() -> Manipulator:
     """A steel wire with four tendons that wind once around it from base to tip.
 
     The static example of the code published with [Till2019], after the robot of [Rucker2011]: 0.5 m
-    of wire of radius 1 mm, tendons at 15.06 mm from its axis, one of them under 15 N. That
-    [0, 15] N is the range of each tendon is our choice. The example's gravity is not part of it.
+    of wire of radius 1 mm, tendons at 15.06 mm from its axis, one of them under 15 N. The range
+    [0, 15] N of each tendon is our choice. The gravity of the example is left out.
     """
     steel = Material(young_modulus=200e9, poisson_ratio=0.25, density=8000.0, name="steel")
     tendons = Tendon(
@@ -213,11 +211,11 @@ def helical_tendon_robot() -> Manipulator:
 def three_chamber_arm() -> Manipulator:
     """A silicone cylinder with three reinforced pressure chambers along it.
 
-    After the STIFF-FLOP manipulator, [Cianchetti2014] and [Ranzani2015]: Ecoflex 00-50, three
-    chambers 120° apart, kept from ballooning. Its modules are 50 mm long and 25 to 32 mm wide; here
-    three modules, 0.15 m, act as one and are 25 mm wide. The chambers' radius of 4 mm, their
-    distance of 7.5 mm from the axis and the pressures in [0, 100] kPa are our choice, and the
-    stiffness is that of the full cylinder.
+    After the STIFF-FLOP manipulator, [Cianchetti2014] and [Ranzani2015]: Ecoflex 00-50 with three
+    chambers that do not balloon. Its modules are 50 mm long and 25 to 32 mm wide; here three of
+    them, 25 mm wide, act as one. The radius of the chambers (4 mm), their distance from the axis
+    (7.5 mm) and the pressures in [0, 100] kPa are our choice. The stiffness is that of the full
+    cylinder.
     """
     silicone = Ring(inner_ratio=0.0, material=named_material("ecoflex_00_50"), name="body")
     chambers = Chamber(
@@ -248,11 +246,10 @@ def elephant_trunk() -> Manipulator:
     """An elephant's trunk: longitudinal, oblique and radial muscles, each on the right and left.
 
     The groups of muscles are those of [KaczmarskiTrunk2025]: dorsal longitudinal, outer and inner
-    ventral oblique of opposite hand, dorsal and ventral radial; the sectors do not wind, and the
+    ventral oblique of opposite hand, dorsal and ventral radial. The sectors do not wind, and the
     section is homogeneous. Young's modulus is the apparent one of [Wilson1991], the density that of
-    muscle, [MendezKeys1960]. Lengths, radii, sectors, angles and bounds were not published: those
-    here are ours. The trunk is 1.8 m long and tapers from 0.18 to 0.05 m; the obliques run at 30°;
-    γ is in [-0.5, 0]. Dorsal is -y, ventral +y, and right is +x.
+    muscle, [MendezKeys1960]. Lengths, radii, sectors, the obliques' angle of 30° and the bounds
+    [-0.5, 0] were not published and are our choice. Dorsal is -y, ventral +y, and right is +x.
     """
     matter = named_material("elephant_trunk")
     rings = tuple(

@@ -17,15 +17,20 @@ from softreach.support.errors import NotPossible, NotWritten, SoftreachError
 from softreach.support.plugins import importing
 
 _GROUPS = (
-    ("Design", "convert:design search:check search:search demo:list studio:studio"),
-    ("Bench", "bench:plan-poses bench:calibrate"),
-    ("Reach", "reach:reach reach:cloud reach:volume reach:payload reach:gradient"),
+    ("Start", "demo:demo demo:example"),
+    ("Design", "convert:design search:check search:search studio:studio"),
+    (
+        "Reach",
+        "reach:reach reach:cloud reach:volume reach:payload reach:gradient "
+        "reach:show convert:export convert:import",
+    ),
     ("Places", "places:solve places:track places:equilibria"),
-    ("Output", "reach:show convert:export convert:import"),
     ("Families", "atlas:atlas"),
-    ("More", "demo:demo demo:example demo:doctor demo:paper demo:warmup"),
+    ("Bench", "bench:plan-poses bench:calibrate"),
+    ("Reference", "demo:list"),
+    ("About", "demo:paper demo:doctor demo:warmup"),
 )
-"""Titles of the help, and commands behind the modules that they are in."""
+"""Titles of the help and of the documentation; commands behind the modules that they are in."""
 MODULES = {x.split(":")[1]: x.split(":")[0] for _, words in _GROUPS for x in words.split()}
 _FUNCTIONS = {"import": "import_file", "list": "listing"}  # where Python needs the name itself
 
