@@ -112,14 +112,14 @@ def _shape(points: np.ndarray) -> AlphaComplex:
 ROUTES: dict[str, tuple[str, Callable[[np.ndarray], float]]] = {
     "scipy": ("SciPy (Qhull), V(α)", scipy_route),
     "ours": ("softreach, V(α)", ours),
-    "hull": ("softreach, hull with surface and regions", ours_hull),
     "bias": ("softreach, hull and bias estimate at 0.05 L", ours_with_bias),
-    "curve": ("softreach, V at 1000 radii", ours_curve),
     "convex": ("softreach, convex hull", ours_convex),
+    "hull": ("softreach, hull with surface and regions", ours_hull),
+    "curve": ("softreach, V at 1000 radii", ours_curve),
     "qhull": ("SciPy's triangulation, our kernels after it", qhull_kernels),
     "critical": ("softreach, critical α and its V", ours_critical),
 }
-OF_DEVELOPERS = 2
+OF_DEVELOPERS = 4
 """So many of the last routes are not for the documentation."""
 
 

@@ -107,9 +107,9 @@ def main(n: int = 400_000) -> None:
     print(f"## Arms under load, tol = 1e-6, {parallel.thread_count()} threads\n")
     print("The paper's trunk of rubber, load number ρgL³/(E R2²) = 2.5, gravity across its base.\n")
     _tip_table(n)
-    _volume_table()
     _peer_table()
     print(FOR_DEVELOPERS)
+    _volume_table()
     _bundle_table(n // 10)
     _posture_table()
 
@@ -120,7 +120,6 @@ def _tip_table(n: int) -> None:
         found = loaded_and_free(arm, n)
         return {
             "load": name,
-            "steps": LoadedRod(arm).steps,
             "CPU [µs a tip]": f"{1e6 * found.cpu:.2f}",
             "times a free tip": f"{found.ratio:.0f}",
             f"wall [s], {n:,} tips": f"{found.wall:.2f}",

@@ -119,8 +119,8 @@ def print_table(scene: Scene, repeat: int) -> None:
     tip_drags(scene, 3)
     dragged = best([tip_drags(scene, 60) for _ in range(repeat)])
     print(f"## Studio, server side: the best of {repeat}, minimal trunk\n")
-    print("| what | wall [s] | CPU [s] |")
-    print("|---|--:|--:|")
+    print("| what | wall [s] |")
+    print("|---|--:|")
     row("slider to first cloud (65,536 points) and volume", best([r["coarse"] for r in runs]))
     row("slider to fine result (524,288 points, 0.3 %)", best([r["fine"] for r in runs]))
     row("first cloud and volume with four bundles, once", four["coarse"])
@@ -137,7 +137,7 @@ def best(costs: list[Cost]) -> Cost:
 
 def row(what: str, cost: Cost) -> None:
     """One line of the table."""
-    print(f"| {what} | {cost.wall:.3f} | {cost.cpu:.3f} |")
+    print(f"| {what} | {cost.wall:.3f} |")
 
 
 if __name__ == "__main__":
