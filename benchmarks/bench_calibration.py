@@ -342,26 +342,34 @@ def _rows(robot: Robot, train: Measurements, test: Measurements) -> Iterator[Row
 
 
 HEAD = """\
-| arm | samples fitted, held out | numbers: softreach | within 2σ | constant curvature \
+| arm | length [mm] | samples fitted, held out | softreach | within 2σ | constant curvature \
 | quadratic ridge | Gaussian process |
-|---|--:|---|--:|--:|--:|--:|
+|---|--:|--:|--:|--:|--:|--:|--:|
 """
 
 
 def _robot_row(robot: Robot) -> str:
-    """Errors of one arm: rms and median."""
+    """Errors of one arm by its last fit and by other laws: rms and median, behind the numbers."""
     data = read_measurements(robot.arm, DATA / robot.file, **robot.columns)  # pyright: ignore
     train, test = split(data, robot.train)
-    *ours, curvature, ridge, process = _rows(robot, train, test)
+    *fits, curvature, ridge, process = _rows(robot, train, test)
+    for row in fits[:-1]:
+        print(f"<!-- {robot.name}, {shown(row)} -->")
+    cells = [
+        robot.name,
+        f"{1e3 * robot.arm.length:.0f}",
+        f"{len(train)}, {len(test)}",
+        shown(fits[-1]),
+        f"{100 * fits[-1].coverage:.0f} %",
+        *map(shown, (curvature, ridge)),
+        shown(process).split(": ")[1],
+    ]
+    return f"| {' | '.join(cells)} |\n"
 
-    def shown(row: Row) -> str:
-        return f"{1e3 * row.held_out.rms:.2f} ({1e3 * row.held_out.median:.2f})"
 
-    fits = ", ".join(f"{row.numbers}: {shown(row)}" for row in ours)
-    others = " | ".join(f"{row.numbers}: {shown(row)}" for row in (curvature, ridge))
-    samples = f"{len(train)}, {len(test)}"
-    within = f"{100 * ours[-1].coverage:.0f} %"
-    return f"| {robot.name} | {samples} | {fits} | {within} | {others} | {shown(process)} |\n"
+def shown(row: Row) -> str:
+    """How many numbers a law has, and its errors in mm."""
+    return f"{row.numbers}: {1e3 * row.held_out.rms:.2f} ({1e3 * row.held_out.median:.2f})"
 
 
 def main(*names: str) -> None:
