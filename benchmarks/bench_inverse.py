@@ -147,8 +147,8 @@ def many_row(bundles: int, n: int) -> str:
 
     solver = partial(solve_inverse, prepared_map(random_design(bundles, bundles - 3)))
     prepared, rng = solver.args[0], np.random.default_rng(0)
-    box = prepared.rod.box
-    targets = prepared.rod.tips(rng.uniform(box.low, box.high, (n, bundles)))
+    box = prepared.whole.box
+    targets = prepared.whole.tips(rng.uniform(box.low, box.high, (n, bundles)))
     places = rng.uniform(-1.2, 1.2, (n // 10, 3))
     solver(places[:2])
     _, wall, cpu = timed(lambda: solver(targets))
