@@ -342,9 +342,8 @@ def _rows(robot: Robot, train: Measurements, test: Measurements) -> Iterator[Row
 
 
 HEAD = """\
-| arm | length [mm] | samples fitted, held out | softreach | within 2σ | constant curvature \
-| quadratic ridge | Gaussian process |
-|---|--:|--:|--:|--:|--:|--:|--:|
+| arm | softreach | within 2σ | constant curvature | quadratic ridge | Gaussian process |
+|---|--:|--:|--:|--:|--:|
 """
 
 
@@ -356,9 +355,7 @@ def _robot_row(robot: Robot) -> str:
     for row in fits[:-1]:
         print(f"<!-- {robot.name}, {shown(row)} -->")
     cells = [
-        robot.name,
-        f"{1e3 * robot.arm.length:.0f}",
-        f"{len(train)}, {len(test)}",
+        f"{robot.name}, {1e3 * robot.arm.length:.0f} mm, {len(train)} + {len(test)} samples",
         shown(fits[-1]),
         f"{100 * fits[-1].coverage:.0f} %",
         *map(shown, (curvature, ridge)),
