@@ -1,4 +1,7 @@
-"""Run every benchmark and write its tables into the documentation."""
+"""Run every benchmark and write the tables that users read into the documentation.
+
+What a part prints after `table.FOR_DEVELOPERS` is for the terminal alone.
+"""
 
 from __future__ import annotations
 
@@ -11,32 +14,30 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
+from benchmarks.table import FOR_DEVELOPERS
 from softreach.support import parallel
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks.md"
 PARTS = (
     "waits",
-    "cold",
     "kernels",
-    "arms",
     "geometry",
     "workspace",
     "loads",
-    "calibration",
     "search",
     "inverse",
-    "redundancy",
     "atlas",
     "studio",
-    "pictures",
-    "earlier",
 )
+OTHERS = "calibration", "cold", "arms", "redundancy", "pictures", "earlier"
+"""Parts that are printed; calibration writes its table into the page of validation."""
 
 HEADER = """# Benchmarks
 
 Written by `make bench`; do not edit. {date}, softreach {softreach}, Python {python}, NumPy {numpy},
-Numba {numba}, {threads} threads on {machine}. The machine was shared with other work: compare
-within a table, where all rows come from one run, and trust CPU time before wall time.
+Numba {numba}, {threads} threads on {machine}. Other work shared the machine: compare rows of one
+table, and trust CPU time before wall time. `python -m benchmarks PART` also prints tables for
+developers. [Validation](validation.md) has errors, [Clouds](clouds.md#on-a-gpu) the GPU.
 
 """
 
@@ -54,12 +55,12 @@ def main() -> None:
         **{name: version(name) for name in ("softreach", "numpy", "numba")},
     )
     sections = _sections()
-    for name in sys.argv[1:] or PARTS:
+    for name in sys.argv[1:] or PARTS + OTHERS:
         captured = io.StringIO()
         with redirect_stdout(captured):
             importlib.import_module(f"benchmarks.bench_{name}").main()
         print(captured.getvalue(), flush=True)
-        sections[name] = captured.getvalue().strip() + "\n\n"
+        sections[name] = captured.getvalue().partition(FOR_DEVELOPERS)[0].strip() + "\n\n"
         known = [part for part in PARTS if part in sections]
         body = "".join(MARK.format(part) + sections[part] for part in known)
         PAGE.write_text(header + body, encoding="utf-8")

@@ -142,7 +142,7 @@ def row(arm, n: int, place: str) -> str:
 
     prepared = prepared_map(arm)
     gamma = activations(arm, n, place)
-    targets = prepared.rod.tips(gamma)
+    targets = prepared.whole.tips(gamma)
     solve_inverse(prepared, targets[:2])
     begin, cpu = time.perf_counter(), time.process_time()
     found = solve_inverse(prepared, targets)

@@ -127,7 +127,7 @@ def _winding() -> list[FiberArchitecture]:
 
 def _tendons(start: float, end: float) -> Tendon:
     return Tendon(
-        name=f"to {end:g} L",
+        name=f"to {100 * end:g} % of L",
         bundles=3,
         distance_ratio=0.9,
         start_over_length=start,

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.memory import peak_bytes
+from benchmarks.table import FOR_DEVELOPERS
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.metrics import METRIC_GROUPS, Intermediates, Need, chosen_metrics
@@ -139,9 +140,9 @@ def measured(threads: int, *task: object) -> dict:
 def main(side: int = 4, n: int = 400_000) -> None:
     """Print the tables."""
     print(f"## Atlas: {side} x {side} designs of {n:,} points\n")
-    alone = measured(1, "parts", side, side, n, "-")
-    print_parts(alone, side**2)
-    print_atlas(alone, side, n)
+    print_atlas(side, n)
+    print(FOR_DEVELOPERS)
+    print_parts(measured(1, "parts", side, side, n, "-"), side**2)
     print_memory(side, n)
 
 
@@ -153,28 +154,14 @@ def print_parts(alone: Times, designs: int) -> None:
         print(f"| {told} | {wall:.2f} | {cpu:.2f} |")
 
 
-def print_atlas(alone: Times, side: int, n: int) -> None:
-    print("\nThe whole, from the call to the opened atlas, beside the sum of its parts, which is")
-    print("shared evenly among the threads:\n")
-    print(
-        "| α-shapes | Threads | Wall [s] | Sum of parts [s] | Ratio | CPU ratio | Designs/min |",
-        end="",
-    )
-    print(" 256 designs [s] | Wanted | Store [MB/design] | Peak [MB] |")
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
-    for kind, left_out in (("concave", "convex"), ("convex", "concave")):
-        used = [alone[name] for name in PARTS if name != left_out]
-        wall, cpu = (sum(times) for times in zip(*used, strict=True))
+def print_atlas(side: int, n: int) -> None:
+    print("| α-shapes | threads | wall [s] | designs/min | store [MB/design] | peak [MB] |")
+    print("|---|---|---|---|---|---|")
+    for kind, shown in (("concave", "yes"), ("convex", "no")):
         for threads in (1, 2):
             found = measured(threads, "atlas", side, side, n, kind)
-            print(
-                f"| {'yes' if kind == 'concave' else 'no'} | {threads} | {found['wall']:.1f} |",
-                end="",
-            )
-            print(f" {wall / threads:.1f} | {found['wall'] * threads / wall:.2f} |", end="")
-            print(f" {found['cpu'] / cpu:.2f} | {60 * side**2 / found['wall']:.1f} |", end="")
-            wanted = "120" if (kind, threads) == ("convex", 2) else ""
-            print(f" {256 * found['wall'] / side**2:.0f} | {wanted} |", end="")
+            rate = 60 * side**2 / found["wall"]
+            print(f"| {shown} | {threads} | {found['wall']:.1f} | {rate:.1f} |", end="")
             print(f" {found['size']:.2f} | {found['peak']:.0f} |")
 
 

@@ -1,15 +1,14 @@
 """Measured arms: rods of more and more numbers beside what a laboratory would use, held out.
 
-`python -m benchmarks.bench_calibration [robot]` prints Markdown tables; under pytest-benchmark one
-small fit runs.
+`python -m benchmarks.bench_calibration [robot]` prints a Markdown table, that of all robots into
+the documentation; under pytest-benchmark one small fit runs.
 """
 
 from __future__ import annotations
 
 import sys
-import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
 import softreach as sr
+from benchmarks.table import VALIDATION, put_between_marks
 from softreach.arm import (
     Chamber,
     Drive,
@@ -315,73 +315,72 @@ class Row(NamedTuple):
     """A law and its errors."""
 
     law: str
-    numbers: str
+    numbers: int
     held_out: PlacementErrors
-    last: PlacementErrors
-    """Of the last marker."""
-    seconds: float
     coverage: float = np.nan
     """Share of held-out coordinates within two standard deviations of their prediction."""
 
 
-def _rows(robot: Robot) -> Iterator[Row]:
-    data = read_measurements(robot.arm, DATA / robot.file, **robot.columns)  # pyright: ignore
-    train, test = split(data, robot.train)
-
-    def row(law: str, numbers: int | str, places: np.ndarray, seconds: float) -> Row:
-        left = places - test.places
-        return Row(law, str(numbers), misses(left), misses(left[:, -1]), seconds)
+def _rows(robot: Robot, train: Measurements, test: Measurements) -> Iterator[Row]:
+    def row(law: str, numbers: int, places: np.ndarray) -> Row:
+        return Row(law, numbers, misses(places - test.places))
 
     for free in robot.free:
-        begin = time.perf_counter()
-        if not free:
-            places = marker_positions(robot.arm, test.inputs)
-            yield row("softreach, as the source has it", 0, places, 0.0)
+        if not free:  # as the source has it
+            yield row("softreach", 0, marker_positions(robot.arm, test.inputs))
             continue
         result = sr.calibrate(robot.arm, train, free=free, rivals=False)
         places = result.residuals_on(test) + test.places
-        seconds = time.perf_counter() - begin
         left, sigma = np.abs(places - test.places), result.predict(test.inputs)[1]
         within = float((left <= 2.0 * sigma)[np.isfinite(left)].mean())
-        yield row("softreach", len(result.names), places, seconds)._replace(coverage=within)
-    yield from _others(robot, train, test, row)
+        yield row("softreach", len(result.names), places)._replace(coverage=within)
+    places, numbers = constant_curvature(robot.arm, train, test)
+    yield row("constant curvature", numbers, places)
+    places, numbers = quadratic(train, test)
+    yield row("quadratic ridge", numbers, places)
+    yield row("Gaussian process", len(train), gaussian_process(train, test))
 
 
-def _others(
-    robot: Robot, train: Measurements, test: Measurements, row: Callable[..., Row]
-) -> Iterator[Row]:
-    for law, made in (
-        ("constant curvature", lambda: constant_curvature(robot.arm, train, test)),
-        ("quadratic ridge", lambda: quadratic(train, test)),
-        ("Gaussian process", lambda: (gaussian_process(train, test), "all samples")),
-    ):
-        begin = time.perf_counter()
-        places, numbers = made()
-        yield row(law, numbers, places, time.perf_counter() - begin)
+HEAD = """\
+| arm | softreach | within 2σ | constant curvature | quadratic ridge | Gaussian process |
+|---|--:|--:|--:|--:|--:|
+"""
+
+
+def _robot_row(robot: Robot) -> str:
+    """Errors of one arm by its last fit and by other laws: rms and median, behind the numbers."""
+    data = read_measurements(robot.arm, DATA / robot.file, **robot.columns)  # pyright: ignore
+    train, test = split(data, robot.train)
+    *fits, curvature, ridge, process = _rows(robot, train, test)
+    for row in fits[:-1]:
+        print(f"<!-- {robot.name}, {shown(row)} -->")
+    cells = [
+        f"{robot.name}, {1e3 * robot.arm.length:.0f} mm, {len(train)} + {len(test)} samples",
+        shown(fits[-1]),
+        f"{100 * fits[-1].coverage:.0f} %",
+        *map(shown, (curvature, ridge)),
+        shown(process).split(": ")[1],
+    ]
+    return f"| {' | '.join(cells)} |\n"
+
+
+def shown(row: Row) -> str:
+    """How many numbers a law has, and its errors in mm."""
+    return f"{row.numbers}: {1e3 * row.held_out.rms:.2f} ({1e3 * row.held_out.median:.2f})"
 
 
 def main(*names: str) -> None:
-    """Print a table for each robot."""
+    """Print a row for each robot."""
     warnings.simplefilter("ignore")
-    print("## Measured arms\n")
-    print("Errors of places [mm] on samples that no fit saw; the split is by chance (seed 0), of")
-    print(
-        "the tentacle and the bellows every third pose. Fits of wires and cables see 270 samples,"
-    )
-    print("that of the hose 300. Within 2σ are coordinates within two standard deviations of")
-    print("`predict`, numbers and residuals together.")
-    print("The hose has friction and the rod has none: its verdict is memory.")
-    print("Seconds are those of the fit.")
+    table = HEAD
+    print(table, end="")
     for robot in robots():
-        if names and not any(name in robot.name for name in names):
-            continue
-        print(f"\n**{robot.name}**\n")
-        print("| law | numbers | rms | median | 95 % | rms, last marker | within 2σ | s |")
-        print("|---|---|---|---|---|---|---|---|")
-        for law, numbers, held, last, seconds, coverage in _rows(robot):
-            texts = (f"{1e3 * value:.2f}" for value in (held.rms, held.median, held.most, last.rms))
-            within = "" if np.isnan(coverage) else f"{100 * coverage:.0f} %"
-            print(f"| {law} | {numbers} | {' | '.join(texts)} | {within} | {seconds:.1f} |")
+        if not names or any(name in robot.name for name in names):
+            row = _robot_row(robot)
+            print(row, end="", flush=True)
+            table += row
+    if not names:
+        put_between_marks(VALIDATION, "measured arms", table)
 
 
 def test_a_fit(benchmark) -> None:

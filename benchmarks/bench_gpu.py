@@ -2,7 +2,7 @@
 
     python -m benchmarks.bench_gpu
 
-It needs a GPU, so that `make bench` does not run it; docs/gpu.md has what it printed.
+It needs a GPU, so that `make bench` does not run it; docs/clouds.md has what it printed.
 """
 
 from __future__ import annotations

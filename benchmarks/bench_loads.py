@@ -20,7 +20,7 @@ import pytest
 import softreach as sr
 from benchmarks import loads_peers
 from benchmarks.bench_kernels import best_time, twelve_bundles
-from benchmarks.table import Row, print_table
+from benchmarks.table import FOR_DEVELOPERS, Row, print_table
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
@@ -40,7 +40,6 @@ KINDS = {
     "gravity and a force that follows": sr.Loads(gravity=SIDE, follower_force=(NEWTONS, 0.0, 0.0)),
 }
 MARGIN = 0.02  # nearer to the loss of stability every error is magnified
-WANTED = {"gravity": 40, "gravity and a force across it": 60}
 
 
 def rubber(arm: sr.Manipulator, load_number: float, loads: sr.Loads) -> sr.Manipulator:
@@ -108,10 +107,11 @@ def main(n: int = 400_000) -> None:
     print(f"## Arms under load, tol = 1e-6, {parallel.thread_count()} threads\n")
     print("The paper's trunk of rubber, load number ρgL³/(E R2²) = 2.5, gravity across its base.\n")
     _tip_table(n)
+    _peer_table()
+    print(FOR_DEVELOPERS)
     _volume_table()
     _bundle_table(n // 10)
     _posture_table()
-    _peer_table()
 
 
 def _tip_table(n: int) -> None:
@@ -120,11 +120,8 @@ def _tip_table(n: int) -> None:
         found = loaded_and_free(arm, n)
         return {
             "load": name,
-            "steps": LoadedRod(arm).steps,
             "CPU [µs a tip]": f"{1e6 * found.cpu:.2f}",
             "times a free tip": f"{found.ratio:.0f}",
-            "wanted": f"≤ {WANTED[name]}" if name in WANTED else "",
-            "unstable, none": f"{found.shares[1]:.2%}, {found.shares[2]:.2%}",
             f"wall [s], {n:,} tips": f"{found.wall:.2f}",
         }
 

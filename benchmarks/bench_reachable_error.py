@@ -11,20 +11,18 @@ from __future__ import annotations
 import sys
 import time
 import warnings
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import softreach as sr
+from benchmarks.table import VALIDATION, put_between_marks
 from softreach.arm import FiberArchitecture, Manipulator
 from softreach.workspace import ReachableSet, reachable_set
 
 Array = NDArray[np.float64]
 
-PAGE = Path(__file__).parent.parent / "docs" / "reachable-set.md"
-BEGIN, END = "<!-- coverage of the stated errors -->\n", "<!-- end of coverage -->\n"
 ACCURACIES = (5e-2, 2e-2, 1e-2)
 FINE = {3: 1e-3, 4: 3e-3, 5: 3e-3, 6: 3e-3}
 PLACES, STARTS = 1500, 6
@@ -143,33 +141,34 @@ def measured(bundles: int, seed: int) -> list[Row]:
 
 
 def table(rows: list[Row]) -> str:
-    """How often the error is covered, and how large it is."""
-    lines = [
-        "| m | accuracy | designs | covered | error, median | stated, median | time, median |",
-        "|--:|--:|--:|--:|--:|--:|--:|",
-    ]
+    """Median errors with those stated, and how often these cover."""
+    accuracies = " | ".join(f"{accuracy:g}" for accuracy in ACCURACIES)
+    lines = [f"| bundles | accuracy {accuracies} | covered |", "|--:|--:|--:|--:|--:|"]
     for m in sorted({row.bundles for row in rows}):
-        for accuracy in ACCURACIES:
-            some = [row for row in rows if (row.bundles, row.accuracy) == (m, accuracy)]
-            off, stated, spent = (
-                np.array([getattr(row, name) for row in some])
-                for name in ("error", "stated", "seconds")
-            )
-            lines.append(
-                f"| {m} | {accuracy:g} | {len(some)} | {np.count_nonzero(off <= stated)} "
-                f"| {np.median(off):.1e} | {np.median(stated):.1e} | {np.median(spent):.1f} s |"
-            )
-    covered = np.mean([row.error <= row.stated for row in rows])
+        some = [row for row in rows if row.bundles == m]
+        shown = " | ".join(
+            f"{_median(some, accuracy, 'error')} ({_median(some, accuracy, 'stated')})"
+            for accuracy in ACCURACIES
+        )
+        lines.append(f"| {m} | {shown} | {sum(map(is_covered, some))} of {len(some)} |")
+    covered = np.mean(list(map(is_covered, rows)))
     return "\n".join([*lines, f"\n{covered:.1%} of {len(rows)} runs are covered."])
+
+
+def is_covered(row: Row) -> bool:
+    """Whether the stated error is as large as the error."""
+    return row.error <= row.stated
+
+
+def _median(rows: list[Row], accuracy: float, name: str) -> str:
+    return f"{np.median([getattr(row, name) for row in rows if row.accuracy == accuracy]):.1e}"
 
 
 def main(designs: int = 52) -> None:
     """Print the table and put it into its page."""
     found = table([row for n in range(designs) for row in measured(3 + n % 4, n // 4)])
     print(found)
-    head, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    tail = rest.split(END)[1]
-    PAGE.write_text(f"{head}{BEGIN}\n{found}\n\n{END}{tail}", encoding="utf-8")
+    put_between_marks(VALIDATION, "errors of reachable sets", found)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ import numpy as np
 
 from benchmarks.bench_geometry import cpu_seconds
 from benchmarks.memory import peak_bytes, reset_peak
+from benchmarks.table import FOR_DEVELOPERS
 from softreach.support.errors import SoftreachError
 
 ROOT = Path(__file__).parent.parent
@@ -62,22 +63,8 @@ LEFT_OUT = {
 WHY = {
     "forces.blocked_force": "the force grows in thirty steps, each solved for equilibria",
     "plot.plot_opposite_sides": "a cloud is drawn four times",
-    "atlas": "eighteen designs, each with all its metrics",
-    "calibrate": "cold: the kernels of loads; warm: predictions of the fit",
-    "check": "solved with and without payloads, then drawn by Matplotlib",
-    "cloud": "half is the import of xarray, the rest 400,000 samples written",
-    "demo": "clouds in four views, drawn by Matplotlib; their hull",
-    "equilibria": "cold: the kernels of loads; warm: imports and the figure",
-    "export": "imports of xarray and trimesh",
-    "gradient": "imports, the set and two hulls by Qhull",
-    "payload": "a set under loads for every payload that is tried",
-    "plan-poses": "predictions for thousands of candidates",
-    "reach": "surface, slices and imports of their libraries; the set itself is a fifth",
-    "show": "400,000 points drawn by Matplotlib, with its import",
-    "volume": "400,000 points are triangulated with exact predicates",
-    "track": "import of xarray",
 }
-"""Reasons of long waits, by command or function."""
+"""Reasons of long waits, by function."""
 
 
 class Wait(NamedTuple):
@@ -92,15 +79,13 @@ class Wait(NamedTuple):
 
 def main() -> None:
     """Print the tables."""
-    print("## What a user waits for\n")
-    print("### Commands, by the example of their help\n")
-    print(
-        "A process each; cold with an empty kernel cache. Example files are those of `examples/`.\n"
-    )
-    print("| command | cold, wall [s] | CPU [s] | warm, wall [s] | CPU [s] | peak [MB] | why |")
-    print("|---|--:|--:|--:|--:|--:|---|")
+    print("## Commands, by the example of their help\n")
+    print("Wall time; cold with an empty kernel cache.\n")
+    print("| command | cold [s] | warm [s] | peak [MB] |")
+    print("|---|--:|--:|--:|")
     for name, words in _examples():
         print(_command_row(name, words), flush=True)
+    print(FOR_DEVELOPERS)
     print(f"\nLeft out: {'; '.join(f'`{name}` ({why})' for name, why in LEFT_OUT.items())}.\n")
     print("### Functions, on small arguments\n")
     print("The first call of a process with a full kernel cache, and the best of two later ones.\n")
@@ -114,8 +99,7 @@ def main() -> None:
 def print_growth() -> None:
     """Print how the times of what depends on a size grow with it."""
     print("\n### Growth with n\n")
-    print("CPU time, warm, the best of two; slope: of log time over log n, by least squares. It is")
-    print("below 1 where a part does not depend on n, as the axes of pictures.\n")
+    print("CPU time, warm. The slope is that of log time over log n.\n")
     print(f"| what | n | {' | '.join(f'{k} n [s]' for k in _GROWN)} | slope |")
     print("|---|--:|--:|--:|--:|--:|")
     for name, least, made in _growths():
@@ -177,9 +161,8 @@ def _command_row(name: str, words: list[str]) -> str:
         _provide(name, folder)
         cold = _command(words, folder)
         warm = min(_command(words, folder) for _ in range(_TURNS))
-    why = _why(name, warm.wall, cold.wall)
-    sizes = f"{cold.wall:.1f} | {cold.cpu:.1f} | {warm.wall:.2f} | {warm.cpu:.2f}"
-    return f"| `{shlex.join(words)}` | {sizes} | {warm.peak:.0f} | {why} |"
+    sizes = f"{cold.wall:.1f} | {warm.wall:.2f} | {warm.peak:.0f}"
+    return f"| `{shlex.join(words)}` | {sizes} |"
 
 
 def _provide(name: str, folder: Path) -> None:

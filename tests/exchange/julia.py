@@ -8,7 +8,7 @@ import numpy as np
 
 
 def json_of(script: str) -> str:
-    """The lines of docs/exchange.md after a script, which is Python but for three things."""
+    """The lines of docs/clouds.md after a script, which is Python but for three things."""
     python = script.replace("using ActiveFilaments\n", "").replace("(rings;", "(rings,")
     names: dict[str, Any] = {
         "MechanicalProperties": lambda E, ν: {"E": E, "ν": ν},
