@@ -164,7 +164,7 @@ def _step_columns_with(kind):
 
     @pasted
     def step(w, columns, first, bundles, lanes, unloaded, tables):
-        """Step the tangents from the first: three of turns, `bundles` of activations, the others."""
+        """Step the tangents from the first on: of turns, of `bundles` activations, the others."""
         c, lengths, bends = tables
         _bend(w, lanes, bends)
         for n in range(first, columns.shape[0]):
@@ -263,7 +263,7 @@ def _arrive(w, columns, frames, q, row, node, count, wanted, i):
             put(columns[n], 0, i, axes[n])
 
 
-def _response_with(kind):
+def _response_with(kind):  # noqa: C901
     """The walk of `respond` for one kind of sections."""
     step_state, step_columns = _step_state_with(kind), _step_columns_with(kind)
     kept = (STEP_ROWS + kind.keeps_turns * TURN_ROWS) * LANES

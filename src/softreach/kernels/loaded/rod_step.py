@@ -11,8 +11,9 @@ another stiffness than K1, with e the axis of K2 in the unloaded arm, these are 
 
     ω: κ e,  dM: κ e × M,  κ = λ (1/K2 - 1/K1) (e·M).
 
-Where all forces are along G it is n = w G, and nothing depends on H; else n = n1 G + n2 H + n3 G × H.
-A force that follows the tip is fixed in that world too, as any frame on the rod is during one walk.
+Where all forces are along G it is n = w G, and nothing depends on H; else
+n = n1 G + n2 H + n3 G × H. A force that follows the tip is fixed in that world too, as any frame on
+the rod is during one walk.
 
 A tangent turns the world of a section by θ, so that δG = θ × G. It is (θ, δM, δy) with
 

@@ -255,10 +255,10 @@ def respond(
 
     Of each node (step, 3): η dZ and ζ dZ [m]; resistance K⁻¹ in the directors [1/(N m²)]
     (3, 3 more), 0 without loads; thrust 1/K0 [1/N]; d1, d2, d3 as rows (3, 3 more); moment m [N m]
-    and force n [N] in the frame of the base (3 more). Columns are what changes there: turning δω| dZ in the
-    directors, pushing δζ| dZ, yielding ν [N]. Works (work, column) are those of unit loads M and N
-    (4, work more) on δω and δζ. The payload has a lever [m], a weight [N] and `tipping`, the change
-    of its moment on the tip at the same directors [N m] (3, column).
+    and force n [N] in the frame of the base (3 more). Columns are what changes there: turning
+    δω| dZ in the directors, pushing δζ| dZ, yielding ν [N]. Works (work, column) are those of unit
+    loads M and N (4, work more) on δω and δζ. The payload has a lever [m], a weight [N] and
+    `tipping`, the change of its moment on the tip at the same directors [N m] (3, column).
     """
     steps, columns = rest_length.shape[0], turning.shape[3]
     every = columns + 3

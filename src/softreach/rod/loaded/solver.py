@@ -196,7 +196,6 @@ class Solver:
 
         Both (n, 3) as the base of the unloaded arm sees them; loads along one direction only.
         """
-
         is_flat = self.tables.is_flat
         walk = kernels.base_flat_directions if is_flat else kernels.base_directions
 
