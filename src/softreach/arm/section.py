@@ -379,7 +379,7 @@ class Section(Part):
         return np.stack([first, self.bending_ratio * first, torsion], axis=-1)
 
     def in_directors(self, values: Array) -> Array:
-        """Tensors in the directors, shape (..., 3, 3), of values about the axes of K1, K2 and K3."""
+        """Tensors in the directors of values about the axes of K1 to K3, shape (..., 3, 3)."""
         angle = self.bending_angle
         half = np.swapaxes(turned(values[..., None] * np.eye(3), angle), -1, -2)
         return turned(half, angle)
