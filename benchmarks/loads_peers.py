@@ -29,7 +29,7 @@ class _Rod(NamedTuple):
 
     length: float
     rest: Callable[[Array], Array]
-    """ζ̂ and û, then 1/K0, 1/K1 and 1/K3, (station, 7)."""
+    """ζ̂ and û, then 1/K0, 1/K1, 1/K2 and 1/K3, (station, 8)."""
     force: Callable[[Array], Array]
     """n in the base frame [N], (station, 3)."""
 
@@ -40,6 +40,7 @@ def _rod(arm: sr.Manipulator, gamma: Array) -> _Rod:
     at, loads = tables(arm, z), arm.loads
     assert loads is not None
     bent = [1.0 + at.extension @ gamma, *(at.curvature @ gamma).T]
+    axial, yields = compliance(arm, z)
 
     def mass(station: float) -> Array:
         return arm.section.mass_per_length(arm.profile.radius(np.array([station])))
@@ -47,7 +48,7 @@ def _rod(arm: sr.Manipulator, gamma: Array) -> _Rod:
     beyond = [quad_vec(mass, one, arm.length)[0][0] + loads.payload for one in z]
     return _Rod(
         arm.length,
-        CubicSpline(z, np.stack([*bent, *compliance(arm, z)], axis=-1)),
+        CubicSpline(z, np.stack([*bent, axial, *yields.T], axis=-1)),
         CubicSpline(z, np.outer(beyond, loads.gravity)),
     )
 
@@ -57,7 +58,7 @@ def _rates(rod: _Rod, z: Array, y: Array) -> Array:
     at, force = rod.rest(z).T, rod.force(z).T
     directors = _matrix(y[3:7])
     m, n3 = np.einsum("jis,js->is", directors, y[7:10]), (directors[:, 2] * force).sum(axis=0)
-    u = at[1:4] + np.stack([at[5] * m[0], at[5] * m[1], at[6] * m[2]])
+    u = at[1:4] + at[5:8] * m
     tangent = directors[:, 2] * at[0] * (1.0 + at[4] * n3)
     spin = at[0] * np.einsum("ijs,js->is", directors, u)
     return np.concatenate([tangent, _turning(spin, y[3:7]), -np.cross(tangent, force, axis=0)])

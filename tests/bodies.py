@@ -64,9 +64,10 @@ def oracle_rod(arm: Manipulator, gamma, loads: Loads) -> tuple[rod.Rod, rod.Load
     """An activated arm and its loads as the oracles take them."""
     breaks = tuple(arm.breakpoints)
     at = _polynomials(lambda z: _sections(arm, gamma, z), sorted({0.0, *breaks, arm.length}))
-    names = "axial", "bending", "torsion", "mass", "stretch", "rest_length_factor"
+    names = "axial", "bending", "across", "torsion", "mass", "stretch", "rest_length_factor"
     along = {name: (lambda z, k=k: at(z)[k]) for k, name in enumerate(names)}
-    along["curvature"] = lambda z: at(z)[6:]
+    along["curvature"] = lambda z: at(z)[7:]
+    along["angle"] = arm.section.bending_angle
     return rod.Rod(length=arm.length, breaks=breaks, **along), rod.Loads(
         gravity=loads.gravity,
         payload=loads.payload,
@@ -84,9 +85,9 @@ def oracle_rod(arm: Manipulator, gamma, loads: Loads) -> tuple[rod.Rod, rod.Load
 
 
 def _sections(arm: Manipulator, gamma, z):
-    """K0, K1, K3, mass per length, ζ̂, η and û at stations, shape (station, 9)."""
-    table, yields = tables(arm, z), compliance(arm, z)
-    stiff = [1.0 / np.maximum(one, 1e-300) for one in yields]
+    """K0, K1, K2, K3, mass per length, ζ̂, η and û at stations, shape (station, 10)."""
+    table, (axial, yields) = tables(arm, z), compliance(arm, z)
+    stiff = 1.0 / np.maximum([axial, *yields.T], 1e-300)
     stretch, eta = 1.0 + table.extension @ gamma, 1.0 + table.rest_length_factor @ gamma
     mass = np.zeros(len(z))
     if any(arm.loads.gravity):

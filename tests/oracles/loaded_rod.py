@@ -7,6 +7,7 @@ loads: with the stretch ζ̂(Z) and the curvature û(Z) per length of η(Z), whi
 
     u = û + K⁻¹ m,    ζ = ζ̂ + η n·d3/K0
 
+K resists by K1 and K2 about axes at an angle to d1 and d2, which may be two numbers,
 with m, n, r and the directors in the fixed frame. At the base the pose and all dead forces are
 known; unknown is m(0), and with a force that follows the tip also that force. SciPy's DOP853
 walks to the tip, where m must be what acts there. Derivatives of the tip by the unknowns and by
@@ -216,8 +217,11 @@ class _Shooting:
         y, rod = flat.reshape(18, -1), self.rod
         frame, moment, force = y[3:12].reshape(3, 3, -1), y[12:15], y[15:]
         k1, k3, eta = rod.bending(z), rod.torsion(z), rod.grown(z)
-        in_directors = (frame * moment[:, None]).sum(axis=0)
-        u = np.asarray(rod.curvature(z))[:, None] + in_directors / np.array([[k1], [k1], [k3]])
+        k2, in_directors = (rod.across or rod.bending)(z), (frame * moment[:, None]).sum(axis=0)
+        cos, sin = np.cos(rod.angle), np.sin(rod.angle)
+        axes = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        yielded = axes.T @ ((axes @ in_directors) / np.array([[k1], [k2], [k3]]))
+        u = np.asarray(rod.curvature(z))[:, None] + yielded
         turn = _turned(frame, eta * u)
         thrust = (frame[:, 2] * force).sum(axis=0)
         rates = np.empty_like(y)

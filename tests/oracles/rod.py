@@ -21,9 +21,13 @@ class Rod:
     axial: Number
     """K0(Z) [N]."""
     bending: Number
-    """K1(Z) = K2(Z) [N m²]."""
+    """K1(Z) [N m²]."""
     torsion: Number
     """K3(Z) [N m²]."""
+    across: Number | None = None
+    """K2(Z) [N m²]; K1 if None."""
+    angle: float = 0.0
+    """Of the axes of K1 and K2 about d3, from d1 and d2 [rad]."""
     mass: Number = lambda z: 0.0
     """Mass per length Z [kg/m]."""
     stretch: Number = lambda z: 1.0

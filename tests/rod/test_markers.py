@@ -191,7 +191,7 @@ def test_in_a_rigid_piece_nothing_is_deformed_and_beside_it_nothing_changes():
     for found, plain in (
         (tables(made, z).extension, tables(arm(), z).extension),
         (tables(made, z).curvature, tables(arm(), z).curvature),
-        (np.stack(compliance(made, z), axis=1), np.stack(compliance(arm(), z), axis=1)),
+        (compliance(made, z)[1], compliance(arm(), z)[1]),
     ):
         np.testing.assert_array_equal(found[~inside], plain[~inside])
         assert not found[inside].any()

@@ -159,7 +159,7 @@ class Measured(Part):
         pair="two about d1 and d2",
         default=None,
     )
-    """K1 = K2 [N m²], or (K1, K2) about d1 and d2, as of a flat strip, without loads."""
+    """K1 = K2 [N m²], or (K1, K2) about d1 and d2, as of a flat strip."""
     angle: float = number("α", "rad", "angle of the axis of K1 from d1", default=0.0)
     """α, angle of the axes of K1 and K2 about d3, from d1 and d2 [rad]."""
     torsion_stiffness: float | AlongArm | None = number(
@@ -378,6 +378,12 @@ class Section(Part):
         first, torsion = stiffness.bending, stiffness.torsion
         return np.stack([first, self.bending_ratio * first, torsion], axis=-1)
 
+    def in_directors(self, values: Array) -> Array:
+        """Tensors in the directors of values about the axes of K1 to K3, shape (..., 3, 3)."""
+        angle = self.bending_angle
+        half = np.swapaxes(turned(values[..., None] * np.eye(3), angle), -1, -2)
+        return turned(half, angle)
+
     def mass_per_length_at(self, profile: Profile, z: ArrayLike) -> Array:
         """Mass per length [kg/m] at stations Z [m]: what was measured, else by the materials.
 
@@ -427,12 +433,7 @@ class Section(Part):
 
     def load_faults(self) -> list[Fault]:
         """Faults that keep loads from acting on an arm."""
-        faults = self.modulus_faults("where loads act")
-        if self.measured is not None and self.bending_ratio != 1.0:
-            allowed = "must be one number where loads act or compliance is computed"
-            given = self.measured.bending_stiffness
-            faults.append(Fault("measured.bending_stiffness", given, allowed))
-        return faults
+        return self.modulus_faults("where loads act")
 
     def density_faults(self, why: str) -> list[Fault]:
         """A fault for each material without a density, unless the mass per length was measured."""

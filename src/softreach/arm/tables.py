@@ -83,16 +83,18 @@ def _resultants(actuator: Actuator, arm: Body, z: Array) -> Resultants:
     return Resultants(np.where(acts, load.force, 0.0), np.where(acts[:, None], load.moment, 0.0))
 
 
-def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array, Array]:
-    """1/K0 [1/N], 1/K1 = 1/K2 and 1/K3 [1/(N m²)] at stations Z [m], (station,); 0 in rigid pieces.
+def compliance(arm: Body, stations: ArrayLike) -> tuple[Array, Array]:
+    """1/K0 [1/N] at stations Z [m], and 1/K1, 1/K2 and 1/K3 [1/(N m²)], one more axis of 3.
+
+    All are 0 in rigid pieces. The axes of K1 and K2 are those of `Section.bending_angle`.
 
     Raises:
-        InvalidDesign: A material without Young's modulus, or two bending stiffnesses.
+        InvalidDesign: A material without Young's modulus.
     """
     if faults := arm.section.load_faults():
         raise InvalidDesign(faults)
-    axial, bending, torsion = arm.stiffness_at(stations)
-    return 1.0 / axial, 1.0 / bending, 1.0 / torsion
+    stiffness = arm.stiffness_at(stations)
+    return 1.0 / stiffness.axial, 1.0 / arm.section.resistance(stiffness)
 
 
 @lru_cache(maxsize=64)

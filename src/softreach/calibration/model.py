@@ -282,10 +282,11 @@ def _strains(at: _Explicit, state: RodState) -> tuple[Array, Array]:
     table, gamma = at.table, state.gamma
     rest_length = table.length * (1.0 + np.einsum("kij,nj->nki", table.rest_length_factor, gamma))
     bend = np.einsum("kicj,nj->nkic", table.curvature, gamma)
-    bend = rest_length[..., None] * (bend + table.compliance[..., 1:] * state.moment)
+    yields = np.einsum("kiab,nkib->nkia", table.compliance, state.moment)
+    bend = rest_length[..., None] * (bend + yields)
     thrust = np.einsum("nkic,kic->nki", state.directors[..., 2, :], table.force)
     rise = table.length * np.einsum("kij,nj->nki", table.extension, gamma)
-    return bend, rise + rest_length * table.compliance[..., 0] * thrust
+    return bend, rise + rest_length * table.thrust * thrust
 
 
 def _explicit_shortening(at: _Explicit, change: _Explicit, bend: Array, rise: Array) -> Array:

@@ -253,7 +253,8 @@ def warmup(*, only: str | None = None) -> int:
     Example: softreach warmup --only free
 
     Args:
-        only: Kernels of arms without loads (free) or with loads (loaded): both if left out.
+        only: Kernels of arms without loads (free), with loads (loaded) or with loads and two
+            bending stiffnesses (flat): all if left out.
     """
     from softreach.kernels.compiler import not_kept
 
@@ -330,8 +331,8 @@ def _hulls() -> None:
     _ = sr.activation_distance(cloud, 0.1), sr.activation_distance(other, 0.1)
 
 
-def _loaded() -> Iterator[object]:
-    free = sr.designs.lce_arm()
+def _loaded(free: sr.Manipulator | None = None) -> Iterator[object]:
+    free = free or sr.designs.lce_arm()
     rest, pulled = [0.0] * free.bundles, free.input_bounds[:, 0].tolist()
     weight = free.replace(loads=sr.Loads(gravity=(0, 0, 9.81), payload=0.001))
     follower = free.replace(loads=sr.Loads(follower_force=(0, 0.001, 0)))
@@ -342,7 +343,13 @@ def _loaded() -> Iterator[object]:
     yield sr.equilibria(weight, pulled)
 
 
-_JOBS = {"free": _free, "loaded": _loaded}
+def _flat() -> Iterator[object]:
+    arm = sr.designs.lce_arm()
+    measured = sr.arm.Measured(bending_stiffness=(1e-5, 2e-5))
+    return _loaded(arm.replace(section=arm.section.replace(measured=measured)))
+
+
+_JOBS = {"free": _free, "loaded": _loaded, "flat": _flat}
 
 
 def doctor(*, json: options.AsJson = False) -> None:

@@ -49,8 +49,10 @@ class NodeTables(NamedTuple):
     """Its part in η, likewise."""
     curvature: Array
     """U [1/m], shape (step, 3, 3, bundle)."""
+    thrust: Array
+    """1/K0 [1/N], shape (step, 3); zero without loads."""
     compliance: Array
-    """1/K0, 1/K1, 1/K1, 1/K3, shape (step, 3, 4); zero without loads."""
+    """K⁻¹ in the directors [1/(N m²)], shape (step, 3, 3, 3); zero without loads."""
     force: Array
     """Dead force n in the frame of the base [N], shape (step, 3, 3)."""
     lever: Array
@@ -126,10 +128,9 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
     z = profile.station(at)
     # Steps without length stand where something ends: the inside of the arm decides.
     length = width[:, None] * profile.radius(z)
-    (table,), soft = tables_on(arm, z), np.zeros((*z.shape, 4))
+    (table,), axial, soft = tables_on(arm, z), np.zeros(z.shape), np.zeros((*z.shape, 3))
     if arm.loads is not None:
-        axial, bending, torsion = compliance(arm, z)
-        soft = np.stack([axial, bending, bending, torsion], axis=-1)
+        axial, soft = compliance(arm, z)
     force, weight = dead_forces(arm, arm.base, z, length)
     return NodeTables(
         stations=z,
@@ -137,7 +138,8 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         extension=table.extension,
         rest_length_factor=table.rest_length_factor,
         curvature=table.curvature,
-        compliance=soft,
+        thrust=axial,
+        compliance=arm.section.in_directors(soft),
         force=force,
         lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
         weight=weight,
@@ -243,7 +245,7 @@ def linear_response(
 
 
 def _changed_tables(table: NodeTables, changes: list[NodeTables]) -> tuple[Array, ...]:
-    """Changes of ζ̂ dZ, η dZ, U, compliance and force by column.
+    """Changes of ζ̂ dZ, η dZ, U, 1/K0, K⁻¹ and force by column.
 
     Those of products are per activation, (..., column, bundle + 1), the last place at rest.
     """
@@ -262,39 +264,39 @@ def _changed_tables(table: NodeTables, changes: list[NodeTables]) -> tuple[Array
         return np.concatenate([by, length], axis=-1)
 
     products = product("extension"), product("rest_length_factor")
-    return *products, stacked("curvature", -2), stacked("compliance", -1), stacked("force", -1)
+    others = (stacked(name, -1) for name in ("thrust", "compliance", "force"))
+    return *products, stacked("curvature", -2), *others
 
 
 def _per_arm(
     table: NodeTables, change: tuple[Array, ...], gamma: Array, d: Array, moment: Array
 ) -> tuple[Array, ...]:
     """What the kernel wants of one arm."""
-    by_stretch, by_rest_length, by_curvature, by_compliance, by_force = change
-    length, whole = table.length, np.append(gamma, 1.0)
-    axial, bending = table.compliance[..., 0], table.compliance[..., 1:]
+    by_stretch, by_rest_length, by_curvature, by_thrust, by_compliance, by_force = change
+    length, whole, axial = table.length, np.append(gamma, 1.0), table.thrust
     thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
     squeeze = axial * thrust  # n3/K0
     rest_length = length * (1.0 + table.rest_length_factor @ gamma)
     stretch = length * (1.0 + table.extension @ gamma) + rest_length * squeeze
-    bend = table.curvature @ gamma + bending * moment
+    bend = table.curvature @ gamma + np.einsum("kiab,kib->kia", table.compliance, moment)
     each = length[..., None]
     grown, stretched = by_rest_length @ whole, by_stretch @ whole
-    bent = by_curvature @ gamma + by_compliance[..., 1:, :] * moment[..., None]
+    bent = by_curvature @ gamma + np.einsum("kiabc,kib->kiac", by_compliance, moment)
     of_activations = (each * table.rest_length_factor)[:, :, None] * bend[..., None]
     of_activations += rest_length[..., None, None] * table.curvature
     of_changes = grown[:, :, None] * bend[..., None] + rest_length[..., None, None] * bent
     turning = np.concatenate([of_activations, of_changes], axis=-1)
     of_activations = each * (table.extension + table.rest_length_factor * squeeze[..., None])
     of_changes = stretched + grown * squeeze[..., None]
-    of_changes += rest_length[..., None] * by_compliance[..., 0, :] * thrust[..., None]
+    of_changes += rest_length[..., None] * by_thrust * thrust[..., None]
     pushing = np.concatenate([of_activations, of_changes], axis=-1)
     yielding = np.zeros((*table.force.shape, turning.shape[-1]))
     yielding[..., len(gamma) :] = by_force
     return (
         rest_length,
         stretch,
-        np.ascontiguousarray(bending),
-        np.ascontiguousarray(axial),
+        np.ascontiguousarray(table.compliance),
+        table.thrust,
         np.ascontiguousarray(d),
         np.einsum("kic,kica->kia", moment, d),
         table.force,

@@ -234,6 +234,7 @@ def _volume(arm: Manipulator, mass: float, accuracy: float) -> _Volume:
 def _usual_payloads(arm: Manipulator) -> Array:
     assert arm.loads is not None
     stiffness = arm.section.stiffness_at(arm.profile, np.array([0.5 * arm.length]))
-    weight = float(stiffness.bending[0]) / arm.length**2
+    softer = min(1.0, arm.section.bending_ratio)
+    weight = softer * float(stiffness.bending[0]) / arm.length**2
     mass = weight / float(np.linalg.norm(arm.loads.gravity))
     return float(f"{mass:.1g}") * np.array(_USUAL)

@@ -10,10 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, pasted
-from softreach.kernels.loaded.rod_step import at_stages, column_step, frame_tip
+from softreach.kernels.loaded.rod_step import at_stages
 from softreach.kernels.loaded.section import (
+    FLAT,
     FORCE,
     MOMENT,
+    ROUND,
     SHARE,
     THETA,
     F,
@@ -23,7 +25,6 @@ from softreach.kernels.loaded.section import (
     along,
     begin_tangents,
     begin_tip,
-    frame_nodes,
     inverse_rows,
     missing_turn,
     orthonormal,
@@ -59,8 +60,8 @@ force that follows the tip, along G, H, K."""
 DRIVE = SECTION  # turn of the unloaded arm per unit of an activation at five nodes
 BEND = DRIVE + 15 * LANES  # Uγ at five nodes
 COLUMN = BEND + 15 * LANES  # the tangent in hand
-REST = COLUMN + 12 * LANES  # the unloaded arm at the nodes of a step
-STAGES = REST + STEP_ROWS * LANES  # states at the stages of a step
+REST = COLUMN + 12 * LANES  # the unloaded arm at the nodes of a step, its turns behind it
+STAGES = REST + (STEP_ROWS + TURN_ROWS) * LANES  # states at the stages of a step
 SIZE = STAGES + 132 * LANES
 # Rows of a tangent: θ, δM, δy, the change of force u, and the turn of the tip along G, H, K.
 _COLUMN_ROWS = 15
@@ -82,38 +83,48 @@ def _drives(w, change, i):
     )
 
 
-@pasted
-def _step_state(w, c):
-    """Step the states, and keep those at the stages."""
-    for i in range(LANES):
-        s, at = frame_tip(frame_nodes(w, w, REST, c, i), get_four(w, G, i))
-        put_four(w, G, i, s)
-        for n in range(11):
-            put_four(w, STAGES + 12 * n * LANES, i, at[n])
+def _step_state_with(kind):
+    frame_nodes, frame_tip = kind.frame_nodes, kind.steps.frame_tip
+
+    @pasted
+    def step(w, c):
+        """Step the states, and keep those at the stages."""
+        for i in range(LANES):
+            s, at = frame_tip(frame_nodes(w, w, REST, c, i), get_four(w, G, i))
+            put_four(w, G, i, s)
+            for n in range(11):
+                put_four(w, STAGES + 12 * n * LANES, i, at[n])
+
+    return step
 
 
-@pasted
-def _step_column(w, c, change):
-    for i in range(LANES):
-        n, v = frame_nodes(w, w, REST, c, i), _drives(w, change, i)
-        places = (
-            (n[0], get_four(w, STAGES, i), v[0]),
-            (n[1], get_four(w, STAGES + 12 * LANES, i), v[1]),
-            (n[2], get_four(w, STAGES + 24 * LANES, i), v[2]),
-            (n[3], get_four(w, STAGES + 36 * LANES, i), v[3]),
-            (n[4], get_four(w, STAGES + 48 * LANES, i), v[4]),
-            (n[5], get_four(w, STAGES + 60 * LANES, i), v[5]),
-            (n[6], get_four(w, STAGES + 72 * LANES, i), v[6]),
-            (n[7], get_four(w, STAGES + 84 * LANES, i), v[7]),
-            (n[8], get_four(w, STAGES + 96 * LANES, i), v[8]),
-            (n[9], get_four(w, STAGES + 108 * LANES, i), v[9]),
-            (n[10], get_four(w, STAGES + 120 * LANES, i), v[10]),
-        )
-        theta, dm, dy, _ = get_four(w, COLUMN, i)
-        (theta, dm, dy), _ = column_step(places, (theta, dm, dy))
-        put(w, COLUMN, i, theta)
-        put(w, COLUMN + 3 * LANES, i, dm)
-        put(w, COLUMN + 6 * LANES, i, dy)
+def _step_column_with(kind):
+    frame_nodes, column_step = kind.frame_nodes, kind.steps.column
+
+    @pasted
+    def step(w, c, change):
+        for i in range(LANES):
+            n, v = frame_nodes(w, w, REST, c, i), _drives(w, change, i)
+            places = (
+                (n[0], get_four(w, STAGES, i), v[0]),
+                (n[1], get_four(w, STAGES + 12 * LANES, i), v[1]),
+                (n[2], get_four(w, STAGES + 24 * LANES, i), v[2]),
+                (n[3], get_four(w, STAGES + 36 * LANES, i), v[3]),
+                (n[4], get_four(w, STAGES + 48 * LANES, i), v[4]),
+                (n[5], get_four(w, STAGES + 60 * LANES, i), v[5]),
+                (n[6], get_four(w, STAGES + 72 * LANES, i), v[6]),
+                (n[7], get_four(w, STAGES + 84 * LANES, i), v[7]),
+                (n[8], get_four(w, STAGES + 96 * LANES, i), v[8]),
+                (n[9], get_four(w, STAGES + 108 * LANES, i), v[9]),
+                (n[10], get_four(w, STAGES + 120 * LANES, i), v[10]),
+            )
+            theta, dm, dy, _ = get_four(w, COLUMN, i)
+            (theta, dm, dy), _ = column_step(places, (theta, dm, dy))
+            put(w, COLUMN, i, theta)
+            put(w, COLUMN + 3 * LANES, i, dm)
+            put(w, COLUMN + 6 * LANES, i, dy)
+
+    return step
 
 
 @inline
@@ -148,24 +159,29 @@ def _drive(w, unloaded, bends, change, j):
             put(w, DRIVE + 3 * n * LANES, i, turned(q, bend))
 
 
-@pasted
-def _step_columns(w, columns, first, bundles, lanes, unloaded, tables):
-    """Step the tangents from the first: three of turns, `bundles` of activations, the others."""
-    c, lengths, bends = tables
-    _bend(w, lanes, bends)
-    for n in range(first, columns.shape[0]):
-        j, change = n - 3, (_NONE, _NONE)
-        if 0 <= j < bundles:
-            change = (
-                (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j]),
-                (lengths[5, j], lengths[6, j], lengths[7, j], lengths[8, j], lengths[9, j]),
-            )
-            _drive(w, unloaded, bends, lengths[:, j], j)
-        elif n == first or j == bundles:
-            w[DRIVE : DRIVE + 15 * LANES] = 0.0
-        copy(w, COLUMN, columns[n], 0, 12 * LANES)
-        _step_column(w, c, change)
-        copy(columns[n], 0, w, COLUMN, 12 * LANES)
+def _step_columns_with(kind):
+    step_column = _step_column_with(kind)
+
+    @pasted
+    def step(w, columns, first, bundles, lanes, unloaded, tables):
+        """Step the tangents from the first on: of turns, of `bundles` activations, the others."""
+        c, lengths, bends = tables
+        _bend(w, lanes, bends)
+        for n in range(first, columns.shape[0]):
+            j, change = n - 3, (_NONE, _NONE)
+            if 0 <= j < bundles:
+                change = (
+                    (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j]),
+                    (lengths[5, j], lengths[6, j], lengths[7, j], lengths[8, j], lengths[9, j]),
+                )
+                _drive(w, unloaded, bends, lengths[:, j], j)
+            elif n == first or j == bundles:
+                w[DRIVE : DRIVE + 15 * LANES] = 0.0
+            copy(w, COLUMN, columns[n], 0, 12 * LANES)
+            step_column(w, c, change)
+            copy(columns[n], 0, w, COLUMN, 12 * LANES)
+
+    return step
 
 
 @inline
@@ -247,6 +263,59 @@ def _arrive(w, columns, frames, q, row, node, count, wanted, i):
             put(columns[n], 0, i, axes[n])
 
 
+def _response_with(kind):  # noqa: C901
+    """The walk of `respond` for one kind of sections."""
+    step_state, step_columns = _step_state_with(kind), _step_columns_with(kind)
+    kept = (STEP_ROWS + kind.keeps_turns * TURN_ROWS) * LANES
+
+    @pasted
+    def walk(gamma, tip, frames, tables, slopes, compliance, trace):
+        _, lengths, scalars, bends, moments, firsts = tables
+        count = firsts.shape[0] - 1
+        size = frames.shape[1] // count
+        lanes = np.zeros((tables[0].shape[2] - 1, LANES))
+        work, w = np.zeros(REST_WORK), np.zeros(SIZE)
+        unloaded = np.zeros((lengths.shape[0], (STEP_ROWS + TURN_ROWS) * LANES))
+        bundles = gamma.shape[1] if slopes.shape[0] > 0 else 0
+        units = 3 if compliance.shape[0] > 0 else 0
+        columns = np.zeros((3 + bundles + units, _COLUMN_ROWS * LANES))
+        turns = 0 if size > 3 else 1  # tangents of turns that are no turns of G about itself
+        wanted = bundles + units > 0 or count > 1
+        for first in range(0, gamma.shape[0], LANES):
+            here = min(LANES, gamma.shape[0] - first)
+            load_all(lanes, gamma, first, here)
+            rest_frames(work, lanes, tables[0], lengths, unloaded)
+            columns[:] = 0.0
+            for i in range(LANES):
+                row = first + min(i, here - 1)
+                seen = node_world(turn_at(work, TURN, i), frames, row, 0, size)
+                _begin(w, columns, units, tip, seen, i)
+            for s in range(count):
+                for k in range(firsts[s], firsts[s + 1]):
+                    if moments[k].any():
+                        for i in range(LANES):
+                            _push(w, columns, moments[k], i)
+                    if k == 0 and trace.shape[0] > 0:
+                        _keep(w, unloaded[k], STEP_ROWS * LANES, trace[first:, 0])
+                    copy(w, REST, unloaded[k], 0, kept)
+                    step_state(w, scalars[k])
+                    if wanted:
+                        step = scalars[k], lengths[k], bends[k]
+                        step_columns(w, columns, turns, bundles, lanes, unloaded[k], step)
+                    if trace.shape[0] > 0:
+                        _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[first:, k + 1])
+                for i in range(LANES):
+                    row, q = first + min(i, here - 1), turn_at(work, TURN, i)
+                    _arrive(w, columns, frames, q, row, s + 1, count, wanted, i)
+            for i in range(here):
+                _store(w, work, columns, first, i, bundles, slopes, compliance)
+
+    return walk
+
+
+_respond, _respond_flat = _response_with(ROUND), _response_with(FLAT)
+
+
 @kernel
 def respond(gamma, tip, frames, tables, slopes, compliance, trace):
     """Responses of n rods in equilibrium, whatever is asked for.
@@ -263,45 +332,13 @@ def respond(gamma, tip, frames, tables, slopes, compliance, trace):
         trace: Filled with the sections between steps, tip first, (n, step + 1, `TRACE`); or
             (0, 1, `TRACE`).
     """
-    _, lengths, scalars, bends, moments, firsts = tables
-    count = firsts.shape[0] - 1
-    size = frames.shape[1] // count
-    lanes = np.zeros((tables[0].shape[2] - 1, LANES))
-    work, w = np.zeros(REST_WORK), np.zeros(SIZE)
-    unloaded = np.zeros((lengths.shape[0], (STEP_ROWS + TURN_ROWS) * LANES))
-    bundles = gamma.shape[1] if slopes.shape[0] > 0 else 0
-    units = 3 if compliance.shape[0] > 0 else 0
-    columns = np.zeros((3 + bundles + units, _COLUMN_ROWS * LANES))
-    turns = 0 if size > 3 else 1  # tangents of turns that are no turns of G about itself
-    wanted = bundles + units > 0 or count > 1
-    for first in range(0, gamma.shape[0], LANES):
-        here = min(LANES, gamma.shape[0] - first)
-        load_all(lanes, gamma, first, here)
-        rest_frames(work, lanes, tables[0], lengths, unloaded)
-        columns[:] = 0.0
-        for i in range(LANES):
-            row = first + min(i, here - 1)
-            seen = node_world(turn_at(work, TURN, i), frames, row, 0, size)
-            _begin(w, columns, units, tip, seen, i)
-        for s in range(count):
-            for k in range(firsts[s], firsts[s + 1]):
-                if moments[k].any():
-                    for i in range(LANES):
-                        _push(w, columns, moments[k], i)
-                if k == 0 and trace.shape[0] > 0:
-                    _keep(w, unloaded[k], STEP_ROWS * LANES, trace[first:, 0])
-                copy(w, REST, unloaded[k], 0, STEP_ROWS * LANES)
-                _step_state(w, scalars[k])
-                if wanted:
-                    step = scalars[k], lengths[k], bends[k]
-                    _step_columns(w, columns, turns, bundles, lanes, unloaded[k], step)
-                if trace.shape[0] > 0:
-                    _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[first:, k + 1])
-            for i in range(LANES):
-                row, q = first + min(i, here - 1), turn_at(work, TURN, i)
-                _arrive(w, columns, frames, q, row, s + 1, count, wanted, i)
-        for i in range(here):
-            _store(w, work, columns, first, i, bundles, slopes, compliance)
+    _respond(gamma, tip, frames, tables, slopes, compliance, trace)
+
+
+@kernel
+def respond_flat(gamma, tip, frames, tables, slopes, compliance, trace):
+    """As `respond`, of arms with two bending stiffnesses."""
+    _respond_flat(gamma, tip, frames, tables, slopes, compliance, trace)
 
 
 @inline

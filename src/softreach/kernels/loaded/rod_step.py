@@ -6,9 +6,14 @@ the unloaded arm, λ = η dZ, ℓ = ζ̂ dZ and n the force beyond,
     dG = ω × G,  dH = ω × H,  dM = d × (β M + ζ n),  dy = ω × y + ζ d,
     ω = λ M/K1 + β d,  β = λ (1/K3 - 1/K1) (d·M),  ζ = ℓ + λ (d·n)/K0,
 
-G, H two orthonormal directions of the world, y the tip, all as the section sees them. Where all
-forces are along G it is n = w G, and nothing depends on H; else n = n1 G + n2 H + n3 G × H. A force
-that follows the tip is fixed in that world too, as any frame on the rod is during one walk.
+G, H two orthonormal directions of the world, y the tip, all as the section sees them. Where K2 is
+another stiffness than K1, with e the axis of K2 in the unloaded arm, these are added:
+
+    ω: κ e,  dM: κ e × M,  κ = λ (1/K2 - 1/K1) (e·M).
+
+Where all forces are along G it is n = w G, and nothing depends on H; else
+n = n1 G + n2 H + n3 G × H. A force that follows the tip is fixed in that world too, as any frame on
+the rod is during one walk.
 
 A tangent turns the world of a section by θ, so that δG = θ × G. It is (θ, δM, δy) with
 
@@ -16,7 +21,7 @@ A tangent turns the world of a section by θ, so that δG = θ × G. It is (θ, 
 
 driven by its values at the tip, by a change of force u, or by a change of activation: that changes
 λ by δλ and ℓ by δℓ, and turns the unloaded arm by δω̂ over the step, as the frames of the walk see
-it.
+it. Neither d nor e change in these frames.
 
 The steps are explicit Runge-Kutta steps of order eight [CooperVerner1972]: eleven stages, all on
 the five Lobatto nodes of a step, so that whatever depends on the place alone is tabulated at four
@@ -26,6 +31,7 @@ new places a step.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from softreach.kernels.compiler import inline
 from softreach.kernels.vector import combination, cross, dot, plus, times
@@ -152,8 +158,8 @@ def _mix(a, x, b, y):
 
 @inline
 def _yield(node, n, m):
-    """β, ζ and ω; node = (λ, ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, ...)."""
-    rest_length, length, d, bending, twisting, axial, _ = node
+    """β, ζ and ω; node = (λ, ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, load), flat (..., 1/K2 - 1/K1, e)."""
+    rest_length, length, d, bending, twisting, axial = node[:6]
     beta = rest_length * twisting * dot(d, m)
     zeta = length + rest_length * axial * dot(d, n)
     return beta, zeta, _mix(rest_length * bending, m, beta, d)
@@ -167,7 +173,7 @@ def _moment_rate(node, n, m, beta, zeta):
 @inline
 def _tangent_rate(node, n, m, yields, theta, dm, dn, drive):
     """Product rule, theory (68), (73): dθ, dδM, and δω and δζ; drive = (δλ, δℓ, δω̂)."""
-    rest_length, _, d, bending, twisting, axial, _ = node
+    rest_length, _, d, bending, twisting, axial = node[:6]
     (beta, zeta, turn), (d_rest_length, d_length, d_turn) = yields, drive
     d_beta = rest_length * twisting * dot(d, dm) + d_rest_length * twisting * dot(d, m)
     d_zeta = rest_length * axial * dot(d, dn) + d_rest_length * axial * dot(d, n) + d_length
@@ -183,79 +189,138 @@ def _tangent_rate(node, n, m, yields, theta, dm, dn, drive):
     )
 
 
-# Forces along one direction: the last of a node is w.
+@inline
+def _kappa(node, m):
+    return node[0] * node[7] * dot(node[8], m)
 
 
 @inline
-def _direction_rates(node, s):
-    """Of (G, M, θ1, δM1, θ2, δM2); a turn about G itself changes nothing."""
-    n, m = times(node[6], s[0]), s[1]
-    yields = _yield(node, n, m)
-    beta, zeta, turn = yields
-    a = _tangent_rate(node, n, m, yields, s[2], s[3], cross(s[2], n), _NO_DRIVE)
-    b = _tangent_rate(node, n, m, yields, s[4], s[5], cross(s[4], n), _NO_DRIVE)
-    return cross(turn, s[0]), _moment_rate(node, n, m, beta, zeta), a[0], a[1], b[0], b[1]
+def _flat_yield(node, n, m):
+    beta, zeta, turn = _yield(node, n, m)
+    return beta, zeta, plus(turn, times(_kappa(node, m), node[8]))
 
 
 @inline
-def _direction_tip_rates(node, s):
+def _flat_moment_rate(node, n, m, beta, zeta):
+    bent = times(_kappa(node, m), cross(node[8], m))
+    return plus(_moment_rate(node, n, m, beta, zeta), bent)
+
+
+@inline
+def _flat_tangent_rate(node, n, m, yields, theta, dm, dn, drive):
+    """The same with δκ = λ (1/K2 - 1/K1) (e·δM) + δλ (1/K2 - 1/K1) (e·M)."""
+    d_theta, d_moment, turned, d_zeta = _tangent_rate(node, n, m, yields, theta, dm, dn, drive)
+    d_kappa = _kappa(node, dm) + drive[0] * node[7] * dot(node[8], m)
+    more = times(d_kappa, node[8])
+    bent = cross(node[8], _mix(d_kappa, m, _kappa(node, m), dm))
+    return plus(d_theta, more), plus(d_moment, bent), plus(turned, more), d_zeta
+
+
+class Law(NamedTuple):
+    """How sections yield: functions for β, ζ, ω, for dM, and for the rates of a tangent."""
+
+    yields: Any
+    moment_rate: Any
+    tangent_rate: Any
+
+
+class Steps(NamedTuple):
+    """Steps of rods of one law; they return the states at their stages too."""
+
+    direction_walk: Any
+    """Of (G, M) and two tangents of it."""
+    direction_tip: Any
     """Of (G, M, y)."""
-    n, m = times(node[6], s[0]), s[1]
-    beta, zeta, turn = _yield(node, n, m)
-    dy = plus(cross(turn, s[2]), times(zeta, node[2]))
-    return cross(turn, s[0]), _moment_rate(node, n, m, beta, zeta), dy
-
-
-# Any loads: the last of a node is (n1, n2, n3), with the changes u of three tangents behind it.
-
-
-@inline
-def _frame_rates(node, s):
-    """Of (G, H, M, θ1, δM1, θ2, δM2, θ3, δM3)."""
-    axes, m = (s[0], s[1], cross(s[0], s[1])), s[2]
-    load, u1, u2, u3 = node[6]
-    n = combination(load, axes)
-    yields = _yield(node, n, m)
-    beta, zeta, turn = yields
-    d1 = plus(cross(s[3], n), combination(u1, axes))
-    d2 = plus(cross(s[5], n), combination(u2, axes))
-    d3 = plus(cross(s[7], n), combination(u3, axes))
-    a = _tangent_rate(node, n, m, yields, s[3], s[4], d1, _NO_DRIVE)
-    b = _tangent_rate(node, n, m, yields, s[5], s[6], d2, _NO_DRIVE)
-    c = _tangent_rate(node, n, m, yields, s[7], s[8], d3, _NO_DRIVE)
-    dm = _moment_rate(node, n, m, beta, zeta)
-    return cross(turn, s[0]), cross(turn, s[1]), dm, a[0], a[1], b[0], b[1], c[0], c[1]
-
-
-@inline
-def _frame_tip_rates(node, s):
+    frame_walk: Any
+    """Of (G, H, M) and three tangents of it."""
+    frame_tip: Any
     """Of (G, H, M, y)."""
-    n, m = combination(node[6], (s[0], s[1], cross(s[0], s[1]))), s[2]
-    beta, zeta, turn = _yield(node, n, m)
-    dy = plus(cross(turn, s[3]), times(zeta, node[2]))
-    return cross(turn, s[0]), cross(turn, s[1]), _moment_rate(node, n, m, beta, zeta), dy
+    column: Any
+    """Of one tangent, given the states at the stages."""
 
 
-@inline
-def _column_rates(place, t):
-    """Of (θ, δM, δy); place = (node, (G, H, M, y), (δλ, δℓ, δω̂, u))."""
-    node, (g, h, m, y), (d_rest_length, d_length, d_turn, unit) = place
-    axes = g, h, cross(g, h)
-    n = combination(node[6], axes)
-    dn = plus(cross(t[0], n), combination(unit, axes))
-    yields, drive = _yield(node, n, m), (d_rest_length, d_length, d_turn)
-    theta, dm, turned, d_zeta = _tangent_rate(node, n, m, yields, t[0], t[1], dn, drive)
-    dy = plus(plus(cross(yields[2], t[2]), cross(turned, y)), times(d_zeta, node[2]))
-    return theta, dm, dy
+def _steps_of(law):
+    """Steps for round sections or flat ones."""
+    walk, tip = _along_one(law)
+    frame_walk, frame_tip = _in_space(law)
+    column = _step_function(_column_rates_of(law), _sums(3))
+    return Steps(walk, tip, frame_walk, frame_tip, column)
 
 
-direction_walk = _step_function(_direction_rates, _sums(6))
-"""Step of (G, M) and two tangents of it."""
-direction_tip = _step_function(_direction_tip_rates, _sums(3))
-"""Step of (G, M, y)."""
-frame_walk = _step_function(_frame_rates, _sums(9))
-"""Step of (G, H, M) and three tangents of it."""
-frame_tip = _step_function(_frame_tip_rates, _sums(4))
-"""Step of (G, H, M, y)."""
-column_step = _step_function(_column_rates, _sums(3))
-"""Step of one tangent, given the states at the stages."""
+def _along_one(law):
+    """Steps under forces along one direction: after six numbers a node has w."""
+    yields, moment_rate, tangent_rate = law
+
+    @inline
+    def walk_rates(node, s):
+        """Of (G, M, θ1, δM1, θ2, δM2); a turn about G itself changes nothing."""
+        n, m = times(node[6], s[0]), s[1]
+        known = yields(node, n, m)
+        beta, zeta, turn = known
+        a = tangent_rate(node, n, m, known, s[2], s[3], cross(s[2], n), _NO_DRIVE)
+        b = tangent_rate(node, n, m, known, s[4], s[5], cross(s[4], n), _NO_DRIVE)
+        return cross(turn, s[0]), moment_rate(node, n, m, beta, zeta), a[0], a[1], b[0], b[1]
+
+    @inline
+    def tip_rates(node, s):
+        n, m = times(node[6], s[0]), s[1]
+        beta, zeta, turn = yields(node, n, m)
+        dy = plus(cross(turn, s[2]), times(zeta, node[2]))
+        return cross(turn, s[0]), moment_rate(node, n, m, beta, zeta), dy
+
+    return _step_function(walk_rates, _sums(6)), _step_function(tip_rates, _sums(3))
+
+
+def _in_space(law):
+    """Steps under any loads: a node has (n1, n2, n3), and the changes u of three tangents."""
+    yields, moment_rate, tangent_rate = law
+
+    @inline
+    def walk_rates(node, s):
+        """Of (G, H, M, θ1, δM1, θ2, δM2, θ3, δM3)."""
+        axes, m = (s[0], s[1], cross(s[0], s[1])), s[2]
+        load, u1, u2, u3 = node[6]
+        n = combination(load, axes)
+        known = yields(node, n, m)
+        beta, zeta, turn = known
+        d1 = plus(cross(s[3], n), combination(u1, axes))
+        d2 = plus(cross(s[5], n), combination(u2, axes))
+        d3 = plus(cross(s[7], n), combination(u3, axes))
+        a = tangent_rate(node, n, m, known, s[3], s[4], d1, _NO_DRIVE)
+        b = tangent_rate(node, n, m, known, s[5], s[6], d2, _NO_DRIVE)
+        c = tangent_rate(node, n, m, known, s[7], s[8], d3, _NO_DRIVE)
+        dm = moment_rate(node, n, m, beta, zeta)
+        return cross(turn, s[0]), cross(turn, s[1]), dm, a[0], a[1], b[0], b[1], c[0], c[1]
+
+    @inline
+    def tip_rates(node, s):
+        n, m = combination(node[6], (s[0], s[1], cross(s[0], s[1]))), s[2]
+        beta, zeta, turn = yields(node, n, m)
+        dy = plus(cross(turn, s[3]), times(zeta, node[2]))
+        return cross(turn, s[0]), cross(turn, s[1]), moment_rate(node, n, m, beta, zeta), dy
+
+    return _step_function(walk_rates, _sums(9)), _step_function(tip_rates, _sums(4))
+
+
+def _column_rates_of(law):
+    yields, _, tangent_rate = law
+
+    @inline
+    def rates(place, t):
+        """Of (θ, δM, δy); place = (node, (G, H, M, y), (δλ, δℓ, δω̂, u))."""
+        node, (g, h, m, y), (d_rest_length, d_length, d_turn, unit) = place
+        axes = g, h, cross(g, h)
+        n = combination(node[6], axes)
+        dn = plus(cross(t[0], n), combination(unit, axes))
+        known, drive = yields(node, n, m), (d_rest_length, d_length, d_turn)
+        theta, dm, turned, d_zeta = tangent_rate(node, n, m, known, t[0], t[1], dn, drive)
+        dy = plus(plus(cross(known[2], t[2]), cross(turned, y)), times(d_zeta, node[2]))
+        return theta, dm, dy
+
+    return rates
+
+
+ROUND = _steps_of(Law(_yield, _moment_rate, _tangent_rate))
+"""Steps of sections whose two bending stiffnesses are one."""
+FLAT = _steps_of(Law(_flat_yield, _flat_moment_rate, _flat_tangent_rate))
+"""Steps of sections with two."""

@@ -12,17 +12,20 @@ is a tuple of its three columns.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.loaded.rod_step import (
-    at_stages,
-    direction_tip,
-    direction_walk,
-    frame_tip,
-    frame_walk,
+from softreach.kernels.loaded import rod_step
+from softreach.kernels.loaded.rod_step import at_stages
+from softreach.kernels.loaded.unloaded_frames import (
+    LANES,
+    NODE_ROWS,
+    STEP_ROWS,
+    get,
+    put,
+    turn_at,
 )
-from softreach.kernels.loaded.unloaded_frames import LANES, NODE_ROWS, get, put, turn_at
-from softreach.kernels.vector import combination, cross, dot, minus, plus, times
+from softreach.kernels.vector import combination, cross, dot, minus, plus, times, turned
 
 # Rows of the workspace, LANES numbers each.
 G, H, M, Y, F = (3 * k * LANES for k in range(5))  # of the section; F: what follows, along G, H, K
@@ -174,8 +177,8 @@ def push_tangents(w, m, i):
         put(w, MOMENT + at, i, plus(get(w, MOMENT + at, i), dm))
 
 
-def _nodes_with(load):
-    """A function that has the nodes of the stages of a step, each with what loads it.
+def _round_node(load):
+    """A function that has a node of a step, with what loads it.
 
     The unloaded arm is in the rows of `rest` from one on, the constants of the nodes are in `c`.
     """
@@ -185,6 +188,25 @@ def _nodes_with(load):
         at = first + NODE_ROWS * n * LANES
         place = rest[at + i], rest[at + 4 * LANES + i], get(rest, at + LANES, i)
         return (*place, c[n, 0], c[n, 1], c[n, 2], load(w, c, n, i))
+
+    return node
+
+
+def _flat_node(load):
+    """The same with the axis of K2, from the turn of the unloaded arm, which is kept for it."""
+    round_node = _round_node(load)
+
+    @inline
+    def node(w, rest, first, c, n, i):
+        q = turn_at(rest, first + (STEP_ROWS + 4 * n) * LANES, i)
+        axis = turned(q, (c[n, 7], c[n, 8], 0.0))
+        return (*round_node(w, rest, first, c, n, i), c[n, 6], axis)
+
+    return node
+
+
+def _at_stages_of(node):
+    """A function that has the nodes of the stages of a step."""
 
     @inline
     def nodes(w, rest, first, c, i):
@@ -217,55 +239,60 @@ def _changing_force(w, c, n, i):
     return _force(w, c, n, i), u[0], u[1], u[2]
 
 
-_direction_nodes, _changing_nodes = _nodes_with(_weight), _nodes_with(_changing_force)
-frame_nodes = _nodes_with(_force)
-"""Nodes of a step under any loads."""
+def _steps_along_one(steps, node_under):
+    """Steps of sections under forces along one direction, with tangents and with the tip."""
+    nodes, walk, tip = _at_stages_of(node_under(_weight)), steps.direction_walk, steps.direction_tip
+
+    @inline
+    def step_walk(w, rest, c, i):
+        _, t1, t2 = three(w, THETA, i)
+        _, m1, m2 = three(w, MOMENT, i)
+        s = get(w, G, i), get(w, M, i), t1, m1, t2, m2
+        (g, m, t1, m1, t2, m2), _ = walk(nodes(w, rest, 0, c, i), s)
+        put(w, G, i, g)
+        put(w, M, i, m)
+        put(w, THETA + 3 * LANES, i, t1)
+        put(w, THETA + 6 * LANES, i, t2)
+        put(w, MOMENT + 3 * LANES, i, m1)
+        put(w, MOMENT + 6 * LANES, i, m2)
+
+    @inline
+    def step_tip(w, rest, c, i):
+        s = get(w, G, i), get(w, M, i), get(w, Y, i)
+        (g, m, y), _ = tip(nodes(w, rest, 0, c, i), s)
+        put(w, G, i, g)
+        put(w, M, i, m)
+        put(w, Y, i, y)
+
+    return step_walk, step_tip
 
 
-@inline
-def _step_direction_walk(w, rest, c, i):
-    _, t1, t2 = three(w, THETA, i)
-    _, m1, m2 = three(w, MOMENT, i)
-    s = get(w, G, i), get(w, M, i), t1, m1, t2, m2
-    (g, m, t1, m1, t2, m2), _ = direction_walk(_direction_nodes(w, rest, 0, c, i), s)
-    put(w, G, i, g)
-    put(w, M, i, m)
-    put(w, THETA + 3 * LANES, i, t1)
-    put(w, THETA + 6 * LANES, i, t2)
-    put(w, MOMENT + 3 * LANES, i, m1)
-    put(w, MOMENT + 6 * LANES, i, m2)
+def _steps_in_space(steps, node_under):
+    """The same under any loads."""
+    changing, frame_walk = _at_stages_of(node_under(_changing_force)), steps.frame_walk
+    nodes, frame_tip = _at_stages_of(node_under(_force)), steps.frame_tip
 
+    @inline
+    def step_walk(w, rest, c, i):
+        t, m = three(w, THETA, i), three(w, MOMENT, i)
+        s = get(w, G, i), get(w, H, i), get(w, M, i), t[0], m[0], t[1], m[1], t[2], m[2]
+        s, _ = frame_walk(changing(w, rest, 0, c, i), s)
+        put(w, G, i, s[0])
+        put(w, H, i, s[1])
+        put(w, M, i, s[2])
+        put_three(w, THETA, i, (s[3], s[5], s[7]))
+        put_three(w, MOMENT, i, (s[4], s[6], s[8]))
 
-@inline
-def step_direction_tip(w, rest, c, i):
-    """Step of G, M and the tip."""
-    s = get(w, G, i), get(w, M, i), get(w, Y, i)
-    (g, m, y), _ = direction_tip(_direction_nodes(w, rest, 0, c, i), s)
-    put(w, G, i, g)
-    put(w, M, i, m)
-    put(w, Y, i, y)
+    @inline
+    def step_tip(w, rest, c, i):
+        s = get(w, G, i), get(w, H, i), get(w, M, i), get(w, Y, i)
+        (g, h, m, y), _ = frame_tip(nodes(w, rest, 0, c, i), s)
+        put(w, G, i, g)
+        put(w, H, i, h)
+        put(w, M, i, m)
+        put(w, Y, i, y)
 
-
-@inline
-def _step_frame_walk(w, rest, c, i):
-    t, m = three(w, THETA, i), three(w, MOMENT, i)
-    s = get(w, G, i), get(w, H, i), get(w, M, i), t[0], m[0], t[1], m[1], t[2], m[2]
-    s, _ = frame_walk(_changing_nodes(w, rest, 0, c, i), s)
-    put(w, G, i, s[0])
-    put(w, H, i, s[1])
-    put(w, M, i, s[2])
-    put_three(w, THETA, i, (s[3], s[5], s[7]))
-    put_three(w, MOMENT, i, (s[4], s[6], s[8]))
-
-
-@inline
-def _step_frame_tip(w, rest, c, i):
-    s = get(w, G, i), get(w, H, i), get(w, M, i), get(w, Y, i)
-    (g, h, m, y), _ = frame_tip(frame_nodes(w, rest, 0, c, i), s)
-    put(w, G, i, g)
-    put(w, H, i, h)
-    put(w, M, i, m)
-    put(w, Y, i, y)
+    return step_walk, step_tip
 
 
 @inline
@@ -357,24 +384,37 @@ def _first_frames(w, i):
     put_three(w, TURNS, i, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
-ALONG_ONE = (
-    _step_direction_walk,
-    step_direction_tip,
+_ALONG_ONE = (
     _watch_directions,
     _first_directions,
     _next_directions,
     _turns_about,
     missing_direction,
 )
-"""Steps with tangents and without; the watch, where it begins and where it goes on; turns of
-tangents, and of what is missing: for forces along one direction."""
-IN_SPACE = (
-    _step_frame_walk,
-    _step_frame_tip,
-    _watch_frames,
-    _first_frames,
-    _first_frames,
-    _turns_of,
-    missing_turn,
-)
-"""The same for any loads."""
+_IN_SPACE = (_watch_frames, _first_frames, _first_frames, _turns_of, missing_turn)
+
+
+class Kind(NamedTuple):
+    """Functions of one kind of sections.
+
+    Those of forces along one direction and of any loads are: steps with tangents and without; the
+    watch, where it begins and where it goes on; turns of tangents, and of what is missing.
+    """
+
+    along_one: tuple[Any, ...]
+    in_space: tuple[Any, ...]
+    frame_nodes: Any
+    """Nodes of a step under any loads."""
+    steps: rod_step.Steps
+    keeps_turns: bool
+    """The unloaded arm needs its turns at the nodes."""
+
+
+def _kind(steps, node_under, keeps_turns):
+    along_one = (*_steps_along_one(steps, node_under), *_ALONG_ONE)
+    in_space = (*_steps_in_space(steps, node_under), *_IN_SPACE)
+    return Kind(along_one, in_space, _at_stages_of(node_under(_force)), steps, keeps_turns)
+
+
+ROUND, FLAT = _kind(rod_step.ROUND, _round_node, False), _kind(rod_step.FLAT, _flat_node, True)
+"""Sections with one bending stiffness and with two."""

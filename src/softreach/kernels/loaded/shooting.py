@@ -20,11 +20,11 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.loaded.section import (
-    ALONG_ONE,
+    FLAT,
     FORCE,
-    IN_SPACE,
     MARGIN,
     MOMENT,
+    ROUND,
     SHARE,
     THETA,
     F,
@@ -43,7 +43,6 @@ from softreach.kernels.loaded.section import (
     push_tangents,
     put_three,
     put_world,
-    step_direction_tip,
     three,
     unit,
     world,
@@ -53,6 +52,7 @@ from softreach.kernels.loaded.unloaded_frames import (
     LANES,
     STEP_ROWS,
     TURN,
+    TURN_ROWS,
     get,
     load_all,
     put,
@@ -229,9 +229,10 @@ def _entry_with(in_space, tangents, missing, turns):
     return enter
 
 
-def _walk_with(in_space, tangents):  # noqa: C901
+def _walk_with(kind, in_space, tangents):  # noqa: C901
     """A walk from tip to base, with tangents of turns of the world or with the tip."""
-    step_walk, step_tip, watch, begin, go_on, turns, missing = IN_SPACE if in_space else ALONG_ONE
+    functions = kind.in_space if in_space else kind.along_one
+    step_walk, step_tip, watch, begin, go_on, turns, missing = functions
     step = step_walk if tangents else step_tip
     enter = _entry_with(in_space, tangents, missing, turns)
 
@@ -272,9 +273,15 @@ def _walk_with(in_space, tangents):  # noqa: C901
     return walk
 
 
-def _search_with(in_space):
+def _rest_rows(kind):
+    """Rows of a step of the unloaded arm."""
+    return (STEP_ROWS + kind.keeps_turns * TURN_ROWS) * LANES
+
+
+def _search_with(kind, in_space):
     """A search over all samples, for forces along one direction or, in space, for any loads."""
-    walk, walk_tip = _walk_with(in_space, tangents=True), _walk_with(in_space, tangents=False)
+    walk, walk_tip = (_walk_with(kind, in_space, tangents) for tangents in (True, False))
+    rest_rows = _rest_rows(kind)
 
     @pasted
     def search(gamma, axes, tip, guesses, steps, limits, most, shares, out):
@@ -283,7 +290,7 @@ def _search_with(in_space):
         lanes = np.zeros((steps[0].shape[2] - 1, LANES))
         work, w = np.zeros(REST_WORK), np.zeros(SIZE)
         nodes = np.zeros((count + 1, NODE))
-        rest = np.zeros((steps[1].shape[0], STEP_ROWS * LANES))
+        rest = np.zeros((steps[1].shape[0], rest_rows))
         for first in range(0, gamma.shape[0], LANES):
             here = min(LANES, gamma.shape[0] - first)
             load_all(lanes, gamma, first, here)
@@ -309,7 +316,8 @@ def _search_with(in_space):
     return search
 
 
-_search_directions, _search_frames = _search_with(in_space=False), _search_with(in_space=True)
+_search_directions, _search_frames = (_search_with(ROUND, in_space) for in_space in (False, True))
+_search_flat_directions, _search_flat_frames = (_search_with(FLAT, s) for s in (False, True))
 
 
 @kernel
@@ -340,6 +348,51 @@ def solve_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out):
 
 
 @kernel
+def solve_flat_directions(gamma, axes, tip, guesses, steps, limits, most, shares, out):
+    """As `solve_directions`, of arms with two bending stiffnesses."""
+    _search_flat_directions(gamma, axes, tip, guesses, steps, limits, most, shares, out)
+
+
+@kernel
+def solve_flat_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out):
+    """As `solve_frames`, of arms with two bending stiffnesses."""
+    _search_flat_frames(gamma, axes, tip, guesses, steps, limits, most, shares, out)
+
+
+def _base_with(kind):
+    """A walk from tip to base from each of many directions."""
+    step, rest_rows = kind.along_one[1], _rest_rows(kind)
+
+    @pasted
+    def walk(gamma, tip, directions, steps, out):
+        lanes = np.zeros((steps[0].shape[2] - 1, LANES))
+        work, w = np.zeros(REST_WORK), np.zeros(SIZE)
+        rest = np.zeros((steps[1].shape[0], rest_rows))
+        load_all(lanes, gamma, 0, 1)
+        rest_frames(work, lanes, steps[0], steps[1], rest)
+        for first in range(0, directions.shape[0], LANES):
+            here = min(LANES, directions.shape[0] - first)
+            for i in range(LANES):
+                w[SHARE + i], row = 1.0, first + min(i, here - 1)
+                g, h = node_world(turn_at(work, TURN, i), directions, row, 0, 3)
+                put_world(w, G, i, g, h)
+                begin_tip(w, tip, i)
+            for k in range(rest.shape[0]):
+                r, c = rest[k], steps[2][k]
+                for i in range(LANES):
+                    step(w, r, c, i)
+            for i in range(here):
+                g = turned(back(turn_at(work, TURN, i)), get(w, G, i))
+                for axis in range(3):
+                    out[first + i, axis] = g[axis]
+
+    return walk
+
+
+_base_directions, _base_flat_directions = _base_with(ROUND), _base_with(FLAT)
+
+
+@kernel
 def base_directions(gamma, tip, directions, steps, out):
     """Directions of the forces that the base must see, for those that the tip of one rod sees.
 
@@ -350,26 +403,13 @@ def base_directions(gamma, tip, directions, steps, out):
         steps: As of `solve_directions`.
         out: Filled, (n, 3).
     """
-    lanes = np.zeros((steps[0].shape[2] - 1, LANES))
-    work, w = np.zeros(REST_WORK), np.zeros(SIZE)
-    rest = np.zeros((steps[1].shape[0], STEP_ROWS * LANES))
-    load_all(lanes, gamma, 0, 1)
-    rest_frames(work, lanes, steps[0], steps[1], rest)
-    for first in range(0, directions.shape[0], LANES):
-        here = min(LANES, directions.shape[0] - first)
-        for i in range(LANES):
-            w[SHARE + i] = 1.0
-            g, h = node_world(turn_at(work, TURN, i), directions, first + min(i, here - 1), 0, 3)
-            put_world(w, G, i, g, h)
-            begin_tip(w, tip, i)
-        for k in range(rest.shape[0]):
-            r, c = rest[k], steps[2][k]
-            for i in range(LANES):
-                step_direction_tip(w, r, c, i)
-        for i in range(here):
-            g = turned(back(turn_at(work, TURN, i)), get(w, G, i))
-            for axis in range(3):
-                out[first + i, axis] = g[axis]
+    _base_directions(gamma, tip, directions, steps, out)
+
+
+@kernel
+def base_flat_directions(gamma, tip, directions, steps, out):
+    """As `base_directions`, of arms with two bending stiffnesses."""
+    _base_flat_directions(gamma, tip, directions, steps, out)
 
 
 UNEVEN = 1e3

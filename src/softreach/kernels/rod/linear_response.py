@@ -106,7 +106,10 @@ def _law(rest_length, resistance, d, moment, force, rise, hat, local):
     for a in range(3):
         for b in range(3):
             for e in range(3):
-                local[a, 3 + b] += rest_length * d[e, a] * resistance[e] * d[e, b]
+                yields = 0.0
+                for f in range(3):
+                    yields += resistance[e, f] * d[f, b]
+                local[a, 3 + b] += rest_length * d[e, a] * yields
     _skew(moment, hat)
     _product(1.0, local[:3, 3:], hat, local[:3, :3])
     _skew(force, hat)
@@ -250,12 +253,12 @@ def respond(
 ):
     """Moves ρ [m] and turns θ (mark, 3, column) of one rod behind steps `marks`, and works.
 
-    Of each node (step, 3): η dZ and ζ dZ [m]; resistance 1/K1, 1/K1, 1/K3 [1/(N m²)] (3 more), 0
-    without loads; thrust 1/K0 [1/N]; d1, d2, d3 as rows (3, 3 more); moment m [N m] and force n [N]
-    in the frame of the base (3 more). Columns are what changes there: turning δω| dZ in the
-    directors, pushing δζ| dZ, yielding ν [N]. Works (work, column) are those of unit loads M and N
-    (4, work more) on δω and δζ. The payload has a lever [m], a weight [N] and `tipping`, the change
-    of its moment on the tip at the same directors [N m] (3, column).
+    Of each node (step, 3): η dZ and ζ dZ [m]; resistance K⁻¹ in the directors [1/(N m²)]
+    (3, 3 more), 0 without loads; thrust 1/K0 [1/N]; d1, d2, d3 as rows (3, 3 more); moment m [N m]
+    and force n [N] in the frame of the base (3 more). Columns are what changes there: turning
+    δω| dZ in the directors, pushing δζ| dZ, yielding ν [N]. Works (work, column) are those of unit
+    loads M and N (4, work more) on δω and δζ. The payload has a lever [m], a weight [N] and
+    `tipping`, the change of its moment on the tip at the same directors [N m] (3, column).
     """
     steps, columns = rest_length.shape[0], turning.shape[3]
     every = columns + 3

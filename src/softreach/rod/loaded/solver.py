@@ -12,7 +12,7 @@ from softreach.arm.base import rotation_matrices
 from softreach.arm.tables import compliance as compliance_of
 from softreach.geometry.sphere_maps import Map
 from softreach.kernels.loaded import shooting as kernels
-from softreach.kernels.loaded.response import TRACE, respond
+from softreach.kernels.loaded.response import TRACE, respond, respond_flat
 from softreach.rod.free import linear_strains, per_length, tables_at
 from softreach.rod.loaded.tables import LoadTables, StepTables
 from softreach.rod.steps import enough_for_all_breaks
@@ -26,6 +26,12 @@ _WIDEST = 1.2  # [rad], longest first step of Newton's method that is trusted
 _SMALL = 2e-3  # [rad], step from which on chord steps do
 _WALKS = 8, 12  # allowed, with tangents and without
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
+_SEARCHES = {  # of flat sections, and of forces along one direction
+    (False, False): kernels.solve_frames,
+    (False, True): kernels.solve_directions,
+    (True, False): kernels.solve_flat_frames,
+    (True, True): kernels.solve_flat_directions,
+}
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
 
 
@@ -121,7 +127,7 @@ class Solver:
         """Searches on any steps; see `solve_directions`."""
         tables, size = self.tables, self.tables.frame_size
         out = np.empty((len(gamma), 5 + size))
-        solve = kernels.solve_directions if tables.one_direction else kernels.solve_frames
+        solve = _SEARCHES[tables.is_flat, tables.one_direction]
         given = np.zeros((0, size)) if guesses is None else np.ascontiguousarray(guesses)
         arm = _columns(gamma), tables.axes, tables.at_tip, given, tuple(steps)
         solve(*arm, limits, walks, shares, out)
@@ -142,7 +148,8 @@ class Solver:
         twists, yields = np.zeros((moved, 6, gamma.shape[1] or 1)), np.zeros((yielding, 3, 3))
         sections = np.zeros((traced, len(steps.lengths) + 1, TRACE))
         walked = _columns(gamma), self.tables.at_tip, np.ascontiguousarray(frames), tuple(steps)
-        respond(*walked, twists, yields, sections)
+        walk = respond_flat if self.tables.is_flat else respond
+        walk(*walked, twists, yields, sections)
         return twists[:, :, : gamma.shape[1]], yields, sections
 
     def empty(self, n: int) -> Equilibria:
@@ -178,22 +185,24 @@ class Solver:
     def strains_under(self, gamma: Array, z: Array, shapes: LoadedShapes) -> Strains:
         """The strains at stations Z [m], from m and n in the directors of the shapes there."""
         arm = self.tables.arm
-        axial, bending, torsion = compliance_of(arm, z)
+        axial, yields = compliance_of(arm, z)
         u, extension, eta = linear_strains(tables_at(arm, z.tobytes()), gamma)
         extension = extension + eta * shapes.force[..., 2] * axial
-        yielded = np.stack([bending, bending, torsion], axis=1)
-        return per_length(u + shapes.moment * yielded, extension, eta)
+        bent = np.einsum("sab,nsb->nsa", arm.section.in_directors(yields), shapes.moment)
+        return per_length(u + bent, extension, eta)
 
     def base_map(self, gamma: Array) -> Map:
         """Map from directions of gravity at the tip of one arm (1, bundles) to those at its base.
 
         Both (n, 3) as the base of the unloaded arm sees them; loads along one direction only.
         """
+        is_flat = self.tables.is_flat
+        walk = kernels.base_flat_directions if is_flat else kernels.base_directions
 
         def image(points: Array) -> Array:  # steps do not keep the length
             images, directions = np.empty((len(points), 3)), np.ascontiguousarray(points)
             at_tip, steps = self.tables.at_tip, tuple(self._steps)
-            kernels.base_directions(_columns(gamma), at_tip, directions, steps, images)
+            walk(_columns(gamma), at_tip, directions, steps, images)
             return images / np.linalg.norm(images, axis=1, keepdims=True)
 
         return image
@@ -291,7 +300,7 @@ def _shapes_of(
     tips: Array, trace: Array, table: StepTables, rows: Index, stations: Array
 ) -> LoadedShapes:
     """Shapes at stations Z [m], ends of steps with these rows, tip first; NaN where a tip is."""
-    force = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])[rows]
+    force = np.concatenate([table.scalars[:1, 0, 3:6], table.scalars[:, -1, 3:6]])[rows]
     axes = _world(trace[:, -1])[:, None]
     trace = trace[:, rows]
     world, turn = _world(trace), rotation_matrices(trace[..., 12:16])

@@ -67,7 +67,8 @@ class StepTables(NamedTuple):
     lengths: Array
     """η dZ, then ζ̂ dZ, at the nodes, (step, 10, bundle + 1)."""
     scalars: Array
-    """1/K1, 1/K3 - 1/K1, 1/K0 and the dead force along the world's axes, (step, 5, 6)."""
+    """1/K1, 1/K3 - 1/K1, 1/K0 and the dead force along the world's axes, (step, 5, 6); of flat
+    sections then 1/K2 - 1/K1 and the axis of K2 along d1 and d2, (step, 5, 9)."""
     bends: Array
     """U at the nodes, (step, 5, 3, bundle)."""
     moments: Array
@@ -96,6 +97,11 @@ class LoadTables:
         tables = replace(self, force=force)
         vars(tables).update(kept)
         return tables
+
+    @property
+    def is_flat(self) -> bool:
+        """True if sections have two bending stiffnesses."""
+        return self.arm.section.bending_ratio != 1.0
 
     @lazy
     def loads(self) -> Loads:
@@ -179,23 +185,26 @@ class LoadTables:
     def phase(self) -> LoadPhase:
         """The phase that the loads give the tangents at most.
 
-        Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the
+        Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smallest of K1, K2 and K3, w and M the
         sizes of all forces and moments beyond, added as if along one line, and ζ̂ the largest
-        within bounds, or η where that is larger.
+        within bounds, or η where that is larger. Flat sections add what buckles them sideways.
         """
         arm, profile = self.arm, self.arm.profile
         z = both_sides(arm, profile.station(np.linspace(0.0, profile.slender_length, _STATIONS)))
-        axial, bending, torsion = compliance(arm, z)
-        moment = self.loads.moment_size
+        axial, yields = compliance(arm, z)
+        moment, softest = self.loads.moment_size, yields.max(axis=-1)
         with np.errstate(over="ignore"):
-            force, softest = self._largest_force(z), np.maximum(bending, torsion)
+            force = self._largest_force(z)
             swing = force * (1.0 + force * axial) * softest + (0.5 * moment * softest) ** 2
             table = tables(arm, z)
             longest = 1.0 + ends_over(table.extension, arm.bounds).T
             grown = 1.0 + ends_over(table.rest_length_factor, arm.bounds).T
             relative = grown[1] / longest[0] if table.has_forces else 1.0
             squeeze = float((force * axial * relative).max())
-            rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
+            stretch = np.maximum(longest[1], grown[1])
+            if self.is_flat:
+                swing += _sideways(yields, force, _beyond(stretch * force, z) + moment)
+            rate = stretch * np.sqrt(swing)
         steepest = rate * profile.radius(z) * profile.slender_length  # dZ = R2 dS
         along = np.append(0.0, np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(z)))
         return LoadPhase(float(along[-1]), float(steepest.max()), squeeze, z, along)
@@ -205,8 +214,7 @@ class LoadTables:
         loads = self.loads
         gravity, at_tip = math.hypot(*loads.gravity), math.hypot(*loads.tip_force)
         per_length = math.hypot(*loads.force_per_length) + self._mass_per_length(z) * gravity
-        each = 0.5 * (per_length[1:] + per_length[:-1]) * np.diff(z)
-        along = np.append(np.cumsum(each[::-1])[::-1], 0.0)
+        along = _beyond(per_length, z)
         points = sum((math.hypot(*p.force) * (p.station >= z) for p in loads.point_loads), 0.0)
         at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
         return at_tip + along + points
@@ -224,7 +232,7 @@ class LoadTables:
         if self.direction is None:
             return made
         scalars = made.scalars.copy()
-        scalars[..., 3:] += self.force * (self.axes @ self.direction)
+        scalars[..., 3:6] += self.force * (self.axes @ self.direction)
         return made._replace(scalars=scalars)
 
     def edges(self, stations: Array, steps: int) -> Array:
@@ -252,14 +260,18 @@ class LoadTables:
         pieces = rod.pack(wide * profile.radius(between), resting, resting, inside.curvature)
         pieces[:, 3::4, -1] += self.twist  # u3 at rest
         measure = width * profile.radius(inward)
-        axial, bending, torsion = (c[..., None] for c in compliance(self.arm, inward))
+        axial, yields = compliance(self.arm, inward)
+        bending, across, torsion = np.moveaxis(yields, -1, 0)
         force, moments = self._dead_loads(z)
-        scalars = np.concatenate([bending, torsion - bending, axial, force], axis=-1)
+        scalars = [bending, torsion - bending, axial, *np.moveaxis(force, -1, 0)]
+        if self.is_flat:
+            angle = np.full(z.shape, self.arm.section.bending_angle)
+            scalars += [across - bending, -np.sin(angle), np.cos(angle)]
         inner = [int(np.abs(ends - node).argmin()) for node in self.nodes]
         return StepTables(
             pieces,
             rest_frames.pack_lengths(measure, at.extension, at.rest_length_factor),
-            np.ascontiguousarray(scalars),
+            np.ascontiguousarray(np.stack(scalars, axis=-1)),
             np.ascontiguousarray(at.curvature),
             moments,
             np.array([0, *inner, len(edges) - 1], np.int64),
@@ -280,3 +292,24 @@ class LoadTables:
             force[step:] += load.force
             moments[step : step + 1] += self.axes @ np.array(load.moment)
         return force @ self.axes.T, moments
+
+
+def _beyond(density: Array, z: Array) -> Array:
+    """Integrals from stations Z [m] to the last one."""
+    each = 0.5 * (density[1:] + density[:-1]) * np.diff(z)
+    return np.append(np.cumsum(each[::-1])[::-1], 0.0)
+
+
+def _sideways(yields: Array, force: Array, moment: Array) -> Array:
+    """Square of the rate at which a bending moment winds tangents about a flat strip [1/m²].
+
+    A moment M about the axis of K1 couples bending about the other one with torsion at the rate
+    M √((1/K2 - 1/K1) (1/K3 - 1/K1)): Prandtl's strip buckles sideways as M comes to about π/2 of
+    it. M is at most that of all forces on their levers, and of an elastica 2 √(w K).
+    """
+    first, second, torsion = np.moveaxis(yields, -1, 0)
+    coupling = np.abs(first - second)
+    coupling *= np.maximum(np.abs(torsion - first), np.abs(torsion - second))
+    with np.errstate(divide="ignore", invalid="ignore"):  # in rigid pieces
+        elastica = 2.0 * np.sqrt(force / np.minimum(first, second))
+    return coupling * np.fmin(moment, elastica) ** 2
