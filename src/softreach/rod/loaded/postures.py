@@ -322,6 +322,34 @@ class ContinuedPostures(Postures):
         return True
 
 
+@dataclass(frozen=True, eq=False)
+class PosturesBeside(Postures):
+    """Those beside a posture that the arm is in, by one search each; undecided where it fails.
+
+    Time is bounded so. The posture that was found last is in `found`; whoever accepts it moves
+    `frame` there.
+    """
+
+    frame: Array = field(kw_only=True)
+    """How the arm sees the world in its posture, shape (1, component)."""
+    found: Array = field(kw_only=True)
+    """The same of what was found last, shape (1, component)."""
+
+    @classmethod
+    def of(cls, postures: Postures, frame: Array) -> PosturesBeside:
+        """Those beside a posture with this frame (1, component)."""
+        return cls(postures.solver, postures.side, frame=frame.copy(), found=frame.copy())
+
+    def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
+        """Postures at activations (n, bundles), no more than half a radian from `frame`."""
+        new = self.solver.search(gamma, np.repeat(self.frame, len(gamma), axis=0))
+        near = turn_between(new.frame, self.frame) < _POLISHED
+        equilibria = self.solver.empty(len(gamma))
+        self.solver.put(gamma, slice(None), new.only(new.is_stable & near), equilibria)
+        self.found[:] = new.frame[-1:]
+        return equilibria
+
+
 def _turned(frame: Array, angles: Array, axes: Array) -> Array:
     """Frames of a frame that turns about the first axis [rad], shape (n, component)."""
     turns = np.zeros((len(angles), 3, 3))

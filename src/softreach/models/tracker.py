@@ -1,0 +1,335 @@
+"""A control step: activations that bring the tip of an arm toward a target, in bounded time.
+
+A step takes two or three damped Gauss-Newton steps within the bounds and within what the rate
+allows. Each is the exact minimum of ½|J dx - e|² + ½ s|dx|² in that box; what brings the tip no
+nearer is not taken and raises the damping s, which later steps inherit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.arm.manipulator import Manipulator
+from softreach.kernels.box.bounded_descent import box_minimum
+from softreach.rod.loaded.postures import PosturesBeside
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
+from softreach.rod.tip_map import TipMap, TipOutputs
+from softreach.stiffness import tip_compliance
+from softreach.support.arguments import POSITIVE, as_number
+from softreach.support.arrays import Array, as_directions, as_floats, as_points, as_rows
+from softreach.support.errors import InvalidInput, NotPossible
+from softreach.support.lazy import lazy
+
+_TRIALS, _DIRECTED_TRIALS = 3, 2
+_SHARE = 0.1  # of its range, by which a bundle moves in a step where no rate is given
+_FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-6, 1e-10, 1e6  # of the mean square slope
+_EASE = 0.05  # of the way to the least activations, in a step, as far as the tip does not move
+_ENOUGH = 0.1  # of the tolerance, at which a step ends
+_AT_END = 1e-9  # of a range, from a limit on which a bundle is
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrackingStep:
+    """Where a control step leads."""
+
+    activations: Array
+    """Inputs of the arm, each in its own unit, shape (bundles,)."""
+    tip: Array
+    """Its tip [m], shape (3,)."""
+    tip_direction: Array | None
+    """Tangent d3 of the tip [-], shape (3,), where a direction is wanted."""
+    jacobian: Array
+    """∂r/∂γ of the tip [m per unit of each activation], shape (3, bundles)."""
+    distance: float
+    """|target - tip| [m]."""
+    angle: float
+    """Between the direction of the tip and the one wanted [rad]; 0 if none is."""
+    reached: bool
+    """True if the distance is at most `tol`, and the angle, in rad, too."""
+    at_bound: tuple[str, ...]
+    """Bundles at a bound."""
+    at_rate: tuple[str, ...]
+    """Bundles that moved as far as their rate allows."""
+    snaps: bool
+    """True if a way was not taken, since the arm loses its stability on it."""
+    _yielding: TipMap
+    _has_modulus: bool
+
+    @lazy
+    def compliance(self) -> Array | None:
+        """∂r/∂F of the tip [m/N], shape (3, 3), computed when it is read.
+
+        None where it is unknown: of an arm without moduli, or of a marker.
+        """
+        if not self._has_modulus or self._yielding.point is not None:
+            return None
+        return tip_compliance(self._yielding, self.activations[None])[0]
+
+    def __str__(self) -> str:
+        angle = f" and {math.degrees(self.angle):.3g}°" if self.angle else ""
+        limits = [f"at a bound: {', '.join(self.at_bound)}"] * bool(self.at_bound)
+        limits += [f"at the rate: {', '.join(self.at_rate)}"] * bool(self.at_rate)
+        limits += ["the arm would snap"] * self.snaps
+        where = "reached" if self.reached else f"{1e3 * self.distance:.3g} mm{angle} away"
+        return "; ".join([where, *limits])
+
+
+class Tracker:
+    """Control steps of one arm, from the activations that it has to a place for its tip.
+
+    A step continues from the last one: activations change by no more than the rate allows, stay
+    within the bounds, and an arm under loads stays on its branch of stable postures. Out of reach
+    the tip comes as near as it can. Of more bundles than it takes those with less activation are
+    preferred.
+    """
+
+    def __init__(
+        self,
+        arm: Manipulator | TipMap,
+        *,
+        rate: ArrayLike | None = None,
+        period: float = 0.01,
+        bounds: ArrayLike | None = None,
+        start: ArrayLike | None = None,
+        direction_weight: float = 1.0,
+        tol: float = 1e-6,
+        point: str | None = None,
+    ) -> None:
+        """Prepare for steps, and begin at `start`.
+
+        Args:
+            arm: The design, or its tip map.
+            rate: Largest change of each activation per second, in its own unit, one number for all
+                or shape (bundles,). By default a tenth of the range of each a step.
+            period: Time between two steps [s].
+            bounds: Bounds of the activations, (lower, upper) of each, shape (bundles, 2), within
+                those of the arm, which are the default.
+            start: Activations to begin with, shape (bundles,); 0, or the bound next to it, by
+                default.
+            direction_weight: Weight of an angle of 1 rad beside a distance of L [-].
+            tol: Largest tip error, in L, and the distance at which a target counts as reached.
+            point: Name of the marker that counts as the tip; by default that of the design.
+
+        Raises:
+            InvalidInput: An argument is out of its range or has another shape.
+            InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+            NotPossible: The arm has drives with dead zones, or no stable posture at the start.
+        """
+        self._origin = _without_dead_zones(all_inputs(as_tip_map(arm, tol, point=point)))
+        box = self._origin.box
+        self.names = box.names
+        self.low, self.high = _within(bounds, box.low, box.high)
+        self.period = as_number("period", period, POSITIVE)
+        self._scales = np.where(self.high > self.low, self.high - self.low, 1.0)
+        self._most = _SHARE * self._scales if rate is None else self._of_rate(rate)
+        self._weight = as_number("direction_weight", direction_weight, POSITIVE)
+        self._has_modulus = not self._origin.arm.section.modulus_faults("")
+        self._least = np.clip(0.0, self.low, self.high)
+        self.begin(self._least if start is None else start)
+
+    def _of_rate(self, rate: ArrayLike) -> Array:
+        rates = as_floats("rate", rate)
+        if rates.shape not in ((), self.low.shape) or not (np.isfinite(rates) & (rates > 0)).all():
+            allowed = f"a positive number, or {len(self.low)} of them, per second"
+            raise InvalidInput("rate", rate, allowed)
+        return rates * self.period * np.ones(len(self.low))
+
+    def begin(self, activations: ArrayLike) -> None:
+        """Go to activations (bundles,), such as measured ones, whatever the rate.
+
+        An arm under loads is in the posture to which they lead from rest.
+
+        Raises:
+            InvalidInput: They have another shape or are out of the bounds.
+            NotPossible: There is no stable posture.
+        """
+        allowed = f"{len(self.low)} numbers within the bounds"
+        x = as_rows("activations", activations, len(self.low), allowed)
+        if len(x) != 1 or ((x < self.low) | (x > self.high)).any():
+            raise InvalidInput("activations", activations, allowed)
+        self._origin.prepare()
+        self._map, self._beside, rod = self._origin, None, self._origin.rod
+        if isinstance(rod, LoadedRod):
+            inner = self._origin.inputs.activations(x)
+            known = rod.equilibria(inner)
+            if not known.is_stable[0]:
+                raise NotPossible("the arm has no stable posture at the start: lighten its loads")
+            self._beside = PosturesBeside.of(rod.postures, known.frame)
+            inputs = self._origin.inputs.continued_from(inner, known.frame)
+            held = rod.with_postures(self._beside)
+            self._map = replace(self._origin, rod=held, inputs=inputs)
+        self._x, self._damping = x[0].copy(), _FIRST_DAMPING
+        self._here = self._motion(self._x)
+
+    @property
+    def activations(self) -> Array:
+        """Where the arm is, each in its own unit, shape (bundles,)."""
+        return self._x.copy()
+
+    def step(self, target: ArrayLike, direction: ArrayLike | None = None) -> TrackingStep:
+        """Move the tip toward a target [m] (3,), and to a direction (3,) of any length if given.
+
+        Raises:
+            InvalidInput: The target or the direction is no vector of three finite numbers.
+        """
+        place = as_points("target", target)
+        if len(place) != 1:
+            raise InvalidInput("target", target, "one place, shape (3,)")
+        wanted = None if direction is None else as_directions("direction", direction, 1)[0]
+        low = np.maximum(self.low, self._x - self._most)
+        high = np.minimum(self.high, self._x + self._most)
+        before, snaps = self._x, self._advance(place[0], wanted, low, high)
+        return self._result(place[0], wanted, before, snaps)
+
+    def _advance(self, target: Array, wanted: Array | None, low: Array, high: Array) -> bool:
+        """Take the trials that lead nearer; whether one ended where the arm is not stable."""
+        if wanted is not None and self._here.directions is None:
+            self._here = self._motion(self._x, directed=True)
+        error, slope = self._rows(self._here, target, wanted)
+        size, snaps, stale = math.sqrt(error @ error), False, False
+        for k in range(_TRIALS if wanted is None else _DIRECTED_TRIALS):
+            if size <= _ENOUGH * self._origin.tol:
+                break
+            eases = k == 0 and self._damping <= _FIRST_DAMPING
+            trial = self._trial(error, slope, low, high, _EASE * eases)
+            if (trial == self._x).all():
+                break
+            motion = None
+            if wanted is None:
+                there = self._broyden(trial, target, error, slope)
+            else:
+                motion = self._motion(trial, directed=True)
+                there = self._rows(motion, target, wanted)
+            ahead = math.sqrt(there[0] @ there[0])
+            if ahead < size:
+                self._x, self._here, stale = trial, motion or self._here, motion is None
+                (error, slope), size = there, ahead
+                if self._beside is not None:
+                    self._beside.frame[:] = self._beside.found
+                self._damping = max(0.1 * self._damping, _LEAST_DAMPING)
+            else:
+                lost = not math.isfinite(ahead)
+                snaps |= lost
+                self._damping *= 1e4 if lost else 10.0
+                self._damping = min(max(self._damping, 1e-6), _LARGEST_DAMPING)
+        if stale:
+            self._here = self._motion(self._x)
+        return snaps
+
+    def _trial(self, error: Array, slope: Array, low: Array, high: Array, ease: float) -> Array:
+        """The end of the best step of the linear map in a box.
+
+        What does not move the tip eases by a part of the way to the activations of least size.
+        """
+        scaled, step = slope * self._scales, np.empty((1, len(low)))
+        hessian = scaled.T @ scaled
+        softness = self._damping * np.trace(hessian) / 3.0 + 1e-300
+        hessian.flat[:: len(low) + 1] += softness
+        gradient = softness * ease * (self._x - self._least) / self._scales - scaled.T @ error
+        ends = (low - self._x) / self._scales, (high - self._x) / self._scales
+        box_minimum(hessian[None], gradient, *ends, step)
+        return np.clip(self._x + step[0] * self._scales, low, high)
+
+    def _broyden(
+        self, trial: Array, target: Array, error: Array, slope: Array
+    ) -> tuple[Array, Array]:
+        """What is missing at a trial, and derivatives that say so of the way there.
+
+        Tips cost a tenth of their derivatives under loads: Broyden's correction of those before.
+        """
+        tips = np.empty((1, 3))
+        self._map.fill(trial[None], TipOutputs(tips))
+        left, step = (target - tips[0]) / self._origin.length, (trial - self._x) / self._scales
+        off = error - left - slope @ (trial - self._x)
+        return left, slope + np.outer(off, step / self._scales) / (step @ step)
+
+    def _motion(self, x: Array, *, directed: bool = False) -> TipOutputs:
+        """Tip and slopes at activations (bundles,), direction and twists if wanted."""
+        out = TipOutputs(np.empty((1, 3)), np.empty((1, 3, len(x))))
+        if directed:
+            out = out._replace(twists=np.empty((1, 6, len(x))), directions=np.empty((1, 3)))
+        self._map.fill(x[None], out)
+        return out
+
+    def _rows(self, motion: TipOutputs, target: Array, wanted: Array | None) -> tuple[Array, Array]:
+        """What is missing, in L and in weighted rad, and its derivatives by the activations."""
+        length, tip = self._origin.length, motion.tips[0]
+        assert motion.slopes is not None
+        error, slope = (target - tip) / length, motion.slopes[0] / length
+        if wanted is None:
+            return error, slope
+        assert motion.twists is not None
+        assert motion.directions is not None
+        d = motion.directions[0]
+        turn = motion.twists[0, 3:] - np.outer(d, d @ motion.twists[0, 3:])
+        missing = _angle(d, wanted) * _axis(d, wanted)
+        return np.append(error, self._weight * missing), np.append(slope, self._weight * turn, 0)
+
+    def _result(
+        self, target: Array, wanted: Array | None, before: Array, snaps: bool
+    ) -> TrackingStep:
+        x, here, tol = self._x, self._here, self._origin.tol
+        assert here.slopes is not None
+        away, angle, pointing = target - here.tips[0], 0.0, None
+        distance = math.sqrt(away @ away)
+        if wanted is not None and here.directions is not None:
+            pointing = here.directions[0]
+            angle = _angle(pointing, wanted)
+        close, yielding = _AT_END * self._scales, self._map
+        bound = (np.minimum(x - self.low, self.high - x) <= close) & (self.low < self.high)
+        rate = np.abs(x - before) >= self._most - close
+        if self._beside is not None:
+            at = PosturesBeside.of(self._beside, self._beside.frame)
+            assert isinstance(self._map.rod, LoadedRod)
+            yielding = replace(self._map, rod=self._map.rod.with_postures(at))
+        return TrackingStep(
+            activations=x.copy(),
+            tip=here.tips[0],
+            tip_direction=pointing,
+            jacobian=here.slopes[0],
+            distance=distance,
+            angle=angle,
+            reached=distance <= tol * self._origin.length and angle <= tol,
+            at_bound=tuple(self.names[k] for k in np.flatnonzero(bound)),
+            at_rate=tuple(self.names[k] for k in np.flatnonzero(rate)),
+            snaps=snaps,
+            _yielding=yielding,
+            _has_modulus=self._has_modulus,
+        )
+
+
+def _within(bounds: ArrayLike | None, low: Array, high: Array) -> tuple[Array, Array]:
+    if bounds is None:
+        return low, high
+    allowed = f"(lower, upper) of {len(low)} bundles within those of the arm"
+    ends = as_rows("bounds", bounds, 2, allowed)
+    within = len(ends) == len(low) and (ends[:, 0] <= ends[:, 1]).all()
+    if not within or (ends[:, 0] < low).any() or (ends[:, 1] > high).any():
+        raise InvalidInput("bounds", ends.tolist(), allowed)
+    return ends[:, 0].copy(), ends[:, 1].copy()
+
+
+def _without_dead_zones(known: ArmMap) -> ArmMap:
+    if any(drive.dead_zone for drive in known.arm.drives):
+        raise NotPossible(
+            "a tracker does not move drives with dead zones: track without them, and let the "
+            "controller add them"
+        )
+    return known
+
+
+def _angle(d: Array, wanted: Array) -> float:
+    return math.atan2(float(np.linalg.norm(np.cross(d, wanted))), float(d @ wanted))
+
+
+def _axis(d: Array, wanted: Array) -> Array:
+    """About which d turns to what is wanted; any one across where they are opposite."""
+    axis = np.cross(d, wanted)
+    if not axis.any():
+        axis = np.cross(d, np.eye(3)[np.abs(d).argmin()])
+    return axis / np.linalg.norm(axis)
