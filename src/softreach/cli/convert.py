@@ -36,8 +36,8 @@ def export(
 
     A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
-    .glb .3mf .vtu), the source of a filament of ActiveFilaments.jl (.jl), or a
-    model for MuJoCo (.xml).
+    .glb .3mf .vtu), the source of a filament of ActiveFilaments.jl (.jl), a
+    model for MuJoCo (.xml), or kinematics in C (.h .c).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
 
@@ -46,6 +46,7 @@ def export(
     """
     from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
     from softreach.export.surfaces import SURFACE_FILES
+    from softreach.models.c_source import SOURCE, write_c
     from softreach.models.mjcf import MODEL, write_mujoco
 
     if format not in (None, "activefilaments"):
@@ -64,12 +65,13 @@ def export(
         options.check_output(out, FILAMENT_SCRIPT, overwrite)
         write_design(arm, out, overwrite=overwrite)
         console.line(out)
-    elif out.suffix == ".xml":
+    elif out.suffix in (".xml", ".h", ".c"):
         options.refuse("on a model, whose controls they are", activation=activation)
         arm = design_from(source, changes)
-        options.refuse("for MuJoCo, whose lengths are in m", unit=unit)
-        options.check_output(out, MODEL, overwrite)
-        write_mujoco(arm, out, overwrite=overwrite)
+        options.refuse("for a model, whose lengths are in m", unit=unit)
+        options.check_output(out, {**SOURCE, **MODEL}, overwrite)
+        write = write_mujoco if out.suffix == ".xml" else write_c
+        write(arm, out, overwrite=overwrite)
         console.line(out)
     else:
         arm = design_from(source, changes, unit)

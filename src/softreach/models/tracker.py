@@ -332,4 +332,4 @@ def _axis(d: Array, wanted: Array) -> Array:
     axis = np.cross(d, wanted)
     if not axis.any():
         axis = np.cross(d, np.eye(3)[np.abs(d).argmin()])
-    return axis / np.linalg.norm(axis)
+    return np.asarray(axis / np.linalg.norm(axis), float)
