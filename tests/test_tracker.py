@@ -9,7 +9,6 @@ from scipy.optimize import least_squares
 
 import softreach as sr
 from softreach.arm.drives import Drive
-from softreach.kernels.box.bounded_descent import box_minimum
 from softreach.rod.rods import as_tip_map
 
 FREE = sr.designs.three_tendon_robot(segments=2)
@@ -25,21 +24,6 @@ def activations_of_path(arm, seed=0, steps=25):
     rng, high = np.random.default_rng(seed), arm.bounds[:, 1]
     knots = high * (0.1 + 0.5 * rng.random((9, arm.bundles)))
     return CubicSpline(np.arange(9), knots)(np.linspace(0, 8, steps + 1)).clip(0.0, high)
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_the_minimum_of_a_quadratic_in_a_box_is_one(seed):
-    """Where the projected gradient vanishes a convex function is least."""
-    rng = np.random.default_rng(seed)
-    m = int(rng.integers(1, 12))
-    slopes = rng.normal(size=(3, m))
-    hessian = slopes.T @ slopes + 10.0 ** rng.uniform(-8, 0) * np.eye(m)
-    gradient, x = -slopes.T @ rng.normal(size=3) * 3.0, np.empty((1, m))
-    low, high = -rng.random(m) * (rng.random(m) > 0.2), rng.random(m) * (rng.random(m) > 0.2)
-    box_minimum(hessian[None], gradient, low, high, x)
-    assert ((low <= x[0]) & (x[0] <= high)).all()
-    downhill = x[0] - hessian @ x[0] - gradient
-    np.testing.assert_allclose(x[0], downhill.clip(low, high), atol=1e-9)
 
 
 def errors_without_a_limit_of_time(arm, path, start):
@@ -125,7 +109,7 @@ def test_a_direction_is_reached_together_with_a_place(arm):
     for _ in range(40):
         step = tracker.step(motion.tips[0], 3.0 * motion.directions[0])
     assert step.reached
-    np.testing.assert_allclose(step.tip_direction, motion.directions[0], atol=1e-5)
+    assert step.angle < 1e-6
 
 
 def test_an_arm_under_loads_goes_on_along_its_branch():
@@ -175,7 +159,6 @@ REFUSED = {
     "period": {"period": 0.0},
     "bounds": {"bounds": [[0.0, 9.0]] * 6},
     "activations": {"start": [9.0] * 6},
-    "direction_weight": {"direction_weight": -1.0},
 }
 
 

@@ -46,8 +46,9 @@ def export(
     """
     from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.models.c_source import SOURCE, write_c
-    from softreach.models.mjcf import MODEL, write_mujoco
+    from softreach.models.c_source import SOURCE
+    from softreach.models.mjcf import MODEL
+    from softreach.support.files.text import write_text
 
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
@@ -70,8 +71,8 @@ def export(
         arm = design_from(source, changes)
         options.refuse("for a model, whose lengths are in m", unit=unit)
         options.check_output(out, {**SOURCE, **MODEL}, overwrite)
-        write = write_mujoco if out.suffix == ".xml" else write_c
-        write(arm, out, overwrite=overwrite)
+        text = sr.models.mujoco(arm) if out.suffix == ".xml" else sr.models.c(arm)
+        write_text(out, text, overwrite=overwrite)
         console.line(out)
     else:
         arm = design_from(source, changes, unit)

@@ -1,6 +1,6 @@
 """Arms as models of other programs, which simulate them or run on controllers; control steps."""
 
-from softreach.models.c_source import c, write_c
+from softreach.models.c_source import c
 from softreach.models.inverse_table import InverseTable, inverse_table
 from softreach.models.mjcf import mujoco, write_mujoco
 from softreach.models.tracker import Tracker, TrackingStep
@@ -12,6 +12,5 @@ __all__ = [
     "c",
     "inverse_table",
     "mujoco",
-    "write_c",
     "write_mujoco",
 ]

@@ -6,7 +6,7 @@ Formulas are those of the kernels, written down by `formulas`; loops and tables 
 from __future__ import annotations
 
 import re
-from os import PathLike
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.kernels.rod.jacobian import step_column, weights_at
 from softreach.kernels.rod.magnus import act, exponent
-from softreach.kernels.rod.tips import NODE_ROWS, node_twist
+from softreach.kernels.rod.tips import BEND_ROWS, node_twist
 from softreach.models.formulas import function_in_c
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
@@ -22,12 +22,11 @@ from softreach.support.arguments import as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.files.formats import FileFormat, Formats
-from softreach.support.files.text import write_text
 
 if TYPE_CHECKING:
     from softreach.models.inverse_table import InverseTable
 
-SOURCE: Formats = {".h": FileFormat(), ".c": FileFormat()}  # Formats of `write_c`
+SOURCE: Formats = {".h": FileFormat(), ".c": FileFormat()}  # Formats of files with `c`
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
 _A_LINE = 8  # numbers
@@ -62,9 +61,9 @@ def c(
 
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
-        InvalidInput: `tol` is out of range, `name` is none of C, or there is no such marker; or the
+        InvalidInput: `tol` is out of range, `name` is none of C, there is no such marker, or the
             table is that of another arm.
-        NotPossible: The arm has loads and there is no lookup, or its bundles do not follow from its
+        NotPossible: The arm has loads and there is no lookup, or activations do not follow from the
             inputs by a linear map, as of tendons driven by length, of guides and of dead zones.
     """
     arm = a_manipulator("arm", arm)
@@ -76,128 +75,102 @@ def c(
     parts = [_head(known)]
     if arm.loads is None:
         table = _table(known)
-        parts += [_sizes(table), _tables(known, table), _formulas(), _WALKS]
+        parts += [_tables(known, table), _formulas(table.shape[1]), _WALKS]
     elif lookup is None:
         raise NotPossible("C has no kinematics of arms under loads: give it a lookup table")
     parts += [] if lookup is None else [_lookup(lookup)]
-    text = "\n".join([*parts, "#endif", ""])
+    text = "\n".join([*parts, "#endif\n"])
     return text.replace("NAME", name).replace("UPPER", name.upper())
-
-
-def write_c(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write the text of `c` to a file.
-
-    Args:
-        arm: The design.
-        path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace a file.
-
-    Raises:
-        InvalidDesign: As `c`.
-        NotPossible: As `c`.
-        InvalidInput: Something else is there.
-        NotWritten: It cannot be written.
-    """
-    write_text(path, c(arm), overwrite=overwrite)
 
 
 def _table(known: ArmMap) -> Array:
     """Tables of the steps by inputs, base first, shape (step, row, input + 1)."""
     rod, driving = known.rod, known.inputs.driving
     assert isinstance(rod, FreeRod)
-    bundles = rod.box.bundles
-    of_bundles, constant = rod.table[..., :bundles], rod.table[..., -1:]
-    if driving is None:
-        return np.concatenate([of_bundles, constant], axis=-1)
-    if not driving.is_affine:
-        raise NotPossible(
-            "C has no tendons driven by length or held by guides, and no drives with dead zones or "
-            "slack tendons: leave them out"
-        )
-    return np.concatenate(
-        [of_bundles @ driving.gains, constant + of_bundles @ driving.offsets[:, None]], axis=-1
-    )
+    columns, rest = rod.table[..., : rod.box.bundles], rod.table[..., -1:]
+    if driving is not None:
+        if not driving.is_affine:
+            raise NotPossible(
+                "C has no tendons driven by length or held by guides, and no dead zones of drives: "
+                "leave them out"
+            )
+        columns, rest = columns @ driving.gains, rest + columns @ driving.offsets[:, None]
+    return np.concatenate([columns, rest], axis=-1)
 
 
 def _head(known: ArmMap) -> str:
     from softreach import __version__
 
     arm, box = known.arm, known.box
-    names = zip(map(_plain, arm.input_names), arm.input_units, strict=True)
-    lines = [
-        f"   {k}: {label} [{unit}], {low:g} to {high:g}"
-        for k, ((label, unit), (low, high)) in enumerate(zip(names, box.bounds, strict=True))
+    names = [name.encode("ascii", "replace").decode().replace("*/", "") for name in box.names]
+    rows = zip(names, arm.input_units, box.bounds, strict=True)
+    bundles = [
+        f"   {k}: {n} [{u}], {low:g} to {high:g}\n" for k, (n, u, (low, high)) in enumerate(rows)
     ]
-    return "\n".join(
-        [
-            f"/* An arm of {arm.length:g} m, by softreach {__version__}. SI units, world frame.",
-            f"   Tips are exact to {known.tol:g} L while activations are within their bounds:",
-            *lines,
-            "*/\n#ifndef UPPER_H\n#define UPPER_H\n",
-            "#if defined(__GNUC__)\n#define UPPER_API static __attribute__((unused))",
-            "#else\n#define UPPER_API static\n#endif\n",
-            f"#define UPPER_INPUTS {box.bundles}\n",
-            array_in_c("UPPER_API const double NAME_low[UPPER_INPUTS]", box.low),
-            array_in_c("UPPER_API const double NAME_high[UPPER_INPUTS]", box.high),
-        ]
+    return f"""/* An arm of {arm.length:g} m, by softreach {__version__}. SI units, world frame.
+   Tips are exact to {known.tol:g} L while activations are within their bounds:
+{"".join(bundles)}*/
+#ifndef UPPER_H
+#define UPPER_H
+#if defined(__GNUC__)
+#define UPPER_API static __attribute__((unused))
+#else
+#define UPPER_API static
+#endif
+#define UPPER_INPUTS {box.bundles}
+""" + _arrays(
+        {"double NAME_low[UPPER_INPUTS]": box.low, "double NAME_high[UPPER_INPUTS]": box.high}
     )
 
 
-def _sizes(table: Array) -> str:
-    return f"#define UPPER_STEPS {table.shape[0]}\n#define UPPER_ROWS {table.shape[1]}\n"
-
-
-def _plain(label: str) -> str:
-    """A name that ends no comment."""
-    return label.encode("ascii", "replace").decode().replace("*/", "")
-
-
-def array_in_c(head: str, values: Array) -> str:
-    """An initialized array with this head, of numbers that C reads back to the last bit."""
-    digits = ".9g" if values.dtype == np.float32 else ""
-    numbers = [format(value, digits) for value in values.ravel().tolist()]
-    lines = [", ".join(numbers[k : k + _A_LINE]) for k in range(0, len(numbers), _A_LINE)]
-    return f"{head} = {{\n    " + ",\n    ".join(lines) + "\n};\n"
+def _arrays(arrays: Mapping[str, Array]) -> str:
+    """Constant arrays by what declares them, of numbers that C reads back to the last bit."""
+    text = ""
+    for head, values in arrays.items():
+        digits = ".9g" if values.dtype == np.float32 else ""
+        numbers = [format(value, digits) for value in values.ravel().tolist()]
+        lines = [", ".join(numbers[k : k + _A_LINE]) for k in range(0, len(numbers), _A_LINE)]
+        text += f"UPPER_API const {head} = {{\n" + ",\n".join(lines) + "\n};\n"
+    return text
 
 
 def _tables(known: ArmMap, table: Array) -> str:
     """Steps from base to tip, rows as in `kernels.rod.tips.pack`; point and base."""
-    rod, base = known.rod, known.pose
-    assert isinstance(rod, FreeRod)
-    constants = {
+    assert isinstance(known.rod, FreeRod)
+    arrays = {
         "table[UPPER_STEPS * UPPER_ROWS * (UPPER_INPUTS + 1)]": table,
-        "point[3]": rod.offset,
-        "base[3]": np.array(base.position),
-        "axes[9]": np.array(base.rotation),
+        "point[3]": known.rod.offset,
+        "base[3]": np.array(known.pose.position),
+        "axes[9]": np.array(known.pose.rotation),
     }
-    heads = {f"UPPER_API const double NAME_{head}": value for head, value in constants.items()}
-    return "".join(array_in_c(head, value) for head, value in heads.items())
+    sizes = f"#define UPPER_STEPS {table.shape[0]}\n#define UPPER_ROWS {table.shape[1]}\n"
+    return sizes + _arrays({f"double NAME_{head}": value for head, value in arrays.items()})
 
 
-def _formulas() -> str:
+def _formulas(rows: int) -> str:
     """Exponent of a step, how it moves points and turns directions, and its derivative."""
-    w, v = "const double w[6]", "const double v[15]"
+    w, v, t = "const double w[6]", f"const double v[{rows}]", f"const double t[{rows}]"
+    sizes = {"v": rows, "t": rows, "w": 6, "x": 6, "p": 3}
     parts = {
-        f"exponent({v}, double w[6])": (_exponent, {"v": NODE_ROWS}, "w"),
-        f"move({w}, double p[3])": (act, {"w": 6, "p": 3}, "p"),
-        f"turn({w}, double d[3])": (_turn, {"w": 6, "d": 3}, "d"),
-        f"column({v}, const double t[15], {w}, double x[6])": (
-            _column,
-            {"v": NODE_ROWS, "t": NODE_ROWS, "w": 6, "x": 6},
-            "x",
-        ),
+        f"exponent({v}, double w[6])": (_exponent, "v", "w"),
+        f"move({w}, double p[3])": (act, "wp", "p"),
+        f"turn({w}, double p[3])": (_turn, "wp", "p"),
+        f"column({v}, {t}, {w}, double x[6])": (_column, "vtwx", "x"),
     }
-    return "\n".join(
-        function_in_c(f"static void NAME_{head}", *part) for head, part in parts.items()
+    return "".join(
+        function_in_c(
+            f"static void NAME_{head}", formula, {name: sizes[name] for name in inputs}, out
+        )
+        for head, (formula, inputs, out) in parts.items()
     )
 
 
 def _nodes(v):
-    base, middle, tip = v[0:4], v[4:8], v[8:12]
+    lengths = v[12:15] if len(v) > BEND_ROWS else (v[0], v[4], v[8])
     return (
-        node_twist(base[0], base[1], base[2], base[3], v[12]),
-        node_twist(middle[0], middle[1], middle[2], middle[3], v[13]),
-        node_twist(tip[0], tip[1], tip[2], tip[3], v[14]),
+        node_twist(v[0], v[1], v[2], v[3], lengths[0]),
+        node_twist(v[4], v[5], v[6], v[7], lengths[1]),
+        node_twist(v[8], v[9], v[10], v[11], lengths[2]),
     )
 
 
@@ -215,10 +188,9 @@ def _column(v, t, w, x):
 
 
 def _lookup(lookup: InverseTable) -> str:
-    nx, ny, nz = lookup.rows.shape
-    sizes = f"#define UPPER_NX {nx}\n#define UPPER_NY {ny}\n#define UPPER_NZ {nz}\n"
-    sizes += "/* Largest distance of a tip from its place [m] */\n"
-    sizes += f"#define UPPER_ERROR {lookup.error!r}\n"
+    sizes = [
+        f"#define UPPER_N{axis} {n}\n" for axis, n in zip("XYZ", lookup.rows.shape, strict=True)
+    ]
     grid, count = "[UPPER_NX * UPPER_NY * UPPER_NZ]", len(lookup.activations)
     arrays = {
         "double NAME_origin[3]": lookup.origin,
@@ -227,19 +199,17 @@ def _lookup(lookup: InverseTable) -> str:
         f"unsigned char NAME_cells{grid}": lookup.cells,
         f"float NAME_nodes[{count} * UPPER_INPUTS]": lookup.activations,
     }
-    parts = [array_in_c(f"UPPER_API const {head}", value) for head, value in arrays.items()]
-    return "".join([sizes, *parts, _LOOKUP])
+    error = f"#define UPPER_ERROR {lookup.error!r} /* m, from a tip to its place at most */\n"
+    return "".join([*sizes, error, _arrays(arrays), _LOOKUP])
 
 
-_LOOKUP = """
-/* Activations for a place [m], 1 where the table has an answer: the tip is UPPER_ERROR from the
-   place at most. Else 0, and the activations are left as they are. */
+_LOOKUP = """/* Activations for a place [m], and 1, where the table has an answer; else 0. */
 UPPER_API int NAME_lookup(const double place[3], double activations[UPPER_INPUTS])
 {
     const int size[3] = {UPPER_NX, UPPER_NY, UPPER_NZ};
-    double share[3], weight, sum[UPPER_INPUTS] = {0.0};
-    int i, j, corner, at[3];
-    for (i = 0; i < 3; i++) {
+    double share[3], sum[UPPER_INPUTS] = {0.0};
+    int at[3];
+    for (int i = 0; i < 3; i++) {
         share[i] = (place[i] - NAME_origin[i]) / NAME_spacing[0];
         if (!(share[i] >= 0.0 && share[i] < size[i] - 1))
             return 0;
@@ -248,15 +218,15 @@ UPPER_API int NAME_lookup(const double place[3], double activations[UPPER_INPUTS
     }
     if (!NAME_cells[(at[0] * UPPER_NY + at[1]) * UPPER_NZ + at[2]])
         return 0;
-    for (corner = 0; corner < 8; corner++) {
+    for (int corner = 0; corner < 8; corner++) {
         const int x = corner >> 2, y = (corner >> 1) & 1, z = corner & 1;
         const int row = NAME_rows[((at[0] + x) * UPPER_NY + at[1] + y) * UPPER_NZ + at[2] + z];
-        weight = (x ? share[0] : 1.0 - share[0]) * (y ? share[1] : 1.0 - share[1])
-               * (z ? share[2] : 1.0 - share[2]);
-        for (j = 0; j < UPPER_INPUTS; j++)
+        const double weight = (x ? share[0] : 1.0 - share[0]) * (y ? share[1] : 1.0 - share[1])
+                              * (z ? share[2] : 1.0 - share[2]);
+        for (int j = 0; j < UPPER_INPUTS; j++)
             sum[j] += weight * NAME_nodes[row * UPPER_INPUTS + j];
     }
-    for (j = 0; j < UPPER_INPUTS; j++) {
+    for (int j = 0; j < UPPER_INPUTS; j++) {
         activations[j] = sum[j] < NAME_low[j] ? NAME_low[j] : sum[j];
         activations[j] = activations[j] > NAME_high[j] ? NAME_high[j] : activations[j];
     }
@@ -264,109 +234,71 @@ UPPER_API int NAME_lookup(const double place[3], double activations[UPPER_INPUTS
 }
 """
 
-_WALKS = """/* Rows of the table of step k: their column j, or their values at an activation. */
-static void NAME_lengths(double v[15])
+_WALKS = """/* A vector in the world of one in the frame of the base. */
+static void NAME_to_world(const double d[3], double out[3])
 {
-#if UPPER_ROWS == 12
-    v[12] = v[0];
-    v[13] = v[4];
-    v[14] = v[8];
-#else
-    (void)v;
-#endif
+    const double *a = NAME_axes;
+    for (int i = 0; i < 3; i++, a += 3)
+        out[i] = a[0] * d[0] + a[1] * d[1] + a[2] * d[2];
 }
 
-static void NAME_weights(int k, int j, double t[15])
+/* From tip to base; d are directors, x twists (omega, v) by the activations, each if not null. */
+static void NAME_walk(const double *activations, double *tip, double *p, double d[3][3],
+                      double x[UPPER_INPUTS][6])
 {
-    int row;
-    for (row = 0; row < UPPER_ROWS; row++)
-        t[row] = NAME_table[(k * UPPER_ROWS + row) * (UPPER_INPUTS + 1) + j];
-    NAME_lengths(t);
-}
-
-static void NAME_values(int k, const double *activations, double v[15])
-{
-    int row, j;
-    const double *weight = NAME_table + k * UPPER_ROWS * (UPPER_INPUTS + 1);
-    for (row = 0; row < UPPER_ROWS; row++, weight += UPPER_INPUTS + 1) {
-        v[row] = weight[UPPER_INPUTS];
-        for (j = 0; j < UPPER_INPUTS; j++)
-            v[row] += weight[j] * activations[j];
+    for (int i = 0; i < 3; i++)
+        p[i] = NAME_point[i];
+    for (int k = UPPER_STEPS - 1; k >= 0; k--) {
+        double v[UPPER_ROWS], t[UPPER_ROWS], w[6];
+        const int columns = UPPER_INPUTS + 1;
+        const double *rows = NAME_table + k * UPPER_ROWS * columns;
+        for (int row = 0; row < UPPER_ROWS; row++) {
+            v[row] = rows[row * columns + UPPER_INPUTS];
+            for (int j = 0; j < UPPER_INPUTS; j++)
+                v[row] += rows[row * columns + j] * activations[j];
+        }
+        NAME_exponent(v, w);
+        NAME_move(w, p);
+        for (int i = 0; d && i < 3; i++)
+            NAME_turn(w, d[i]);
+        for (int j = 0; x && j < UPPER_INPUTS; j++) {
+            for (int row = 0; row < UPPER_ROWS; row++)
+                t[row] = rows[row * columns + j];
+            NAME_column(v, t, w, x[j]);
+        }
     }
-    NAME_lengths(v);
-}
-
-/* From the frame of the base to the world: a direction, which may be one column of a matrix. */
-static void NAME_to_world(const double d[3], double *out, int stride)
-{
-    int i;
-    for (i = 0; i < 3; i++)
-        out[i * stride] = NAME_axes[3 * i] * d[0] + NAME_axes[3 * i + 1] * d[1]
-                        + NAME_axes[3 * i + 2] * d[2];
-}
-
-static void NAME_place(const double p[3], double tip[3])
-{
-    int i;
-    NAME_to_world(p, tip, 1);
-    for (i = 0; i < 3; i++)
+    NAME_to_world(p, tip);
+    for (int i = 0; i < 3; i++)
         tip[i] += NAME_base[i];
 }
 
 /* The tip [m] at activations. */
 UPPER_API void NAME_tip(const double activations[UPPER_INPUTS], double tip[3])
 {
-    double v[15], w[6], p[3] = {NAME_point[0], NAME_point[1], NAME_point[2]};
-    int k;
-    for (k = UPPER_STEPS - 1; k >= 0; k--) {
-        NAME_values(k, activations, v);
-        NAME_exponent(v, w);
-        NAME_move(w, p);
-    }
-    NAME_place(p, tip);
+    double p[3];
+    NAME_walk(activations, tip, p, 0, 0);
 }
 
 /* The tip [m] and the directors d1, d2, d3 of its section, as rows. */
-UPPER_API void NAME_frame(const double activations[UPPER_INPUTS], double tip[3],
-                          double directors[9])
+UPPER_API void NAME_frame(const double activations[UPPER_INPUTS], double tip[3], double rows[9])
 {
-    double v[15], w[6], p[3] = {NAME_point[0], NAME_point[1], NAME_point[2]};
-    double d[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
-    int k, i;
-    for (k = UPPER_STEPS - 1; k >= 0; k--) {
-        NAME_values(k, activations, v);
-        NAME_exponent(v, w);
-        NAME_move(w, p);
-        for (i = 0; i < 3; i++)
-            NAME_turn(w, d[i]);
-    }
-    NAME_place(p, tip);
-    for (i = 0; i < 3; i++)
-        NAME_to_world(d[i], directors + 3 * i, 1);
+    double p[3], d[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    NAME_walk(activations, tip, p, d, 0);
+    for (int i = 0; i < 3; i++)
+        NAME_to_world(d[i], rows + 3 * i);
 }
 
 /* The tip [m] and its derivatives by the activations, three rows of UPPER_INPUTS numbers. */
-UPPER_API void NAME_jacobian(const double activations[UPPER_INPUTS], double tip[3],
-                             double jacobian[3 * UPPER_INPUTS])
+UPPER_API void NAME_jacobian(const double activations[UPPER_INPUTS], double tip[3], double *slopes)
 {
-    double v[15], t[15], w[6], p[3] = {NAME_point[0], NAME_point[1], NAME_point[2]};
-    double x[UPPER_INPUTS][6] = {{0.0}}, d[3];
-    int k, j;
-    for (k = UPPER_STEPS - 1; k >= 0; k--) {
-        NAME_values(k, activations, v);
-        NAME_exponent(v, w);
-        NAME_move(w, p);
-        for (j = 0; j < UPPER_INPUTS; j++) {
-            NAME_weights(k, j, t);
-            NAME_column(v, t, w, x[j]);
-        }
-    }
-    NAME_place(p, tip);
-    for (j = 0; j < UPPER_INPUTS; j++) {
-        d[0] = x[j][3] + x[j][1] * p[2] - x[j][2] * p[1];
-        d[1] = x[j][4] + x[j][2] * p[0] - x[j][0] * p[2];
-        d[2] = x[j][5] + x[j][0] * p[1] - x[j][1] * p[0];
-        NAME_to_world(d, jacobian + j, UPPER_INPUTS);
+    double p[3], x[UPPER_INPUTS][6] = {{0.0}}, moved[3];
+    NAME_walk(activations, tip, p, 0, x);
+    for (int j = 0; j < UPPER_INPUTS; j++) {
+        const double *w = x[j], d[3] = {w[3] + w[1] * p[2] - w[2] * p[1],
+            w[4] + w[2] * p[0] - w[0] * p[2], w[5] + w[0] * p[1] - w[1] * p[0]};
+        NAME_to_world(d, moved);
+        for (int i = 0; i < 3; i++)
+            slopes[i * UPPER_INPUTS + j] = moved[i];
     }
 }
 """

@@ -14,53 +14,33 @@ Number = Any
 """A float, or an expression that stands for one."""
 
 
-class _Statements:
-    """Numbers `tN = a op b` by their terms, in their order."""
-
-    def __init__(self) -> None:
-        self.known: dict[tuple[str, str, str], str] = {}
-
-    def named(self, operator: str, a: Number, b: Number) -> _Expression:
-        name = self.known.setdefault((operator, _text(a), _text(b)), f"t{len(self.known)}")
-        return _Expression(self, name)
-
-    def lines(self, results: list[str]) -> list[str]:
-        """Those that lead to some results."""
-        needed, lines = {*results}, list[str]()
-        for (operator, a, b), name in reversed(self.known.items()):
-            if name in needed:
-                needed |= {a, b}
-                lines.append(f"const double {name} = {a} {operator} {b};")
-        return lines[::-1]
-
-
 class _Expression:
-    """The name of a number in C."""
+    """The name of a number in C; `known` has the names of all numbers `a op b`, in their order."""
 
-    def __init__(self, statements: _Statements, name: str) -> None:
-        self.statements, self.name = statements, name
+    def __init__(self, known: dict[tuple[str, str, str], str], name: str) -> None:
+        self.known, self.name = known, name
+
+    def _named(self, operator: str, a: Number, b: Number) -> _Expression:
+        key = operator, _text(a), _text(b)
+        return _Expression(self.known, self.known.setdefault(key, f"t{len(self.known)}"))
 
     def __add__(self, other: Number) -> Number:
-        return self if other == 0.0 else self.statements.named("+", self, other)
-
-    def __radd__(self, other: Number) -> Number:
-        return self if other == 0.0 else self.statements.named("+", other, self)
+        return self if other == 0.0 else self._named("+", self, other)
 
     def __sub__(self, other: Number) -> Number:
-        return self if other == 0.0 else self.statements.named("-", self, other)
+        return self if other == 0.0 else self._named("-", self, other)
 
     def __rsub__(self, other: Number) -> Number:
-        return self.statements.named("-", other, self)
+        return self._named("-", other, self)
 
     def __mul__(self, other: Number) -> Number:
-        if other == 0.0:
-            return 0.0
-        return self if other == 1.0 else self.statements.named("*", self, other)
-
-    __rmul__ = __mul__
+        same = self if other == 1.0 else None
+        return 0.0 if other == 0.0 else same or self._named("*", self, other)
 
     def __truediv__(self, other: Number) -> Number:
-        return self.statements.named("/", self, other)
+        return self._named("/", self, other)
+
+    __radd__, __rmul__ = __add__, __mul__
 
 
 def function_in_c(
@@ -71,15 +51,19 @@ def function_in_c(
     `formula` takes a tuple for each of them, and gives what goes to the array `out`, which may be
     one of the inputs.
     """
-    statements = _Statements()
+    known: dict[tuple[str, str, str], str] = {}
     arrays = [
-        tuple(_Expression(statements, f"{name}[{i}]") for i in range(size))
+        tuple(_Expression(known, f"{name}[{i}]") for i in range(size))
         for name, size in inputs.items()
     ]
     numbers = [_text(number) for number in plain(formula)(*arrays)]
-    results = [f"{out}[{i}] = {number};" for i, number in enumerate(numbers)]
-    lines = [*statements.lines(numbers), *results]
-    return "\n".join([head, "{", *(f"    {line}" for line in lines), "}", ""])
+    needed = {*numbers}
+    lines = [f"{out}[{i}] = {number};" for i, number in enumerate(numbers)][::-1]
+    for (operator, a, b), name in reversed(known.items()):
+        if name in needed:
+            needed |= {a, b}
+            lines.append(f"const double {name} = {a} {operator} {b};")
+    return "\n".join([head, "{", *(f"    {line}" for line in reversed(lines)), "}", ""])
 
 
 @cache

@@ -1,8 +1,7 @@
 """A table of the inverse for fast loops: activations at the nodes of a grid, linear between them.
 
-Nodes are solved from their neighbors, so that activations go on continuously from the middle of the
-bounds outward; with more bundles than three they are then evened out, as in every family of
-solutions some are. What is continuous is decided by the error: cells are kept whose tips are right.
+Nodes are solved from their neighbors, with little change of activation, so that these go on
+continuously from the middle of the bounds outward. Cells are kept whose tips are right.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ from softreach.inverse.roots import descend
 from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
+from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_number, as_path
 from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import InvalidInput, NotPossible, Range
@@ -32,11 +32,11 @@ _SAMPLES = 1 << 13
 _MOST_NODES = 4_000_000
 _RESIDUAL = 1e-9  # of nodes, in L
 _FARTHEST = 0.5  # of the ranges, between neighbors on one branch
-_EVENED = 12  # times that nodes take the mean of their neighbors
 _SHARES = np.array(list(product(np.linspace(0.0, 1.0, 5), repeat=3)))  # of a cell, where it is held
 _SAFETY = 1.25  # of the largest error there: linear tables err most at middles, which are there
 _CELLS = 4096  # held to their tips together
 _CORNERS = np.array(list(product((0, 1), repeat=3)))
+_NEIGHBORS = np.concatenate([np.eye(3, dtype=int), -np.eye(3, dtype=int)])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,11 +76,6 @@ class InverseTable:
             weight = np.where(corner, share, 1.0 - share).prod(axis=1)
             gamma += weight[:, None] * self.activations[self.rows[tuple((cell + corner).T)]]
         return gamma.clip(*self.arm.input_bounds.T)
-
-    @property
-    def volume(self) -> float:
-        """Volume of all cells that have an answer [m³]."""
-        return float(self.cells.sum() * self.spacing**3)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the arrays under their names as a file of NumPy, .npz.
@@ -137,7 +132,6 @@ def inverse_table(
         raise InvalidInput("free bundles", known.box.dimension, "3 or more, for places in space")
     nodes = _Nodes(known, spacing)
     nodes.flood()
-    nodes.even()
     cells, error = nodes.judged(most)
     if not cells.any():
         raise NotPossible(
@@ -177,10 +171,6 @@ class _Nodes:
             raise NotPossible("the table has too many nodes: make `spacing_over_length` larger")
         self.gamma = np.full((*self.shape, box.bundles), np.nan, np.float32)
 
-    def places(self, node: Index) -> Array:
-        """Of nodes (n, 3) [m]."""
-        return self.origin + self.spacing * node
-
     def flood(self) -> None:
         """Solve nodes beside solved ones, beginning at those beside tips of samples."""
         order = np.argsort(-self.known.box.margin(self.samples), kind="stable")
@@ -194,11 +184,8 @@ class _Nodes:
 
     def _beside(self, front: Index) -> tuple[Index, Array]:
         """Unsolved neighbors of nodes, each once, and activations to begin with."""
-        every, origin = [], []
-        for step in (*np.eye(3, dtype=int), *-np.eye(3, dtype=int)):
-            every.append(front + step)
-            origin.append(front)
-        node, start = np.concatenate(every), np.concatenate(origin)
+        node = (front + _NEIGHBORS[:, None]).reshape(-1, 3)
+        start = np.tile(front, (len(_NEIGHBORS), 1))
         fits = ((node >= 0) & (node < self.shape)).all(axis=1)
         node, start = node[fits], start[fits]
         new = np.isnan(self.gamma[tuple(node.T)][:, 0])
@@ -210,52 +197,29 @@ class _Nodes:
         if not len(node):
             return node
         box, residual = self.known.box, _RESIDUAL * self.known.length
-        ends = descend(self.known, self.places(node), box.clip(start), residual, 30)
+        ends = descend(self.known, self.origin + self.spacing * node, box.clip(start), residual, 30)
         change = np.abs((ends.gamma - start) / box.scales).max(axis=1)
-        good = (ends.distance <= max(residual, self.known.tol * self.known.length)) & (
-            change <= farthest
-        )
+        good = (ends.distance <= self.known.tol * self.known.length) & (change <= farthest)
         self.gamma[tuple(node[good].T)] = ends.gamma[good]
         return node[good]
 
-    def even(self) -> None:
-        """Let nodes of a family of solutions take those nearest to the mean of their neighbors."""
-        if self.known.box.dimension == 3:
-            return
-        node = np.argwhere(np.isfinite(self.gamma[..., 0]))
-        for _ in range(_EVENED):
-            padded = np.pad(self.gamma, ((1, 1), (1, 1), (1, 1), (0, 0)), constant_values=np.nan)
-            beside = [
-                padded[tuple((node + 1 + step).T)]
-                for step in (*np.eye(3, dtype=int), *-np.eye(3, dtype=int))
-            ]
-            total, count = np.nansum(beside, axis=0), np.isfinite(beside).sum(axis=0)
-            own = self.gamma[tuple(node.T)]
-            mean = np.where(count > 0, total / np.maximum(count, 1), own).astype(float)
-            self._solve(node, mean, _FARTHEST)
-
     def judged(self, most: float) -> tuple[NDArray[np.bool_], float]:
         """Cells with an error up to `most` [m], by their lower corner, and the largest error."""
-        solved = np.isfinite(self.gamma[..., 0])
-        cells = np.zeros(self.shape, bool)
-        nx, ny, nz = (n - 1 for n in self.shape)
-        whole = np.ones((nx, ny, nz), bool)
-        for i, j, k in _CORNERS:
-            whole &= solved[i : i + nx, j : j + ny, k : k + nz]
-        at, largest = np.argwhere(whole), 0.0
-        for first in range(0, len(at), _CELLS):
-            part = at[first : first + _CELLS]
-            errors = self._errors(part)
+        solved, cells, largest = np.isfinite(self.gamma[..., 0]), np.zeros(self.shape, bool), 0.0
+        at = np.argwhere(solved[:-1, :-1, :-1])
+        at = at[solved[tuple((at[:, None] + _CORNERS).transpose(2, 0, 1))].all(axis=1)]
+        for block in parallel.blocks(len(at), _CELLS):
+            errors = self._errors(at[block])
             good = errors <= most
-            cells[tuple(part[good].T)] = True
-            largest = max(largest, errors[good].max(initial=0.0))
-        return cells, float(largest)
+            cells[tuple(at[block][good].T)] = True
+            largest = max(largest, float(errors[good].max(initial=0.0)))
+        return cells, largest
 
     def _errors(self, cell: Index) -> Array:
         """Largest distance of tips from their places in cells (n, 3) [m], and more, shape (n,)."""
         weights = np.where(_CORNERS, _SHARES[:, None], 1.0 - _SHARES[:, None]).prod(axis=2)
         corners = self.gamma[tuple((cell[:, None] + _CORNERS).transpose(2, 0, 1))].astype(float)
-        gamma = np.einsum("sc,ncb->nsb", weights, corners)
-        tips = self.known.tips(self.known.box.clip(gamma.reshape(-1, gamma.shape[2])))
-        away = tips.reshape(len(cell), -1, 3) - self.places(cell[:, None] + _SHARES)
+        gamma = np.einsum("sc,ncb->nsb", weights, corners).reshape(-1, corners.shape[2])
+        tips = self.known.tips(self.known.box.clip(gamma)).reshape(len(cell), -1, 3)
+        away = tips - self.origin - self.spacing * (cell[:, None] + _SHARES)
         return _SAFETY * np.nan_to_num(np.linalg.norm(away, axis=2), nan=np.inf).max(axis=1)

@@ -1,8 +1,7 @@
 """A control step: activations that bring the tip of an arm toward a target, in bounded time.
 
-A step takes two or three damped Gauss-Newton steps within the bounds and within what the rate
-allows. Each is the exact minimum of ½|J dx - e|² + ½ s|dx|² in that box; what brings the tip no
-nearer is not taken and raises the damping s, which later steps inherit.
+A step takes two or three damped Gauss-Newton steps within the bounds and what the rate allows. What
+brings the tip no nearer is not taken and raises the damping, which later steps inherit.
 """
 
 from __future__ import annotations
@@ -14,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.kernels.box.bounded_descent import box_minimum
+from softreach.kernels.box.bounded_descent import box_steps
+from softreach.kernels.box.box_projection import project
 from softreach.rod.loaded.postures import PosturesBeside
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
+from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import TipMap, TipOutputs
 from softreach.stiffness import tip_compliance
 from softreach.support.arguments import POSITIVE, as_number
@@ -41,8 +41,6 @@ class TrackingStep:
     """Inputs of the arm, each in its own unit, shape (bundles,)."""
     tip: Array
     """Its tip [m], shape (3,)."""
-    tip_direction: Array | None
-    """Tangent d3 of the tip [-], shape (3,), where a direction is wanted."""
     jacobian: Array
     """∂r/∂γ of the tip [m per unit of each activation], shape (3, bundles)."""
     distance: float
@@ -57,8 +55,7 @@ class TrackingStep:
     """Bundles that moved as far as their rate allows."""
     snaps: bool
     """True if a way was not taken, since the arm loses its stability on it."""
-    _yielding: TipMap
-    _has_modulus: bool
+    _map: TipMap
 
     @lazy
     def compliance(self) -> Array | None:
@@ -66,17 +63,16 @@ class TrackingStep:
 
         None where it is unknown: of an arm without moduli, or of a marker.
         """
-        if not self._has_modulus or self._yielding.point is not None:
+        if self._map.arm.section.modulus_faults("") or self._map.point is not None:
             return None
-        return tip_compliance(self._yielding, self.activations[None])[0]
+        return tip_compliance(self._map, self.activations[None])[0]
 
     def __str__(self) -> str:
         angle = f" and {math.degrees(self.angle):.3g}°" if self.angle else ""
-        limits = [f"at a bound: {', '.join(self.at_bound)}"] * bool(self.at_bound)
-        limits += [f"at the rate: {', '.join(self.at_rate)}"] * bool(self.at_rate)
-        limits += ["the arm would snap"] * self.snaps
         where = "reached" if self.reached else f"{1e3 * self.distance:.3g} mm{angle} away"
-        return "; ".join([where, *limits])
+        limits = {"at a bound: ": self.at_bound, "at the rate: ": self.at_rate}
+        words = [word + ", ".join(names) for word, names in limits.items() if names]
+        return "; ".join([where, *words, *["the arm would snap"] * self.snaps])
 
 
 class Tracker:
@@ -84,8 +80,7 @@ class Tracker:
 
     A step continues from the last one: activations change by no more than the rate allows, stay
     within the bounds, and an arm under loads stays on its branch of stable postures. Out of reach
-    the tip comes as near as it can. Of more bundles than it takes those with less activation are
-    preferred.
+    the tip comes as near as it can. Of more bundles than it takes small activations are preferred.
     """
 
     def __init__(
@@ -96,7 +91,6 @@ class Tracker:
         period: float = 0.01,
         bounds: ArrayLike | None = None,
         start: ArrayLike | None = None,
-        direction_weight: float = 1.0,
         tol: float = 1e-6,
         point: str | None = None,
     ) -> None:
@@ -111,7 +105,6 @@ class Tracker:
                 those of the arm, which are the default.
             start: Activations to begin with, shape (bundles,); 0, or the bound next to it, by
                 default.
-            direction_weight: Weight of an angle of 1 rad beside a distance of L [-].
             tol: Largest tip error, in L, and the distance at which a target counts as reached.
             point: Name of the marker that counts as the tip; by default that of the design.
 
@@ -120,24 +113,30 @@ class Tracker:
             InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
             NotPossible: The arm has drives with dead zones, or no stable posture at the start.
         """
-        self._origin = _without_dead_zones(all_inputs(as_tip_map(arm, tol, point=point)))
-        box = self._origin.box
-        self.names = box.names
-        self.low, self.high = _within(bounds, box.low, box.high)
-        self.period = as_number("period", period, POSITIVE)
+        self._origin = self._map = all_inputs(as_tip_map(arm, tol, point=point))
+        if any(drive.dead_zone for drive in self._map.arm.drives):
+            raise NotPossible("drives with dead zones cannot be tracked: leave their zones out")
+        self.low, self.high = self._within(bounds).T
         self._scales = np.where(self.high > self.low, self.high - self.low, 1.0)
-        self._most = _SHARE * self._scales if rate is None else self._of_rate(rate)
-        self._weight = as_number("direction_weight", direction_weight, POSITIVE)
-        self._has_modulus = not self._origin.arm.section.modulus_faults("")
+        period = as_number("period", period, POSITIVE)
+        self._most = _SHARE * self._scales
+        if rate is not None:
+            rates = as_floats("rate", rate)
+            positive = ((rates > 0) & (rates < np.inf)).all()
+            if rates.shape not in ((), self.low.shape) or not positive:
+                raise InvalidInput("rate", rate, f"one positive number or {len(self.low)}")
+            self._most = np.broadcast_to(rates * period, self.low.shape)
         self._least = np.clip(0.0, self.low, self.high)
         self.begin(self._least if start is None else start)
 
-    def _of_rate(self, rate: ArrayLike) -> Array:
-        rates = as_floats("rate", rate)
-        if rates.shape not in ((), self.low.shape) or not (np.isfinite(rates) & (rates > 0)).all():
-            allowed = f"a positive number, or {len(self.low)} of them, per second"
-            raise InvalidInput("rate", rate, allowed)
-        return rates * self.period * np.ones(len(self.low))
+    def _within(self, bounds: ArrayLike | None) -> Array:
+        own = np.array(self._origin.box.bounds)
+        allowed = f"(lower, upper) of {len(own)} bundles within those of the arm"
+        ends = own if bounds is None else as_rows("bounds", bounds, 2, allowed)
+        inside = ends.shape == own.shape and (ends == ends.clip(own[:, :1], own[:, 1:])).all()
+        if not inside or (ends[:, 0] > ends[:, 1]).any():
+            raise InvalidInput("bounds", ends.tolist(), allowed)
+        return ends.copy()
 
     def begin(self, activations: ArrayLike) -> None:
         """Go to activations (bundles,), such as measured ones, whatever the rate.
@@ -150,7 +149,7 @@ class Tracker:
         """
         allowed = f"{len(self.low)} numbers within the bounds"
         x = as_rows("activations", activations, len(self.low), allowed)
-        if len(x) != 1 or ((x < self.low) | (x > self.high)).any():
+        if len(x) != 1 or (x != x.clip(self.low, self.high)).any():
             raise InvalidInput("activations", activations, allowed)
         self._origin.prepare()
         self._map, self._beside, rod = self._origin, None, self._origin.rod
@@ -159,10 +158,9 @@ class Tracker:
             known = rod.equilibria(inner)
             if not known.is_stable[0]:
                 raise NotPossible("the arm has no stable posture at the start: lighten its loads")
-            self._beside = PosturesBeside.of(rod.postures, known.frame)
+            self._beside = _beside(rod, known.frame)
             inputs = self._origin.inputs.continued_from(inner, known.frame)
-            held = rod.with_postures(self._beside)
-            self._map = replace(self._origin, rod=held, inputs=inputs)
+            self._map = replace(self._map, rod=rod.with_postures(self._beside), inputs=inputs)
         self._x, self._damping = x[0].copy(), _FIRST_DAMPING
         self._here = self._motion(self._x)
 
@@ -174,6 +172,8 @@ class Tracker:
     def step(self, target: ArrayLike, direction: ArrayLike | None = None) -> TrackingStep:
         """Move the tip toward a target [m] (3,), and to a direction (3,) of any length if given.
 
+        An angle of 1 rad counts as a distance of L.
+
         Raises:
             InvalidInput: The target or the direction is no vector of three finite numbers.
         """
@@ -181,34 +181,30 @@ class Tracker:
         if len(place) != 1:
             raise InvalidInput("target", target, "one place, shape (3,)")
         wanted = None if direction is None else as_directions("direction", direction, 1)[0]
-        low = np.maximum(self.low, self._x - self._most)
-        high = np.minimum(self.high, self._x + self._most)
-        before, snaps = self._x, self._advance(place[0], wanted, low, high)
+        before, snaps = self._x, self._advance(place[0], wanted)
         return self._result(place[0], wanted, before, snaps)
 
-    def _advance(self, target: Array, wanted: Array | None, low: Array, high: Array) -> bool:
+    def _advance(self, target: Array, wanted: Array | None) -> bool:
         """Take the trials that lead nearer; whether one ended where the arm is not stable."""
+        low = np.maximum(self.low, self._x - self._most)
+        high = np.minimum(self.high, self._x + self._most)
         if wanted is not None and self._here.directions is None:
             self._here = self._motion(self._x, directed=True)
         error, slope = self._rows(self._here, target, wanted)
-        size, snaps, stale = math.sqrt(error @ error), False, False
+        size, snaps, motion = math.sqrt(error @ error), False, self._here
         for k in range(_TRIALS if wanted is None else _DIRECTED_TRIALS):
-            if size <= _ENOUGH * self._origin.tol:
+            ease = _EASE * (k == 0 and self._damping <= _FIRST_DAMPING)
+            trial = self._trial(error, slope, low, high, ease)
+            if size <= _ENOUGH * self._origin.tol or (trial == self._x).all():
                 break
-            eases = k == 0 and self._damping <= _FIRST_DAMPING
-            trial = self._trial(error, slope, low, high, _EASE * eases)
-            if (trial == self._x).all():
-                break
-            motion = None
             if wanted is None:
-                there = self._broyden(trial, target, error, slope)
+                motion, there = None, self._broyden(trial, target, error, slope)
             else:
                 motion = self._motion(trial, directed=True)
                 there = self._rows(motion, target, wanted)
             ahead = math.sqrt(there[0] @ there[0])
             if ahead < size:
-                self._x, self._here, stale = trial, motion or self._here, motion is None
-                (error, slope), size = there, ahead
+                self._x, self._here, (error, slope), size = trial, motion, there, ahead
                 if self._beside is not None:
                     self._beside.frame[:] = self._beside.found
                 self._damping = max(0.1 * self._damping, _LEAST_DAMPING)
@@ -216,9 +212,8 @@ class Tracker:
                 lost = not math.isfinite(ahead)
                 snaps |= lost
                 self._damping *= 1e4 if lost else 10.0
-                self._damping = min(max(self._damping, 1e-6), _LARGEST_DAMPING)
-        if stale:
-            self._here = self._motion(self._x)
+                self._damping = min(max(self._damping, _FIRST_DAMPING), _LARGEST_DAMPING)
+        self._here = self._here or self._motion(self._x)
         return snaps
 
     def _trial(self, error: Array, slope: Array, low: Array, high: Array, ease: float) -> Array:
@@ -226,13 +221,18 @@ class Tracker:
 
         What does not move the tip eases by a part of the way to the activations of least size.
         """
-        scaled, step = slope * self._scales, np.empty((1, len(low)))
-        hessian = scaled.T @ scaled
-        softness = self._damping * np.trace(hessian) / 3.0 + 1e-300
-        hessian.flat[:: len(low) + 1] += softness
-        gradient = softness * ease * (self._x - self._least) / self._scales - scaled.T @ error
-        ends = (low - self._x) / self._scales, (high - self._x) / self._scales
-        box_minimum(hessian[None], gradient, *ends, step)
+        scaled = slope * self._scales
+        softness = self._damping * (scaled * scaled).sum() / 3.0 + 1e-300
+        ends = ((low - self._x) / self._scales)[None], ((high - self._x) / self._scales)[None]
+        center, step = ease * ((self._least - self._x) / self._scales)[None], np.empty_like(ends[0])
+        if len(error) == 3:
+            given = scaled[None], error[None], np.array([softness])
+            project(center, *given, *ends, step, np.zeros((1, 3)))
+        else:
+            hessian = scaled.T @ scaled + softness * np.eye(len(low))
+            gradient = -(scaled.T @ error)[None]
+            none = np.zeros_like(center)
+            box_steps(none, gradient, hessian[None], np.zeros(1), ends[0][0], ends[1][0], step)
         return np.clip(self._x + step[0] * self._scales, low, high)
 
     def _broyden(
@@ -257,79 +257,49 @@ class Tracker:
         return out
 
     def _rows(self, motion: TipOutputs, target: Array, wanted: Array | None) -> tuple[Array, Array]:
-        """What is missing, in L and in weighted rad, and its derivatives by the activations."""
-        length, tip = self._origin.length, motion.tips[0]
+        """What is missing, in L and in rad, and its derivatives by the activations."""
         assert motion.slopes is not None
-        error, slope = (target - tip) / length, motion.slopes[0] / length
-        if wanted is None:
+        length = self._origin.length
+        error, slope = (target - motion.tips[0]) / length, motion.slopes[0] / length
+        if wanted is None or motion.twists is None or motion.directions is None:
             return error, slope
-        assert motion.twists is not None
-        assert motion.directions is not None
-        d = motion.directions[0]
-        turn = motion.twists[0, 3:] - np.outer(d, d @ motion.twists[0, 3:])
-        missing = _angle(d, wanted) * _axis(d, wanted)
-        return np.append(error, self._weight * missing), np.append(slope, self._weight * turn, 0)
+        d, turn = motion.directions[0], motion.twists[0, 3:]
+        across = np.cross(d, wanted)
+        missing = _angle(d, wanted) * across / max(float(np.linalg.norm(across)), 1e-300)
+        return np.append(error, missing), np.append(slope, turn - np.outer(d, d @ turn), 0)
 
     def _result(
         self, target: Array, wanted: Array | None, before: Array, snaps: bool
     ) -> TrackingStep:
-        x, here, tol = self._x, self._here, self._origin.tol
+        x, here, length = self._x, self._here, self._origin.length
         assert here.slopes is not None
-        away, angle, pointing = target - here.tips[0], 0.0, None
-        distance = math.sqrt(away @ away)
+        distance, angle = float(np.linalg.norm(target - here.tips[0])), 0.0
         if wanted is not None and here.directions is not None:
-            pointing = here.directions[0]
-            angle = _angle(pointing, wanted)
-        close, yielding = _AT_END * self._scales, self._map
+            angle = _angle(here.directions[0], wanted)
+        close, tip_map, rod = _AT_END * self._scales, self._map, self._map.rod
         bound = (np.minimum(x - self.low, self.high - x) <= close) & (self.low < self.high)
         rate = np.abs(x - before) >= self._most - close
-        if self._beside is not None:
-            at = PosturesBeside.of(self._beside, self._beside.frame)
-            assert isinstance(self._map.rod, LoadedRod)
-            yielding = replace(self._map, rod=self._map.rod.with_postures(at))
+        if self._beside is not None and isinstance(rod, LoadedRod):  # it will have moved on
+            tip_map = replace(tip_map, rod=rod.with_postures(_beside(rod, self._beside.frame)))
+        names = np.array(self._origin.box.names, object)
         return TrackingStep(
             activations=x.copy(),
             tip=here.tips[0],
-            tip_direction=pointing,
             jacobian=here.slopes[0],
             distance=distance,
             angle=angle,
-            reached=distance <= tol * self._origin.length and angle <= tol,
-            at_bound=tuple(self.names[k] for k in np.flatnonzero(bound)),
-            at_rate=tuple(self.names[k] for k in np.flatnonzero(rate)),
+            reached=max(distance / length, angle) <= self._origin.tol,
+            at_bound=tuple(names[bound]),
+            at_rate=tuple(names[rate]),
             snaps=snaps,
-            _yielding=yielding,
-            _has_modulus=self._has_modulus,
+            _map=tip_map,
         )
 
 
-def _within(bounds: ArrayLike | None, low: Array, high: Array) -> tuple[Array, Array]:
-    if bounds is None:
-        return low, high
-    allowed = f"(lower, upper) of {len(low)} bundles within those of the arm"
-    ends = as_rows("bounds", bounds, 2, allowed)
-    within = len(ends) == len(low) and (ends[:, 0] <= ends[:, 1]).all()
-    if not within or (ends[:, 0] < low).any() or (ends[:, 1] > high).any():
-        raise InvalidInput("bounds", ends.tolist(), allowed)
-    return ends[:, 0].copy(), ends[:, 1].copy()
-
-
-def _without_dead_zones(known: ArmMap) -> ArmMap:
-    if any(drive.dead_zone for drive in known.arm.drives):
-        raise NotPossible(
-            "a tracker does not move drives with dead zones: track without them, and let the "
-            "controller add them"
-        )
-    return known
+def _beside(rod: LoadedRod, frame: Array) -> PosturesBeside:
+    known = rod.postures
+    return PosturesBeside(known.solver, known.side, frame=frame.copy(), found=frame.copy())
 
 
 def _angle(d: Array, wanted: Array) -> float:
     return math.atan2(float(np.linalg.norm(np.cross(d, wanted))), float(d @ wanted))
-
-
-def _axis(d: Array, wanted: Array) -> Array:
-    """About which d turns to what is wanted; any one across where they are opposite."""
-    axis = np.cross(d, wanted)
-    if not axis.any():
-        axis = np.cross(d, np.eye(3)[np.abs(d).argmin()])
-    return np.asarray(axis / np.linalg.norm(axis), float)

@@ -324,29 +324,19 @@ class ContinuedPostures(Postures):
 
 @dataclass(frozen=True, eq=False)
 class PosturesBeside(Postures):
-    """Those beside a posture that the arm is in, by one search each; undecided where it fails.
+    """Those within half a radian of one that the arm is in, by one search each.
 
-    Time is bounded so. The posture that was found last is in `found`; whoever accepts it moves
-    `frame` there.
+    `frame` is that of the posture, and `found` of the last that was found, (1, component).
     """
 
     frame: Array = field(kw_only=True)
-    """How the arm sees the world in its posture, shape (1, component)."""
     found: Array = field(kw_only=True)
-    """The same of what was found last, shape (1, component)."""
-
-    @classmethod
-    def of(cls, postures: Postures, frame: Array) -> PosturesBeside:
-        """Those beside a posture with this frame (1, component)."""
-        return cls(postures.solver, postures.side, frame=frame.copy(), found=frame.copy())
 
     def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
-        """Postures at activations (n, bundles), no more than half a radian from `frame`."""
-        new = self.solver.search(gamma, np.repeat(self.frame, len(gamma), axis=0))
+        new, equilibria = self.solver.search(gamma, self.frame), self.solver.empty(len(gamma))
         near = turn_between(new.frame, self.frame) < _POLISHED
-        equilibria = self.solver.empty(len(gamma))
         self.solver.put(gamma, slice(None), new.only(new.is_stable & near), equilibria)
-        self.found[:] = new.frame[-1:]
+        self.found[:] = new.frame
         return equilibria
 
 
