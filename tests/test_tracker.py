@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
 import softreach as sr
+from softreach.arm.actuators import LengthTendon
 from softreach.arm.drives import Drive
 from softreach.rod.rods import as_tip_map
 
@@ -144,13 +145,23 @@ def test_a_step_takes_as_long_as_a_few_tips_with_their_slopes(arm, most):
 def test_narrower_bounds_are_kept_and_a_measured_state_is_gone_on_from():
     bounds = np.array([[0.5, 2.0]] * 6)
     tracker = sr.models.Tracker(FREE, bounds=bounds)
-    np.testing.assert_array_equal(tracker.activations, 0.5)
+    np.testing.assert_allclose(tracker.activations, 0.5)
     for _ in range(30):
         x = tracker.step([0.3, 0.0, 0.1]).activations
     assert x.min() >= 0.5
     assert x.max() <= 2.0
     tracker.begin(np.full(6, 1.5))
-    np.testing.assert_array_equal(tracker.activations, 1.5)
+    np.testing.assert_allclose(tracker.activations, 1.5)
+
+
+def test_tendons_that_are_slack_at_the_start_are_pulled_in():
+    cables = [
+        LengthTendon(name=f"cable {k}", distance=0.008, offset=angle, activation_bounds=(0.0, 0.02))
+        for k, angle in enumerate(np.arange(3) * 2.0 * np.pi / 3.0)
+    ]
+    arm = sr.designs.three_chamber_arm().replace(actuators=tuple(cables))
+    tracker, target = sr.models.Tracker(arm), sr.tip_positions(arm, [[0.008, 0.002, 0.006]])[0]
+    assert any(tracker.step(target).reached for _ in range(40))
 
 
 DRIVE = Drive(name="left", gains={"proximal 1": 1.0}, bounds=(-1.0, 1.0), dead_zone=0.1)

@@ -104,23 +104,14 @@ def _head(known: ArmMap) -> str:
     arm, box = known.arm, known.box
     names = [name.encode("ascii", "replace").decode().replace("*/", "") for name in box.names]
     rows = zip(names, arm.input_units, box.bounds, strict=True)
-    bundles = [
-        f"   {k}: {n} [{u}], {low:g} to {high:g}\n" for k, (n, u, (low, high)) in enumerate(rows)
-    ]
+    bundles = [f"   {n} [{u}], {low:g} to {high:g}\n" for n, u, (low, high) in rows]
     return f"""/* An arm of {arm.length:g} m, by softreach {__version__}. SI units, world frame.
    Tips are exact to {known.tol:g} L while activations are within their bounds:
 {"".join(bundles)}*/
 #ifndef UPPER_H
 #define UPPER_H
-#if defined(__GNUC__)
-#define UPPER_API static __attribute__((unused))
-#else
-#define UPPER_API static
-#endif
 #define UPPER_INPUTS {box.bundles}
-""" + _arrays(
-        {"double NAME_low[UPPER_INPUTS]": box.low, "double NAME_high[UPPER_INPUTS]": box.high}
-    )
+""" + _arrays({"double NAME_low[]": box.low, "double NAME_high[]": box.high})
 
 
 def _arrays(arrays: Mapping[str, Array]) -> str:
@@ -130,7 +121,7 @@ def _arrays(arrays: Mapping[str, Array]) -> str:
         digits = ".9g" if values.dtype == np.float32 else ""
         numbers = [format(value, digits) for value in values.ravel().tolist()]
         lines = [", ".join(numbers[k : k + _A_LINE]) for k in range(0, len(numbers), _A_LINE)]
-        text += f"UPPER_API const {head} = {{\n" + ",\n".join(lines) + "\n};\n"
+        text += f"static const {head} = {{\n" + ",\n".join(lines) + "\n};\n"
     return text
 
 
@@ -138,31 +129,30 @@ def _tables(known: ArmMap, table: Array) -> str:
     """Steps from base to tip, rows as in `kernels.rod.tips.pack`; point and base."""
     assert isinstance(known.rod, FreeRod)
     arrays = {
-        "table[UPPER_STEPS * UPPER_ROWS * (UPPER_INPUTS + 1)]": table,
-        "point[3]": known.rod.offset,
-        "base[3]": np.array(known.pose.position),
-        "axes[9]": np.array(known.pose.rotation),
+        "double NAME_table[]": table,
+        "double NAME_point[3]": known.rod.offset,
+        "double NAME_base[3]": np.array(known.pose.position),
+        "double NAME_axes[9]": np.array(known.pose.rotation),
     }
     sizes = f"#define UPPER_STEPS {table.shape[0]}\n#define UPPER_ROWS {table.shape[1]}\n"
-    return sizes + _arrays({f"double NAME_{head}": value for head, value in arrays.items()})
+    return sizes + _arrays(arrays)
 
 
 def _formulas(rows: int) -> str:
     """Exponent of a step, how it moves points and turns directions, and its derivative."""
-    w, v, t = "const double w[6]", f"const double v[{rows}]", f"const double t[{rows}]"
     sizes = {"v": rows, "t": rows, "w": 6, "x": 6, "p": 3}
-    parts = {
-        f"exponent({v}, double w[6])": (_exponent, "v", "w"),
-        f"move({w}, double p[3])": (act, "wp", "p"),
-        f"turn({w}, double p[3])": (_turn, "wp", "p"),
-        f"column({v}, {t}, {w}, double x[6])": (_column, "vtwx", "x"),
+    parts = {  # what they change comes last
+        "exponent": (_exponent, "v", "w"),
+        "move": (act, "wp", "p"),
+        "turn": (_turn, "wp", "p"),
+        "column": (_column, "vtwx", "x"),
     }
-    return "".join(
-        function_in_c(
-            f"static void NAME_{head}", formula, {name: sizes[name] for name in inputs}, out
-        )
-        for head, (formula, inputs, out) in parts.items()
-    )
+    text = ""
+    for name, (formula, inputs, out) in parts.items():
+        given = [f"const double {each}[{sizes[each]}]" for each in inputs if each != out]
+        head = f"static inline void NAME_{name}({', '.join(given)}, double {out}[{sizes[out]}])"
+        text += function_in_c(head, formula, {each: sizes[each] for each in inputs}, out)
+    return text
 
 
 def _nodes(v):
@@ -175,8 +165,7 @@ def _nodes(v):
 
 
 def _exponent(v):
-    base, middle, tip = _nodes(v)
-    return exponent(base, middle, tip)
+    return exponent(*_nodes(v))
 
 
 def _turn(w, d):
@@ -188,29 +177,27 @@ def _column(v, t, w, x):
 
 
 def _lookup(lookup: InverseTable) -> str:
-    sizes = [
-        f"#define UPPER_N{axis} {n}\n" for axis, n in zip("XYZ", lookup.rows.shape, strict=True)
-    ]
-    grid, count = "[UPPER_NX * UPPER_NY * UPPER_NZ]", len(lookup.activations)
+    nx, ny, nz = lookup.rows.shape
     arrays = {
         "double NAME_origin[3]": lookup.origin,
-        "double NAME_spacing[1]": np.array([lookup.spacing]),
-        f"int NAME_rows{grid}": lookup.rows,
-        f"unsigned char NAME_cells{grid}": lookup.cells,
-        f"float NAME_nodes[{count} * UPPER_INPUTS]": lookup.activations,
+        "int NAME_rows[]": lookup.rows,
+        "unsigned char NAME_cells[]": lookup.cells,
+        "float NAME_nodes[]": lookup.activations,
     }
-    error = f"#define UPPER_ERROR {lookup.error!r} /* m, from a tip to its place at most */\n"
-    return "".join([*sizes, error, _arrays(arrays), _LOOKUP])
+    sizes = f"#define UPPER_NX {nx}\n#define UPPER_NY {ny}\n#define UPPER_NZ {nz}\n"
+    sizes += f"#define UPPER_SPACING {lookup.spacing!r} /* m, between nodes */\n"
+    sizes += f"#define UPPER_ERROR {lookup.error!r} /* m, from a tip to its place at most */\n"
+    return sizes + _arrays(arrays) + _LOOKUP
 
 
 _LOOKUP = """/* Activations for a place [m], and 1, where the table has an answer; else 0. */
-UPPER_API int NAME_lookup(const double place[3], double activations[UPPER_INPUTS])
+static inline int NAME_lookup(const double place[3], double activations[UPPER_INPUTS])
 {
     const int size[3] = {UPPER_NX, UPPER_NY, UPPER_NZ};
-    double share[3], sum[UPPER_INPUTS] = {0.0};
+    double share[3];
     int at[3];
     for (int i = 0; i < 3; i++) {
-        share[i] = (place[i] - NAME_origin[i]) / NAME_spacing[0];
+        share[i] = (place[i] - NAME_origin[i]) / UPPER_SPACING;
         if (!(share[i] >= 0.0 && share[i] < size[i] - 1))
             return 0;
         at[i] = (int)share[i];
@@ -218,16 +205,18 @@ UPPER_API int NAME_lookup(const double place[3], double activations[UPPER_INPUTS
     }
     if (!NAME_cells[(at[0] * UPPER_NY + at[1]) * UPPER_NZ + at[2]])
         return 0;
+    for (int j = 0; j < UPPER_INPUTS; j++)
+        activations[j] = 0.0;
     for (int corner = 0; corner < 8; corner++) {
         const int x = corner >> 2, y = (corner >> 1) & 1, z = corner & 1;
         const int row = NAME_rows[((at[0] + x) * UPPER_NY + at[1] + y) * UPPER_NZ + at[2] + z];
         const double weight = (x ? share[0] : 1.0 - share[0]) * (y ? share[1] : 1.0 - share[1])
                               * (z ? share[2] : 1.0 - share[2]);
         for (int j = 0; j < UPPER_INPUTS; j++)
-            sum[j] += weight * NAME_nodes[row * UPPER_INPUTS + j];
+            activations[j] += weight * NAME_nodes[row * UPPER_INPUTS + j];
     }
     for (int j = 0; j < UPPER_INPUTS; j++) {
-        activations[j] = sum[j] < NAME_low[j] ? NAME_low[j] : sum[j];
+        activations[j] = activations[j] < NAME_low[j] ? NAME_low[j] : activations[j];
         activations[j] = activations[j] > NAME_high[j] ? NAME_high[j] : activations[j];
     }
     return 1;
@@ -235,7 +224,7 @@ UPPER_API int NAME_lookup(const double place[3], double activations[UPPER_INPUTS
 """
 
 _WALKS = """/* A vector in the world of one in the frame of the base. */
-static void NAME_to_world(const double d[3], double out[3])
+static inline void NAME_to_world(const double d[3], double out[3])
 {
     const double *a = NAME_axes;
     for (int i = 0; i < 3; i++, a += 3)
@@ -243,8 +232,8 @@ static void NAME_to_world(const double d[3], double out[3])
 }
 
 /* From tip to base; d are directors, x twists (omega, v) by the activations, each if not null. */
-static void NAME_walk(const double *activations, double *tip, double *p, double d[3][3],
-                      double x[UPPER_INPUTS][6])
+static inline void NAME_walk(const double *activations, double *tip, double *p, double (*d)[3],
+                             double (*x)[6])
 {
     for (int i = 0; i < 3; i++)
         p[i] = NAME_point[i];
@@ -273,14 +262,14 @@ static void NAME_walk(const double *activations, double *tip, double *p, double 
 }
 
 /* The tip [m] at activations. */
-UPPER_API void NAME_tip(const double activations[UPPER_INPUTS], double tip[3])
+static inline void NAME_tip(const double *activations, double tip[3])
 {
     double p[3];
     NAME_walk(activations, tip, p, 0, 0);
 }
 
 /* The tip [m] and the directors d1, d2, d3 of its section, as rows. */
-UPPER_API void NAME_frame(const double activations[UPPER_INPUTS], double tip[3], double rows[9])
+static inline void NAME_frame(const double *activations, double tip[3], double rows[9])
 {
     double p[3], d[3][3] = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
     NAME_walk(activations, tip, p, d, 0);
@@ -289,7 +278,7 @@ UPPER_API void NAME_frame(const double activations[UPPER_INPUTS], double tip[3],
 }
 
 /* The tip [m] and its derivatives by the activations, three rows of UPPER_INPUTS numbers. */
-UPPER_API void NAME_jacobian(const double activations[UPPER_INPUTS], double tip[3], double *slopes)
+static inline void NAME_jacobian(const double *activations, double tip[3], double *slopes)
 {
     double p[3], x[UPPER_INPUTS][6] = {{0.0}}, moved[3];
     NAME_walk(activations, tip, p, 0, x);

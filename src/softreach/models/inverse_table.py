@@ -24,9 +24,6 @@ from softreach.support.arguments import as_flag, as_number, as_path
 from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.files.atomic import writing
-from softreach.support.files.formats import FileFormat, Formats, format_of
-
-TABLE: Formats = {".npz": FileFormat()}
 
 _SAMPLES = 1 << 13
 _MOST_NODES = 4_000_000
@@ -62,33 +59,29 @@ class InverseTable:
         """Activations, shape (n, bundles), for places (n, 3) [m]; NaN where there is no answer."""
         points = as_points("places", places)
         share = (points - self.origin) / self.spacing
-        within = (share >= 0.0) & (share < np.array(self.rows.shape) - 1)
-        inside = np.asarray(within.all(axis=1))
+        inside = np.all((share >= 0.0) & (share < np.array(self.rows.shape) - 1), axis=1)
         cell = np.where(inside[:, None], share, 0.0).astype(int)
-        inside &= self.cells[tuple(cell.T)] == 1
-        gamma = np.full((len(points), self.activations.shape[1]), np.nan)
-        gamma[inside] = self._between(cell[inside], share[inside] - cell[inside])
-        return gamma
-
-    def _between(self, cell: Index, share: Array) -> Array:
-        gamma = np.zeros((len(cell), self.activations.shape[1]))
+        known = np.flatnonzero(inside & (self.cells[tuple(cell.T)] == 1))
+        cell, share = cell[known], share[known] - cell[known]
+        between = np.zeros((len(known), self.activations.shape[1]))
         for corner in _CORNERS:
             weight = np.where(corner, share, 1.0 - share).prod(axis=1)
-            gamma += weight[:, None] * self.activations[self.rows[tuple((cell + corner).T)]]
-        return gamma.clip(*self.arm.input_bounds.T)
+            between += weight[:, None] * self.activations[self.rows[tuple((cell + corner).T)]]
+        gamma = np.full((len(points), between.shape[1]), np.nan)
+        gamma[known] = between.clip(*self.arm.input_bounds.T)
+        return gamma
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write the arrays under their names as a file of NumPy, .npz.
 
         Raises:
-            InvalidInput: The name does not end in .npz, or something else is there.
+            InvalidInput: Something else is there.
             NotWritten: It cannot be written.
         """
-        format_of(as_path("path", path), TABLE)
         names = "origin", "spacing", "rows", "cells", "activations", "error"
         arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in names}
         arrays["input_names"] = np.array(self.arm.input_names)
-        with writing(path, overwrite=as_flag("overwrite", overwrite)) as file:
+        with writing(as_path("path", path), overwrite=as_flag("overwrite", overwrite)) as file:
             np.savez_compressed(file, **arrays)
 
     def __repr__(self) -> str:
@@ -106,8 +99,8 @@ def inverse_table(
 ) -> InverseTable:
     """A table of activations over the places in reach, of an arm with or without loads.
 
-    Of several activations that reach a place, those are taken to which one comes continuously from
-    the middle of the bounds; where that leads nowhere, others.
+    Of several that reach a place those are taken that go on continuously from the middle of the
+    bounds; where that leads nowhere, others.
 
     Args:
         arm: The design, or its tip map, with three free bundles or more.
@@ -117,8 +110,7 @@ def inverse_table(
         point: Name of the marker that counts as the tip; by default that of the design.
 
     Returns:
-        The table. Its `error` is the largest of all cells that are kept, at 125 places in each,
-        and a quarter more.
+        The table, with the largest `error` of its cells at 125 places in each and a quarter more.
 
     Raises:
         InvalidInput: An argument is out of its range, or fewer than three bundles are free.
@@ -131,15 +123,11 @@ def inverse_table(
     if known.box.dimension < 3:
         raise InvalidInput("free bundles", known.box.dimension, "3 or more, for places in space")
     nodes = _Nodes(known, spacing)
-    nodes.flood()
     cells, error = nodes.judged(most)
     if not cells.any():
-        raise NotPossible(
-            f"no cell of the table is right to {most:.3g} m: make `spacing_over_length` smaller"
-        )
+        raise NotPossible(f"no cell is right to {most:.3g} m: make `spacing_over_length` smaller")
     used = np.zeros(cells.shape, bool)
-    for corner in _CORNERS:
-        used[tuple((np.argwhere(cells) + corner).T)] = True
+    used[tuple((np.argwhere(cells)[:, None] + _CORNERS).transpose(2, 0, 1))] = True
     rows = np.where(used, np.cumsum(used).reshape(used.shape) - 1, -1).astype(np.int32)
     return InverseTable(
         arm=known.arm,
@@ -158,27 +146,27 @@ class _Nodes:
     def __init__(self, known: TipMap, spacing: float) -> None:
         self.known, self.spacing = known, spacing
         box = known.box
-        self.samples = box.from_cube(sample_cube("counter", _SAMPLES, box.bundles))
-        self.tips = known.tips(self.samples)
-        found = np.isfinite(self.tips).all(axis=1)
-        self.samples, self.tips = self.samples[found], self.tips[found]
+        samples = box.from_cube(sample_cube("counter", _SAMPLES, box.bundles))
+        tips = known.tips(samples)
+        found = np.isfinite(tips[:, 0])
         if not found.any():
             raise NotPossible("no activation has a stable posture: lighten the loads")
-        low, high = self.tips.min(axis=0) / spacing, self.tips.max(axis=0) / spacing
+        low, high = np.nanmin(tips, axis=0) / spacing, np.nanmax(tips, axis=0) / spacing
         self.origin = spacing * (np.floor(low) - 1.0)
         self.shape = tuple((np.ceil(high) - np.floor(low) + 3.0).astype(int).tolist())
         if np.prod(self.shape) > _MOST_NODES:
             raise NotPossible("the table has too many nodes: make `spacing_over_length` larger")
         self.gamma = np.full((*self.shape, box.bundles), np.nan, np.float32)
+        order = np.argsort(-box.margin(samples), kind="stable")
+        self._flood(samples[order[found[order]]], tips[order[found[order]]])
 
-    def flood(self) -> None:
+    def _flood(self, samples: Array, tips: Array) -> None:
         """Solve nodes beside solved ones, beginning at those beside tips of samples."""
-        order = np.argsort(-self.known.box.margin(self.samples), kind="stable")
-        near = np.rint((self.tips[order] - self.origin) / self.spacing).astype(int)
+        near = np.rint((tips - self.origin) / self.spacing).astype(int)
         _, first = np.unique(near, axis=0, return_index=True)
         for k in np.sort(first):  # each node once, those of the middle of the bounds first
             if np.isnan(self.gamma[tuple(near[k])][0]):
-                front = self._solve(near[[k]], self.samples[order[[k]]], np.inf)
+                front = self._solve(near[[k]], samples[[k]], np.inf)
                 while len(front):
                     front = self._solve(*self._beside(front), _FARTHEST)
 
@@ -194,8 +182,6 @@ class _Nodes:
 
     def _solve(self, node: Index, start: Array, farthest: float) -> Index:
         """Put down what reaches nodes from starts, not too far from them; the nodes solved."""
-        if not len(node):
-            return node
         box, residual = self.known.box, _RESIDUAL * self.known.length
         ends = descend(self.known, self.origin + self.spacing * node, box.clip(start), residual, 30)
         change = np.abs((ends.gamma - start) / box.scales).max(axis=1)

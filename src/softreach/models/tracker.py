@@ -1,6 +1,6 @@
 """A control step: activations that bring the tip of an arm toward a target, in bounded time.
 
-A step takes two or three damped Gauss-Newton steps within the bounds and what the rate allows. What
+It takes two or three damped Gauss-Newton steps within the bounds and what the rate allows. What
 brings the tip no nearer is not taken and raises the damping, which later steps inherit.
 """
 
@@ -17,7 +17,7 @@ from softreach.kernels.box.bounded_descent import box_steps
 from softreach.kernels.box.box_projection import project
 from softreach.rod.loaded.postures import PosturesBeside
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import all_inputs, as_tip_map
+from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.tip_map import TipMap, TipOutputs
 from softreach.stiffness import tip_compliance
 from softreach.support.arguments import POSITIVE, as_number
@@ -55,7 +55,7 @@ class TrackingStep:
     """Bundles that moved as far as their rate allows."""
     snaps: bool
     """True if a way was not taken, since the arm loses its stability on it."""
-    _map: TipMap
+    _map: ArmMap
 
     @lazy
     def compliance(self) -> Array | None:
@@ -65,7 +65,7 @@ class TrackingStep:
         """
         if self._map.arm.section.modulus_faults("") or self._map.point is not None:
             return None
-        return tip_compliance(self._map, self.activations[None])[0]
+        return tip_compliance(all_inputs(self._map), self.activations[None])[0]
 
     def __str__(self) -> str:
         angle = f" and {math.degrees(self.angle):.3g}°" if self.angle else ""
@@ -103,8 +103,7 @@ class Tracker:
             period: Time between two steps [s].
             bounds: Bounds of the activations, (lower, upper) of each, shape (bundles, 2), within
                 those of the arm, which are the default.
-            start: Activations to begin with, shape (bundles,); 0, or the bound next to it, by
-                default.
+            start: Activations to begin with, shape (bundles,); by default 0, or the next bound.
             tol: Largest tip error, in L, and the distance at which a target counts as reached.
             point: Name of the marker that counts as the tip; by default that of the design.
 
@@ -113,30 +112,28 @@ class Tracker:
             InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
             NotPossible: The arm has drives with dead zones, or no stable posture at the start.
         """
-        self._origin = self._map = all_inputs(as_tip_map(arm, tol, point=point))
-        if any(drive.dead_zone for drive in self._map.arm.drives):
+        known = all_inputs(as_tip_map(arm, tol, point=point))
+        if any(drive.dead_zone for drive in known.arm.drives):
             raise NotPossible("drives with dead zones cannot be tracked: leave their zones out")
-        self.low, self.high = self._within(bounds).T
-        self._scales = np.where(self.high > self.low, self.high - self.low, 1.0)
-        period = as_number("period", period, POSITIVE)
-        self._most = _SHARE * self._scales
-        if rate is not None:
-            rates = as_floats("rate", rate)
-            positive = ((rates > 0) & (rates < np.inf)).all()
-            if rates.shape not in ((), self.low.shape) or not positive:
-                raise InvalidInput("rate", rate, f"one positive number or {len(self.low)}")
-            self._most = np.broadcast_to(rates * period, self.low.shape)
-        self._least = np.clip(0.0, self.low, self.high)
-        self.begin(self._least if start is None else start)
-
-    def _within(self, bounds: ArrayLike | None) -> Array:
-        own = np.array(self._origin.box.bounds)
+        own, self._scale = np.array(known.box.bounds), known.box.scales  # of each activation
+        inputs = replace(known.inputs, scale=tuple(self._scale.tolist()))
+        self._origin = replace(known, inputs=inputs)  # in ranges, as are all numbers here
         allowed = f"(lower, upper) of {len(own)} bundles within those of the arm"
         ends = own if bounds is None else as_rows("bounds", bounds, 2, allowed)
         inside = ends.shape == own.shape and (ends == ends.clip(own[:, :1], own[:, 1:])).all()
         if not inside or (ends[:, 0] > ends[:, 1]).any():
             raise InvalidInput("bounds", ends.tolist(), allowed)
-        return ends.copy()
+        self._ends, (low, high) = ends.T, ends.T / self._scale
+        inside = np.minimum(_AT_END, 0.5 * (high - low))  # where tendons are taut
+        self._low, self._high = low + inside, high - inside
+        self._most, self._least = np.full(len(own), _SHARE), np.clip(0.0, self._low, self._high)
+        rates = as_floats("rate", 1.0 if rate is None else rate)
+        if rates.shape not in ((), self._most.shape) or not ((rates > 0) & (rates < np.inf)).all():
+            raise InvalidInput("rate", rate, f"one positive number or {len(own)}")
+        period = as_number("period", period, POSITIVE)
+        if rate is not None:
+            self._most = rates * period / self._scale
+        self.begin(np.clip(0.0, *ends.T) if start is None else start)
 
     def begin(self, activations: ArrayLike) -> None:
         """Go to activations (bundles,), such as measured ones, whatever the rate.
@@ -147,9 +144,10 @@ class Tracker:
             InvalidInput: They have another shape or are out of the bounds.
             NotPossible: There is no stable posture.
         """
-        allowed = f"{len(self.low)} numbers within the bounds"
-        x = as_rows("activations", activations, len(self.low), allowed)
-        if len(x) != 1 or (x != x.clip(self.low, self.high)).any():
+        allowed = f"{len(self._low)} numbers within the bounds"
+        given = as_rows("activations", activations, len(self._low), allowed)
+        x = np.clip(given / self._scale, self._low, self._high)
+        if len(x) != 1 or np.abs(x - given / self._scale).max() > 2.0 * _AT_END:
             raise InvalidInput("activations", activations, allowed)
         self._origin.prepare()
         self._map, self._beside, rod = self._origin, None, self._origin.rod
@@ -158,95 +156,106 @@ class Tracker:
             known = rod.equilibria(inner)
             if not known.is_stable[0]:
                 raise NotPossible("the arm has no stable posture at the start: lighten its loads")
-            self._beside = _beside(rod, known.frame)
+            solver, side, frame = rod.postures.solver, rod.postures.side, known.frame
+            self._beside = PosturesBeside(solver, side, frame=frame, found=frame.copy())
             inputs = self._origin.inputs.continued_from(inner, known.frame)
             self._map = replace(self._map, rod=rod.with_postures(self._beside), inputs=inputs)
-        self._x, self._damping = x[0].copy(), _FIRST_DAMPING
+        self._x, self._damping = x[0], _FIRST_DAMPING
         self._here = self._motion(self._x)
 
     @property
     def activations(self) -> Array:
         """Where the arm is, each in its own unit, shape (bundles,)."""
-        return self._x.copy()
+        return np.clip(self._x * self._scale, *self._ends)
 
     def step(self, target: ArrayLike, direction: ArrayLike | None = None) -> TrackingStep:
-        """Move the tip toward a target [m] (3,), and to a direction (3,) of any length if given.
-
-        An angle of 1 rad counts as a distance of L.
+        """Move the tip toward a target [m] (3,) and a direction (3,), 1 rad of which counts as L.
 
         Raises:
             InvalidInput: The target or the direction is no vector of three finite numbers.
         """
         place = as_points("target", target)
-        if len(place) != 1:
+        if place.shape != (1, 3):
             raise InvalidInput("target", target, "one place, shape (3,)")
         wanted = None if direction is None else as_directions("direction", direction, 1)[0]
         before, snaps = self._x, self._advance(place[0], wanted)
-        return self._result(place[0], wanted, before, snaps)
+        x, here, rod, tip_map = self._x, self._here, self._map.rod, self._map
+        distance, angle = float(np.linalg.norm(place - here.tips)), 0.0
+        if wanted is not None and here.directions is not None:
+            angle = _angle(here.directions[0], wanted)
+        bound = (np.minimum(x - self._low, self._high - x) <= _AT_END) & (self._low < self._high)
+        if self._beside is not None and isinstance(rod, LoadedRod):  # it will have moved on
+            beside = replace(self._beside, frame=self._beside.frame.copy())
+            tip_map = replace(tip_map, rod=rod.with_postures(beside))
+        names = np.array(self._map.box.names, object)
+        assert here.slopes is not None
+        return TrackingStep(
+            activations=self.activations,
+            tip=here.tips[0],
+            jacobian=here.slopes[0] / self._scale,
+            distance=distance,
+            angle=angle,
+            reached=max(distance / self._map.length, angle) <= self._map.tol,
+            at_bound=tuple(names[bound]),
+            at_rate=tuple(names[np.abs(x - before) >= self._most - _AT_END]),
+            snaps=snaps,
+            _map=tip_map,
+        )
 
     def _advance(self, target: Array, wanted: Array | None) -> bool:
         """Take the trials that lead nearer; whether one ended where the arm is not stable."""
-        low = np.maximum(self.low, self._x - self._most)
-        high = np.minimum(self.high, self._x + self._most)
+        low = np.maximum(self._low, self._x - self._most)
+        high = np.minimum(self._high, self._x + self._most)
         if wanted is not None and self._here.directions is None:
             self._here = self._motion(self._x, directed=True)
         error, slope = self._rows(self._here, target, wanted)
-        size, snaps, motion = math.sqrt(error @ error), False, self._here
+        size, snaps, stale = math.sqrt(error @ error), False, False
         for k in range(_TRIALS if wanted is None else _DIRECTED_TRIALS):
             ease = _EASE * (k == 0 and self._damping <= _FIRST_DAMPING)
-            trial = self._trial(error, slope, low, high, ease)
-            if size <= _ENOUGH * self._origin.tol or (trial == self._x).all():
+            trial, motion = self._trial(error, slope, low, high, ease), self._here
+            if size <= _ENOUGH * self._map.tol or (trial == self._x).all():
                 break
             if wanted is None:
-                motion, there = None, self._broyden(trial, target, error, slope)
+                there = self._broyden(trial, target, error, slope)
             else:
                 motion = self._motion(trial, directed=True)
                 there = self._rows(motion, target, wanted)
             ahead = math.sqrt(there[0] @ there[0])
             if ahead < size:
-                self._x, self._here, (error, slope), size = trial, motion, there, ahead
+                self._x, self._here, stale = trial, motion, wanted is None
+                (error, slope), size = there, ahead
                 if self._beside is not None:
                     self._beside.frame[:] = self._beside.found
                 self._damping = max(0.1 * self._damping, _LEAST_DAMPING)
             else:
-                lost = not math.isfinite(ahead)
-                snaps |= lost
+                snaps |= (lost := not math.isfinite(ahead))
                 self._damping *= 1e4 if lost else 10.0
                 self._damping = min(max(self._damping, _FIRST_DAMPING), _LARGEST_DAMPING)
-        self._here = self._here or self._motion(self._x)
+        if stale:
+            self._here = self._motion(self._x)
         return snaps
 
     def _trial(self, error: Array, slope: Array, low: Array, high: Array, ease: float) -> Array:
-        """The end of the best step of the linear map in a box.
-
-        What does not move the tip eases by a part of the way to the activations of least size.
-        """
-        scaled = slope * self._scales
-        softness = self._damping * (scaled * scaled).sum() / 3.0 + 1e-300
-        ends = ((low - self._x) / self._scales)[None], ((high - self._x) / self._scales)[None]
-        center, step = ease * ((self._least - self._x) / self._scales)[None], np.empty_like(ends[0])
+        """The end of the best step of the linear map in a box; the rest eases to the least."""
+        softness = self._damping * (slope * slope).sum() / 3.0 + 1e-300
+        low, high = low - self._x, high - self._x
+        aim = np.where(slope.any(axis=0), self._least, self._high)  # slack tendons are pulled in
+        center, step = ease * (aim - self._x)[None], np.zeros((1, len(low)))
         if len(error) == 3:
-            given = scaled[None], error[None], np.array([softness])
-            project(center, *given, *ends, step, np.zeros((1, 3)))
+            given = slope[None], error[None], np.array([softness])
+            project(center, *given, low[None], high[None], step, np.zeros((1, 3)))
         else:
-            hessian = scaled.T @ scaled + softness * np.eye(len(low))
-            gradient = -(scaled.T @ error)[None]
-            none = np.zeros_like(center)
-            box_steps(none, gradient, hessian[None], np.zeros(1), ends[0][0], ends[1][0], step)
-        return np.clip(self._x + step[0] * self._scales, low, high)
+            hessian = slope.T @ slope + softness * np.eye(len(low))
+            gradient = -(slope.T @ error)[None]
+            box_steps(0.0 * center, gradient, hessian[None], np.zeros(1), low, high, step)
+        return np.clip(self._x + step[0], self._x + low, self._x + high)
 
-    def _broyden(
-        self, trial: Array, target: Array, error: Array, slope: Array
-    ) -> tuple[Array, Array]:
-        """What is missing at a trial, and derivatives that say so of the way there.
-
-        Tips cost a tenth of their derivatives under loads: Broyden's correction of those before.
-        """
-        tips = np.empty((1, 3))
-        self._map.fill(trial[None], TipOutputs(tips))
-        left, step = (target - tips[0]) / self._origin.length, (trial - self._x) / self._scales
-        off = error - left - slope @ (trial - self._x)
-        return left, slope + np.outer(off, step / self._scales) / (step @ step)
+    def _broyden(self, x: Array, target: Array, error: Array, slope: Array) -> tuple[Array, Array]:
+        """What is missing at a trial, and Broyden's derivatives: exact ones cost ten times that."""
+        tips, step = np.empty((1, 3)), x - self._x
+        self._map.fill(x[None], TipOutputs(tips))
+        left = (target - tips[0]) / self._origin.length
+        return left, slope + np.outer(error - left - slope @ step, step) / (step @ step)
 
     def _motion(self, x: Array, *, directed: bool = False) -> TipOutputs:
         """Tip and slopes at activations (bundles,), direction and twists if wanted."""
@@ -267,38 +276,6 @@ class Tracker:
         across = np.cross(d, wanted)
         missing = _angle(d, wanted) * across / max(float(np.linalg.norm(across)), 1e-300)
         return np.append(error, missing), np.append(slope, turn - np.outer(d, d @ turn), 0)
-
-    def _result(
-        self, target: Array, wanted: Array | None, before: Array, snaps: bool
-    ) -> TrackingStep:
-        x, here, length = self._x, self._here, self._origin.length
-        assert here.slopes is not None
-        distance, angle = float(np.linalg.norm(target - here.tips[0])), 0.0
-        if wanted is not None and here.directions is not None:
-            angle = _angle(here.directions[0], wanted)
-        close, tip_map, rod = _AT_END * self._scales, self._map, self._map.rod
-        bound = (np.minimum(x - self.low, self.high - x) <= close) & (self.low < self.high)
-        rate = np.abs(x - before) >= self._most - close
-        if self._beside is not None and isinstance(rod, LoadedRod):  # it will have moved on
-            tip_map = replace(tip_map, rod=rod.with_postures(_beside(rod, self._beside.frame)))
-        names = np.array(self._origin.box.names, object)
-        return TrackingStep(
-            activations=x.copy(),
-            tip=here.tips[0],
-            jacobian=here.slopes[0],
-            distance=distance,
-            angle=angle,
-            reached=max(distance / length, angle) <= self._origin.tol,
-            at_bound=tuple(names[bound]),
-            at_rate=tuple(names[rate]),
-            snaps=snaps,
-            _map=tip_map,
-        )
-
-
-def _beside(rod: LoadedRod, frame: Array) -> PosturesBeside:
-    known = rod.postures
-    return PosturesBeside(known.solver, known.side, frame=frame.copy(), found=frame.copy())
 
 
 def _angle(d: Array, wanted: Array) -> float:

@@ -324,13 +324,10 @@ class ContinuedPostures(Postures):
 
 @dataclass(frozen=True, eq=False)
 class PosturesBeside(Postures):
-    """Those within half a radian of one that the arm is in, by one search each.
+    """Those within half a radian of one that the arm is in, by one search each."""
 
-    `frame` is that of the posture, and `found` of the last that was found, (1, component).
-    """
-
-    frame: Array = field(kw_only=True)
-    found: Array = field(kw_only=True)
+    frame: Array = field(kw_only=True)  # of the posture, (1, component)
+    found: Array = field(kw_only=True)  # of the last that was found
 
     def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
         new, equilibria = self.solver.search(gamma, self.frame), self.solver.empty(len(gamma))
