@@ -10,8 +10,7 @@ from functools import cache
 from types import FunctionType
 from typing import Any
 
-Number = Any
-"""A float, or an expression that stands for one."""
+Number = Any  # A float, or an expression that stands for one
 
 
 class _Expression:
