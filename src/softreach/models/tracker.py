@@ -29,7 +29,7 @@ _TRIALS, _DIRECTED_TRIALS = 3, 2
 _SHARE = 0.1  # of its range, by which a bundle moves in a step where no rate is given
 _FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-6, 1e-10, 1e6  # of the mean square slope
 _EASE = 0.05  # of the way to the least activations, in a step, as far as the tip does not move
-_ENOUGH = 0.1  # of the tolerance, at which a step ends
+_ENOUGH = 0.5  # of the tolerance, at which a step ends
 _AT_END = 1e-9  # of a range, from a limit on which a bundle is
 
 
