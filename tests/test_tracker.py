@@ -42,7 +42,7 @@ def errors_without_a_limit_of_time(arm, path, start):
 
         width = 1e-9 * (high - low)
         inside = x.clip(low + width, high - width)
-        found = least_squares(away, inside, slopes, (low, high), x_scale=8.0, max_nfev=20)
+        found = least_squares(away, inside, slopes, (low, high), x_scale=8.0)
         x = found.x
         errors.append(np.linalg.norm(found.fun))
     return np.array(errors)
