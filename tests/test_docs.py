@@ -110,7 +110,7 @@ def test_every_notebook_runs_and_is_stored_without_outputs(notebook, tmp_path, m
 def test_fences_are_declared_pictures_exist_and_rows_of_tables_have_a_cell_for_each_head(page):
     heads, text = 0, page.read_text(encoding="utf-8")
     languages = {match[2].strip() for match in FENCE.finditer(text)}
-    assert languages <= {"python", "bash", "toml", "text", "bibtex", "julia"}
+    assert languages <= {"python", "bash", "toml", "text", "bibtex", "julia", "c"}
     for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert picture.startswith(address()) or (page.parent / picture).is_file(), picture
     for line in re.sub(r"(?ms)^```.*?^```", "", text).splitlines():

@@ -97,8 +97,8 @@ def export(
 
     A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
-    .glb .3mf .vtu), the source of a filament of ActiveFilaments.jl (.jl), or a
-    model for MuJoCo (.xml).
+    .glb .3mf .vtu), the source of a filament of ActiveFilaments.jl (.jl), a
+    model for MuJoCo (.xml), or kinematics in C (.h .c).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
 
@@ -107,7 +107,9 @@ def export(
     """
     from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.models.mjcf import MODEL, write_mujoco
+    from softreach.models.c_source import SOURCE
+    from softreach.models.mjcf import MODEL
+    from softreach.support.files.text import write_text
 
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
@@ -118,17 +120,20 @@ def export(
         write(source, out, overwrite, unit)
     elif format is not None and out.suffix != ".jl":
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
-    elif out.suffix in (".jl", ".xml"):
-        known = (FILAMENT_SCRIPT, write_design, "a filament's definition, which has none", _OTHER)
-        if out.suffix == ".xml":
-            other = "a model, whose controls they are", "for MuJoCo, whose lengths are in m"
-            known = MODEL, write_mujoco, *other
-        formats, write, what, whose = known
-        options.refuse(f"on {what}", activation=activation)
+    elif out.suffix == ".jl":
+        options.refuse("on a filament's definition, which has none", activation=activation)
         arm = design_from(source, changes)
-        options.refuse(whose, unit=unit)
-        options.check_output(out, formats, overwrite)
-        write(arm, out, overwrite=overwrite)
+        options.refuse(_OTHER, unit=unit)
+        options.check_output(out, FILAMENT_SCRIPT, overwrite)
+        write_design(arm, out, overwrite=overwrite)
+        console.line(out)
+    elif out.suffix in (".xml", ".h", ".c"):
+        options.refuse("on a model, whose controls they are", activation=activation)
+        arm = design_from(source, changes)
+        options.refuse("for a model, whose lengths are in m", unit=unit)
+        options.check_output(out, {**SOURCE, **MODEL}, overwrite)
+        text = sr.models.mujoco(arm) if out.suffix == ".xml" else sr.models.c(arm)
+        write_text(out, text, overwrite=overwrite)
         console.line(out)
     else:
         arm = design_from(source, changes, unit)

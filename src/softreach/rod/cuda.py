@@ -85,7 +85,7 @@ class CudaRod(FreeRod):
     @lazy
     def packed(self) -> Array:
         """The table of the steps without the columns that pad it, shape (step, row, bundle + 1)."""
-        return np.ascontiguousarray(self._table[:, :, [*range(self.box.bundles), -1]])
+        return np.ascontiguousarray(self.table[:, :, [*range(self.box.bundles), -1]])
 
     def _prepare(self) -> None:
         self.packed  # noqa: B018

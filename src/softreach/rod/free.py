@@ -164,12 +164,13 @@ class FreeRod(ArmRod):
         return self.fixed_steps or max(self._fineness, self.rule.steps_for_shapes(self.tol))
 
     @lazy
-    def _table(self) -> Array:
+    def table(self) -> Array:
+        """Node tables of the steps up to the section of the point, as `kernels.rod.tips.pack`."""
         stations = None if self.end == self.length else np.array([self.end])
         return self.rule.packed(self.rule.edges(self._fineness, stations))
 
     def _prepare(self) -> None:
-        self._table  # noqa: B018
+        self.table  # noqa: B018
 
     def fill(self, gamma: Array, out: TipOutputs) -> None:
         """Put tips, and what else is wanted, into place: theory (25) and (31)."""
@@ -178,11 +179,11 @@ class FreeRod(ArmRod):
         if has_offset and slopes is not None and twists is None:
             twists = np.empty((len(gamma), 6, gamma.shape[1]))
         if twists is not None:
-            jacobian.jacobians(self._table, gamma, tips, twists)
+            jacobian.jacobians(self.table, gamma, tips, twists)
         elif slopes is not None:
-            derivatives.slopes(self._table, gamma, tips, slopes)
+            derivatives.slopes(self.table, gamma, tips, slopes)
         else:
-            rod.tips(self._table, gamma, tips)
+            rod.tips(self.table, gamma, tips)
         if has_offset or directions is not None:
             place, directors = np.empty((len(gamma), 1, 3)), np.empty((len(gamma), 1, 3, 3))
             frames.frames(*self._tip_table, gamma, place, directors)

@@ -322,6 +322,21 @@ class ContinuedPostures(Postures):
         return True
 
 
+@dataclass(frozen=True, eq=False)
+class PosturesBeside(Postures):
+    """Those within half a radian of one that the arm is in, by one search each."""
+
+    frame: Array = field(kw_only=True)  # of the posture, (1, component)
+    found: Array = field(kw_only=True)  # of the last that was found
+
+    def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
+        new, equilibria = self.solver.search(gamma, self.frame), self.solver.empty(len(gamma))
+        near = turn_between(new.frame, self.frame) < _POLISHED
+        self.solver.put(gamma, slice(None), new.only(new.is_stable & near), equilibria)
+        self.found[:] = new.frame
+        return equilibria
+
+
 def _turned(frame: Array, angles: Array, axes: Array) -> Array:
     """Frames of a frame that turns about the first axis [rad], shape (n, component)."""
     turns = np.zeros((len(angles), 3, 3))

@@ -174,7 +174,10 @@ class LoadedRod(ArmRod):
 
     def continued_from(self, gamma: Array, frames: Array | None = None) -> LoadedRod:
         frame = self.equilibria(gamma).frame if frames is None else frames
-        postures = self.postures.continued_from(gamma, frame)
+        return self.with_postures(self.postures.continued_from(gamma, frame))
+
+    def with_postures(self, postures: Postures) -> LoadedRod:
+        """The same arm in postures that are found in another way."""
         rod = _ContinuedRod(self.arm, self.tol, self.fixed_steps)
         vars(rod).update({"origin": self, **vars(self), "postures": postures})
         return rod
