@@ -38,7 +38,7 @@ class TrackingStep:
     """Where a control step leads."""
 
     activations: Array
-    """Inputs of the arm, each in its own unit, shape (bundles,)."""
+    """Inputs of the arm [unit of each], shape (bundles,)."""
     tip: Array
     """Its tip [m], shape (3,)."""
     jacobian: Array
@@ -165,7 +165,7 @@ class Tracker:
 
     @property
     def activations(self) -> Array:
-        """Where the arm is, each in its own unit, shape (bundles,)."""
+        """Where the arm is [unit of each], shape (bundles,)."""
         return np.clip(self._x * self._scale, *self._ends)
 
     def step(self, target: ArrayLike, direction: ArrayLike | None = None) -> TrackingStep:
