@@ -1,5 +1,7 @@
 """`softreach atlas`: sweeps over designs; build, status, verify, best, figures."""
 
+from __future__ import annotations
+
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,5 +1,7 @@
 """`softreach calibrate` and `plan-poses`: the arm on the bench from measured poses."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any

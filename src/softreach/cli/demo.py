@@ -1,5 +1,7 @@
 """`softreach demo`, `example`, `list`, `paper`, `doctor`, `warmup`: what to begin with."""
 
+from __future__ import annotations
+
 import os
 import platform
 import re

@@ -1,5 +1,7 @@
 """`softreach reach`, `payload`, `gradient`; `cloud`, `volume`, `show`: exact sets, and samples."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any

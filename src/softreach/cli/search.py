@@ -1,5 +1,7 @@
 """`softreach check` and `search`: a design against what it is for, and designs that meet it."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
 from functools import partial
