@@ -1,9 +1,10 @@
 """Requirements of an arm: places, regions, bounds; met or missed, and by how much."""
 
+from softreach.geometry.meshes import Mesh
+from softreach.geometry.regions import Box, HalfSpace, Region, Sphere
 from softreach.requirements.checks import Check, Coverage, check
 from softreach.requirements.findings import Finding, quick_excess
 from softreach.requirements.parts import Keep, Limits, Target
-from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.requirements.requirements import Requirements
 
 __all__ = [

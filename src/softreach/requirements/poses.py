@@ -10,6 +10,7 @@ from softreach.arm.actuators import Tendon
 from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
+from softreach.geometry.regions import HalfSpace
 from softreach.inverse.direction import compromises, direction_errors
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.request import Request
@@ -17,7 +18,6 @@ from softreach.inverse.roots import placed
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.parts import LIMIT_UNITS, TOL, Goals, Keep
-from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import bending_over_bounds, bending_stations, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map

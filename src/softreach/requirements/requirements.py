@@ -14,6 +14,8 @@ import numpy as np
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
+from softreach.geometry.meshes import Mesh
+from softreach.geometry.regions import Box, HalfSpace, Region, Sphere
 from softreach.inverse.request import positions_in
 from softreach.requirements.parts import (
     LIMIT_UNITS,
@@ -24,7 +26,6 @@ from softreach.requirements.parts import (
     Limits,
     Target,
 )
-from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats, joined
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
