@@ -1,7 +1,7 @@
 """Solids inside closed triangles: read from files, their signed distances."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from os import PathLike
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from softreach.geometry.regions import Region
 from softreach.geometry.surface import enclosed_volume
-from softreach.kernels.room.triangles import listed_near, nearest_triangles
+from softreach.kernels.room.triangles import nearest_triangles
 from softreach.support import arrays, parallel
 from softreach.support.arguments import as_path
 from softreach.support.arrays import Array, Index
@@ -26,21 +26,48 @@ _MOST_BYTES = 256_000_000
 _FILES = (".stl", ".ply", ".obj", ".off", ".glb")
 _PACKED = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ")  # starts of archives
 _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
-_FEW, _DEEPEST = 32, 9  # triangles of a cube of a tree that is not cut, and how often one is
-FAR = 0.1  # of its distance, up to which half a diagonal is short: such a cube lists no triangles
+_FEW = 4  # triangles of the smallest box around some
+_ENDS = np.minimum, np.maximum
+_ENOUGH = 0.8  # of a distance in a field, which need not be exact
+_NODES = 65  # along each edge of a field
+STACK = 128  # Room of a search in a tree: twice its depth
 
 
 class TriangleTree(NamedTuple):
-    """Cubes around a place, each with its distance from a mesh and the triangles near it."""
+    """Boxes around triangles, each cut in two across where its triangles lie widest apart."""
 
-    root: Array  # Center and half edge of the largest [m], shape (4,)
-    children: Index  # Of each node the first of eight, -1 for a leaf, shape (n,)
-    middle: Array  # Signed distance of the center of each [m], shape (n,)
-    starts: Index  # Of the triangles of each in the list, shape (n + 1,)
-    listed: Index  # Those of all leaves that are not far from the mesh
-    corners: Array  # Of the mesh [m], shape (f, 3, 3)
-    spheres: Array  # Around these: center and radius [m], shape (f, 4)
+    boxes: Array  # Lower and upper corner of each [m]; children of i are 2i + 1 and 2i + 2, (n, 6)
+    starts: Index  # Of the triangles in each box of the last level, shape (2^level + 1,)
+    corners: Array  # Of the triangles, in this order [m], shape (f, 3, 3)
     normals: Array  # Of each face, of its edges, and of its corners by their angles, (f, 7, 3)
+
+    def nearest(self, points: Array, enough: float = 1.0) -> tuple[Array, Array, Index]:
+        """Signed distances of points (n, 3) [m], gradients (n, 3), and the nearest triangles.
+
+        With `enough` below 1 distances may be too large, but not so if they are multiplied by it.
+        """
+        distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
+        face, points, table = (
+            np.empty(len(points), np.int64),
+            np.ascontiguousarray(points),
+            (*self,),
+        )
+
+        def fill(b: slice) -> None:
+            room = np.empty(STACK, np.int64)
+            nearest_triangles(points[b], table, room, enough, distance[b], gradient[b], face[b])
+
+        parallel.run(partial(fill, block) for block in parallel.blocks(len(points), _BLOCK))
+        return distance, gradient, face
+
+
+class DistanceField(NamedTuple):
+    """Distances from a mesh at the nodes of a grid, and a triangle near to each."""
+
+    grid: Array  # First node and spacing [m], shape (4,)
+    shape: Index  # Nodes along each axis, shape (3,)
+    distance: Array  # At least, signed [m], shape (node,)
+    face: Index  # Numbers of triangles in the tree, shape (node,)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,6 +90,8 @@ class Mesh(Region):
     """File that it was read from; empty for none."""
     unit: str = "m"
     """Unit of length of that file."""
+    is_turned: bool = field(init=False)
+    """True if all triangles were given facing in."""
 
     def __post_init__(self) -> None:
         vertices = arrays.as_points("vertices", self.vertices)
@@ -71,6 +100,7 @@ class Mesh(Region):
         volume = enclosed_volume(vertices, faces)
         if not abs(volume) > 0.0:
             raise NotPossible(f"{self.source or 'the mesh'} encloses no volume")
+        object.__setattr__(self, "is_turned", volume < 0.0)
         faces = faces if volume > 0.0 else faces[:, ::-1]
         object.__setattr__(self, "vertices", arrays.read_only(vertices.copy()))
         object.__setattr__(self, "faces", arrays.read_only(np.ascontiguousarray(faces, np.int64)))  # pyright: ignore[reportArgumentType]
@@ -130,51 +160,32 @@ class Mesh(Region):
         return self.nearest(arrays.as_points("points", points))[0]
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
-        distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        table = np.arange(len(self.faces)), self._corners, self._spheres, self._normals
-        parallel.run(
-            partial(nearest_triangles, points[block], *table, distance[block], gradient[block])
-            for block in parallel.blocks(len(points), _BLOCK)
-        )
-        return distance, gradient
+        return self.tree.nearest(points)[:2]
 
-    def tree(self, center: Array, half: float) -> TriangleTree:
-        """Cubes within the one around a center (3,) with half an edge [m], until few are near."""
-        children, middles, lists = [-1], list[Array](), dict[int, Array]()
-        table = self._corners, self._spheres, self._normals
-        number, places = np.zeros(1, np.int64), np.asarray(center, float)[None]
-        parent, starts = np.zeros(1, np.int64), np.array([0, len(self.faces)])
-        listed = np.arange(len(self.faces), dtype=np.int32)
-        for depth in range(_DEEPEST + 1):
-            reach = half * 0.5**depth * np.sqrt(3.0)
-            middle, count = np.empty(len(places)), np.empty(len(places), np.int64)
-            near = places, parent, starts, listed, 2.0 * reach, *table, middle, count
-            listed_near(*near, kept := np.empty(0, np.int32))
-            kept = np.empty(int(count.sum()), np.int32)
-            if len(kept):
-                listed_near(*near, kept)
-            middles.append(middle)
-            starts, listed = np.append(0, np.cumsum(count)), kept
-            is_far = reach <= FAR * np.abs(middle)
-            is_leaf = is_far | (count <= _FEW) | (depth == _DEEPEST)
-            for k in np.flatnonzero(is_leaf & ~is_far):
-                lists[number[k]] = listed[starts[k] : starts[k + 1]]
-            parent = np.flatnonzero(~is_leaf)
-            if not len(parent):
-                break
-            first = len(children) + 8 * np.arange(len(parent))
-            children += [-1] * (8 * len(parent))
-            for node, child in zip(number[parent], first, strict=True):
-                children[node] = int(child)
-            corner = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0
-            number = (first[:, None] + np.arange(8)).ravel()
-            places = (places[parent, None] + half * 0.5 ** (depth + 1) * corner).reshape(-1, 3)
-            parent = np.repeat(parent, 8)
-        sizes = np.zeros(len(children), np.int64)
-        sizes[[*lists]] = [len(each) for each in lists.values()]
-        every = np.concatenate([np.empty(0, np.int32), *(lists[node] for node in sorted(lists))])
-        ends, root = np.append(0, np.cumsum(sizes)), np.append(center, half)
-        return TriangleTree(root, np.array(children), np.concatenate(middles), ends, every, *table)
+    @lazy
+    def tree(self) -> TriangleTree:
+        """Boxes around its triangles, by which the nearest one is found."""
+        corners, count = self._corners, len(self.faces)
+        order, middles, boxes = np.arange(count), corners.mean(axis=1), list[Array]()
+        for level in range(max(0, int(np.ceil(np.log2(count / _FEW)))) + 1):
+            starts = np.arange(2**level + 1) * count // 2**level
+            own = corners[order]
+            ends = own.min(axis=1), own.max(axis=1)
+            low, high = (f.reduceat(x, starts[:-1]) for f, x in zip(_ENDS, ends, strict=True))
+            boxes.append(np.concatenate([low, high], axis=1))
+            block = np.repeat(np.arange(2**level), np.diff(starts))
+            along = middles[order, (high - low).argmax(axis=1)[block]]
+            cut, order = order, order[np.lexsort((along, block))]
+        return TriangleTree(np.concatenate(boxes), starts, corners[cut], self._normals[cut])
+
+    def field(self, center: Array, half: float, nodes: int = _NODES) -> DistanceField:
+        """Distances at so many nodes along each edge of a cube around a center [m], shape (3,)."""
+        spacing = 2.0 * half / (nodes - 1)
+        steps = np.array(list(np.ndindex(nodes, nodes, nodes)), float)
+        low = np.asarray(center, float) - half
+        distance, _, face = self.tree.nearest(low + spacing * steps, _ENOUGH)
+        shape = np.full(3, nodes)
+        return DistanceField(np.append(low, spacing), shape, _ENOUGH * distance, face)
 
     def wireframe(self, around: Array) -> list[Array]:
         edges, beside = self._edges[:2]
@@ -185,12 +196,6 @@ class Mesh(Region):
     @lazy
     def _corners(self) -> Array:
         return self.vertices[self.faces]
-
-    @lazy
-    def _spheres(self) -> Array:
-        center = self._corners.mean(axis=1)
-        radius = np.linalg.norm(self._corners - center[:, None], axis=2).max(axis=1)
-        return np.column_stack([center, radius])
 
     @lazy
     def _face_normals(self) -> Array:

@@ -1,8 +1,8 @@
-"""Signed distances of closed triangles, by a tree of cubes that list the triangles near them.
+"""Signed distances of closed triangles, by a tree of boxes around them.
 
-Of a cube around c with the half diagonal ρ only triangles within |d(c)| + 2ρ of c can be the
-nearest of a point in it, as distances change no faster than places. A cube is cut into eight until
-few are left, or until d(c) alone says enough: |d(x) - d(c)| <= |x - c|.
+A field of distances at the nodes of a grid says how far a solid is at least, as distances change no
+faster than places: |d(x) - d(node)| <= |x - node|. It knows the triangle nearest to each node too,
+from which the search of the tree for those near x begins.
 """
 
 from __future__ import annotations
@@ -52,82 +52,85 @@ def _square(a, b):
 
 
 @inline
-def nearest_of(x, listed, first, last, corners, spheres, normals):
-    """Signed distance of x from the nearest triangle in a list, and its gradient: four numbers.
+def _beyond_box(x, box):
+    """Squared distance of a point from a box (6,): its lower and upper corner."""
+    total = 0.0
+    for k in range(3):
+        beyond = max(max(box[k] - x[k], x[k] - box[3 + k]), 0.0)
+        total += beyond * beyond
+    return total
 
-    Corners (f, 3, 3), spheres (f, 4) around triangles as center and radius, and normals (f, 7, 3)
-    of the parts of each, by which it is told what is inside.
+
+@inline
+def nearest_in(x, guess, boxes, starts, corners, normals, stack, enough):
+    """Signed distance of a point from the nearest triangle, its gradient, and the triangle.
+
+    Children of node i of a tree of boxes (node, 6) are 2i + 1 and 2i + 2; its last level lists
+    triangles from `starts` on, whose corners (f, 3, 3) and normals of parts (f, 7, 3) are in that
+    order. A triangle near by, the `guess`, saves most of the search; `stack` has room for it. With
+    `enough` below 1 one will do whose distance, times that, is no more than the least.
     """
-    near, square = np.inf, np.inf
-    face, part, foot = listed[first], FACE, x
-    for k in range(first, last):
-        f = listed[k]
-        apart = minus(x, (spheres[f, 0], spheres[f, 1], spheres[f, 2]))
-        limit = near + spheres[f, 3]
-        if dot(apart, apart) >= limit * limit:
+    leaves = len(starts) - 1
+    face = guess
+    place, part = _on_face(x, corners, face)
+    foot, square = place, _square(x, place)
+    stack[0], size, enough = 0, 1, enough * enough
+    while size:
+        size -= 1
+        node = stack[size]
+        if _beyond_box(x, boxes[node]) >= enough * square:
             continue
-        a, b, c = row(corners[f], 0), row(corners[f], 1), row(corners[f], 2)
-        place, its = nearest_on_triangle(x, a, b, c)
-        if _square(x, place) < square:
-            square, face, part, foot = _square(x, place), f, its, place
-            near = math.sqrt(square)
+        if node >= leaves - 1:
+            for f in range(starts[node - leaves + 1], starts[node - leaves + 2]):
+                place, its = _on_face(x, corners, f)
+                if _square(x, place) < square:
+                    square, face, part, foot = _square(x, place), f, its, place
+            continue
+        first, second = 2 * node + 1, 2 * node + 2
+        if _beyond_box(x, boxes[first]) < _beyond_box(x, boxes[second]):
+            first, second = second, first
+        stack[size], stack[size + 1] = first, second  # the nearer one comes next
+        size += 2
     away, normal = minus(x, foot), row(normals[face], part)
+    near = math.sqrt(square)
     sign = -1.0 if dot(away, normal) < 0.0 else 1.0
     if near > 0.0:
         normal = times(sign / near, away)
     else:
         normal = times(1.0 / max(math.sqrt(dot(normal, normal)), 1e-300), normal)
-    return sign * near, normal[0], normal[1], normal[2]
-
-
-@kernel
-def nearest_triangles(points, listed, corners, spheres, normals, distance, gradient):
-    """Signed distances (n,) of points (n, 3) from listed triangles, and gradients (n, 3)."""
-    for i in range(points.shape[0]):
-        x = points[i, 0], points[i, 1], points[i, 2]
-        found = nearest_of(x, listed, 0, len(listed), corners, spheres, normals)
-        distance[i] = found[0]
-        gradient[i, 0], gradient[i, 1], gradient[i, 2] = found[1], found[2], found[3]
-
-
-@kernel
-def listed_near(
-    centers, parent, starts, listed, reach, corners, spheres, normals, middle, count, kept
-):
-    """Distances d(c) of centers (n, 3) of cubes, and the triangles within |d(c)| + reach of each.
-
-    Candidates of cube i are those of its parent. `count` (n,) says how many there are; where `kept`
-    has room for all, they are put there one after another.
-    """
-    room, place = len(kept), 0
-    for i in range(centers.shape[0]):
-        x = centers[i, 0], centers[i, 1], centers[i, 2]
-        first, last = starts[parent[i]], starts[parent[i] + 1]
-        if room == 0:
-            middle[i] = nearest_of(x, listed, first, last, corners, spheres, normals)[0]
-        count[i], limit = 0, abs(middle[i]) + reach
-        for k in range(first, last):
-            f = listed[k]
-            apart = minus(x, (spheres[f, 0], spheres[f, 1], spheres[f, 2]))
-            most = limit + spheres[f, 3]
-            if dot(apart, apart) <= most * most:
-                if room:
-                    kept[place] = f
-                    place += 1
-                count[i] += 1
+    return sign * near, normal[0], normal[1], normal[2], face
 
 
 @inline
-def leaf_of(x, root, children):
-    """The leaf of a tree that holds x, the center of its cube, and whether x is in the root."""
-    cx, cy, cz, half = root[0], root[1], root[2], root[3]
-    inside = max(abs(x[0] - cx), max(abs(x[1] - cy), abs(x[2] - cz))) <= half
-    node = 0
-    while children[node] >= 0:
-        half *= 0.5
-        i, j, k = x[0] > cx, x[1] > cy, x[2] > cz
-        cx += half if i else -half
-        cy += half if j else -half
-        cz += half if k else -half
-        node = children[node] + 4 * i + 2 * j + k
-    return node, (cx, cy, cz), inside
+def _on_face(x, corners, f):
+    return nearest_on_triangle(x, row(corners[f], 0), row(corners[f], 1), row(corners[f], 2))
+
+
+@kernel
+def nearest_triangles(points, table, stack, enough, distance, gradient, face):
+    """Signed distances (n,) of points (n, 3), gradients (n, 3), and the nearest triangles (n,).
+
+    The table is boxes, starts, corners and normals of a tree; the others are as of `nearest_in`.
+    """
+    guess, (boxes, starts, corners, normals) = 0, table
+    for i in range(points.shape[0]):
+        x = points[i, 0], points[i, 1], points[i, 2]
+        found = nearest_in(x, guess, boxes, starts, corners, normals, stack, enough)
+        distance[i], face[i] = found[0], found[4]
+        gradient[i, 0], gradient[i, 1], gradient[i, 2] = found[1], found[2], found[3]
+        guess = found[4]
+
+
+@inline
+def node_near(x, grid, shape):
+    """Number of the node of a field that is nearest to x, and its distance from x.
+
+    The grid (4,) is its first node and its spacing.
+    """
+    square, node = 0.0, 0
+    for k in range(3):
+        place = (x[k] - grid[k]) / grid[3]
+        nearest = min(max(math.floor(place + 0.5), 0.0), shape[k] - 1.0)
+        square += (place - nearest) ** 2
+        node = node * shape[k] + np.int64(nearest)
+    return node, grid[3] * math.sqrt(square)
