@@ -96,11 +96,6 @@ class Obstacle(Span):
             faults.append(Fault("inside", self.inside, "must be True or False"))
         return faults
 
-    @property
-    def bulges(self) -> bool:
-        """True if the gap to it is least at an end of any straight line on its free side."""
-        return self.inside and self.region.convex
-
     def gap(self, points: Array) -> tuple[Array, Array]:
         """Distance of points (n, 3) from the solid [m], with its gradient, (n,) and (n, 3)."""
         distance, gradient = self.region.nearest(np.ascontiguousarray(points))

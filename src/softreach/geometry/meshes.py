@@ -28,8 +28,8 @@ _PACKED = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ")  # st
 _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
 _FEW = 4  # triangles of the smallest box around some
 _ENDS = np.minimum, np.maximum
-_ENOUGH = 0.8  # of a distance in a field, which need not be exact
-_NODES = 65  # along each edge of a field
+_ENOUGH = 0.97  # of a distance in a field, which is exact near by
+_NODES = 97  # along each edge of a field
 STACK = 128  # Room of a search in a tree: twice its depth
 
 
@@ -66,7 +66,7 @@ class DistanceField(NamedTuple):
 
     grid: Array  # First node and spacing [m], shape (4,)
     shape: Index  # Nodes along each axis, shape (3,)
-    distance: Array  # At least, signed [m], shape (node,)
+    distance: Array  # Signed [m], shape (node,)
     face: Index  # Numbers of triangles in the tree, shape (node,)
 
 
@@ -184,8 +184,7 @@ class Mesh(Region):
         steps = np.array(list(np.ndindex(nodes, nodes, nodes)), float)
         low = np.asarray(center, float) - half
         distance, _, face = self.tree.nearest(low + spacing * steps, _ENOUGH)
-        shape = np.full(3, nodes)
-        return DistanceField(np.append(low, spacing), shape, _ENOUGH * distance, face)
+        return DistanceField(np.append(low, spacing), np.full(3, nodes), distance, face)
 
     def wireframe(self, around: Array) -> list[Array]:
         edges, beside = self._edges[:2]

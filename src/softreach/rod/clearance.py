@@ -12,6 +12,7 @@ from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.obstacles import MeshFile, Obstacle, obstacle_names
@@ -19,22 +20,26 @@ from softreach.arm.stations import Marker
 from softreach.arm.tables import tables
 from softreach.geometry.meshes import STACK, DistanceField, Mesh
 from softreach.kernels.rod.frames import centerlines
-from softreach.kernels.room.nearest import ITSELF, MOST_PARTS, NONE, nearest, swollen
+from softreach.kernels.room.nearest import FIELD_ERROR, ITSELF, MOST_PARTS, NONE, nearest, swollen
 from softreach.kernels.room.shapes import HALF_SPACE, MESH, NUMBERS
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import ArmMap, as_tip_map, coarsened, with_unstable
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
+from softreach.support.arguments import as_flag, as_number
 from softreach.support.arrays import Array, Index
-from softreach.support.errors import NotPossible, warn
+from softreach.support.errors import NotPossible, Range, warn
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
     pass
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 ACCURACY = 1e-3  # over L: largest error of a clearance
-_SHARES = 8.0, 4.0  # parts of the accuracy, for places and for cubics; two of the latter remain
+_PLACES, _CUBICS, _SEARCH = 1 / 16, 1 / 8, 3 / 4  # shares of the accuracy
 _BLOCK = 1024  # arms at once
 _PILOTS = 64
 _MOST_EDGES = 2048
@@ -107,7 +112,7 @@ class ClearanceMap:
     @lazy
     def tip_map(self) -> ArmMap:
         """The tip map to a tolerance that does."""
-        return as_tip_map(coarsened(self.whole, self.accuracy / _SHARES[0]))
+        return as_tip_map(coarsened(self.whole, _PLACES * self.accuracy))
 
     @lazy
     def _marks(self) -> Array:
@@ -123,7 +128,7 @@ class ClearanceMap:
             :: 1 + len(self.whole.box.low)
         ]
         gamma, steps = gamma[:_PILOTS], max(2, self.tip_map.steps or 8)
-        allowed = self.error / _SHARES[1] / 2.0
+        allowed = _CUBICS * self.error
         while True:
             z = self._edges_of(steps)
             error = self._error_of_cubics(gamma, z)
@@ -165,15 +170,14 @@ class ClearanceMap:
 
     def _fill(self, gamma: Array, out: Clearances) -> None:
         edges, (disks, *solids, meshes) = self._at(gamma), self._prepared
-        lost = ~np.isfinite(edges.points).all(axis=(1, 2))
+        lost = np.isnan(edges.points[:, 0, 0])
         for each in edges[:3]:
             each[lost] = 0.0
-        count = len(disks)
-        most = count * (MOST_PARTS + 2) + 4
-        flat = (np.empty(most) for _ in range(4))
-        line = np.empty((most, 3)), *flat, np.empty(count + 1, np.int64)
-        room = np.empty(count - 1), np.empty(STACK, np.int64), line
-        tol = self.error / _SHARES[1]
+        steps = len(disks) - 1
+        most = steps * (MOST_PARTS + 1)
+        line = np.empty((most, 3)), *np.empty((3, most)), np.empty(steps + 1, np.int64)
+        room = np.empty(steps), np.empty(STACK, np.int64), np.empty((STACK + steps, 5)), *line
+        tol = _SEARCH * self.error
         nearest(*edges[:3], disks, edges.tool, *solids, meshes, tol, room, *out)
         out.value[out.which == NONE] = np.inf
         out.value[lost], out.which[lost] = np.nan, NONE
@@ -202,6 +206,16 @@ class ClearanceMap:
         return np.nan_to_num(self.tip_map.tips(gamma))
 
     @lazy
+    def contact_error(self) -> float:
+        """How much smaller the clearance of arms that touch nothing may be [m].
+
+        Of solids as for all; of a mesh so much more as its field does not tell.
+        """
+        meshes = self._prepared[-1]
+        spacing = max(meshes[5][:, 3], default=0.0)
+        return self.error + FIELD_ERROR * spacing
+
+    @lazy
     def _poisson(self) -> float:
         rings = self.arm.section.rings
         return max(rings, key=lambda ring: ring.outer_ratio).material.poisson_ratio
@@ -227,7 +241,7 @@ class ClearanceMap:
         z, arm, count = self.stations, self.arm, len(self.obstacles)
         disks, wide = np.zeros(len(z)), arm.disks.radius > arm.disks.tendons
         np.maximum.at(disks, np.searchsorted(z, arm.disks.station[wide]), arm.disks.radius[wide])
-        kinds = np.zeros((count + 1, 3), np.int64)
+        kinds = np.zeros((count + 1, 2), np.int64)
         numbers, ends = np.zeros((count + 1, NUMBERS + 1)), np.zeros((count + 1, 2), np.int64)
         meshes: list[Mesh] = []
         for k, each in enumerate(self.obstacles):
@@ -239,7 +253,7 @@ class ClearanceMap:
             elif region.kind == HALF_SPACE:
                 own = own * np.repeat((1, side), 3)
                 side = 1
-            kinds[k] = region.kind, side, each.bulges
+            kinds[k] = region.kind, side
             numbers[k, : len(own)], numbers[k, -1] = own, each.clearance
             ends[k] = np.searchsorted(z, each.span(arm.length))
         kinds[count, 1] = self.itself
@@ -270,6 +284,29 @@ class ClearanceMap:
         )
         return sizes, *joined, *grids, *known
 
+    def variables(self, found: Clearances) -> dict[str, Any]:
+        """The same as variables of a dataset over `sample`."""
+        number = np.where(found.which == ITSELF, len(self.obstacles), found.which)
+        edges = np.arange(len(self.stations) + 1.0)
+        z = np.interp(found.place[:, 0], edges, np.append(self.stations, self.arm.length))
+        error = {"error": self.error, "error_apart": self.contact_error}
+        return {
+            "clearance": ("sample", found.value, {"units": "m", **error}),
+            "obstacle": ("sample", np.maximum(number, -1), {"names": self.names}),
+            "station": ("sample", np.where(number < 0, np.nan, z), {"units": "m"}),
+        }
+
+    def warn_at_rest(self) -> None:
+        """Say which obstacle the arm touches before it is activated, if it does."""
+        found = self.of(self.whole.box.clip(np.zeros((1, self.whole.box.bundles))))
+        if found.value[0] < 0.0 and found.which[0] >= 0:
+            z = self.variables(found)["station"][1][0]
+            warn(
+                f"at rest the arm is {-found.value[0]:.3g} m too near to "
+                f"{self.names[found.which[0]]} at Z = {z:.3g} m: if it is held there, let the part "
+                "that must keep clear start beyond, by start or start_over_length"
+            )
+
     def with_slopes(self, gamma: Array) -> tuple[Clearances, Array]:
         """Clearances, and their derivatives along each activation [m], shape (n, bundles).
 
@@ -295,7 +332,7 @@ class ClearanceMap:
         return found, slopes
 
     def _moved(self, edges: _Edges, gamma: Array, place: Array) -> tuple[Array, Array]:
-        """Points at places (n,), shape (n, 3), and derivatives, those of radii last, (n, 4, bundles)."""
+        """Points at places (n,), (n, 3), and derivatives of these and of radii, (n, 4, bundles)."""
         count, rows = len(self.stations) - 1, np.arange(len(gamma))
         k = np.clip(place.astype(int), 0, count - 1)
         t, moves = place - k, np.zeros((len(gamma), 4, gamma.shape[1]))
@@ -365,6 +402,53 @@ class ClearanceMap:
             return along[:, 0]
         inputs.along_x(along, of_drives, out)
         return out[:, 0]
+
+
+def compute_clearance(
+    arm: Manipulator | TipMap,
+    activations: ArrayLike,
+    *,
+    accuracy: float = ACCURACY,
+    itself: bool = True,
+    slopes: bool = False,
+) -> xr.Dataset:
+    """Clearance of the whole arm to its surroundings and to itself, at many activations.
+
+    The arm is as wide as the widest of its body, R2 ζ^-ν, its tendons and its disks, and counts
+    as balls around its centerline; so does the line to the point of a tool, without width. Parts of
+    the arm count where they come nearer to each other than the arm is wide and it has turned back.
+
+    Args:
+        arm: The design with its `surroundings`, or its tip map.
+        activations: γ [-], shape (n, bundles), or (bundles,) for one.
+        accuracy: Largest error, over L.
+        itself: Whether the arm must keep clear of itself.
+        slopes: Whether to compute derivatives.
+
+    Returns:
+        Dataset over `sample` with `clearance` [m], beyond what is wanted; infinite where nothing is
+        near, NaN without an equilibrium. `obstacle`, its number in the attribute `names`, -1 for
+        none; `station`, Z of the place [m]. With `slopes`, `clearance_slope` (sample, bundle)
+        [m per unit]. The attribute `error` says how much smaller a clearance may be [m], and
+        `error_apart` that of arms that touch no mesh.
+
+    Raises:
+        InvalidInput: As for `tip_positions`, or an accuracy out of range.
+        NotPossible: The base lies inside an obstacle, or a mesh is open or faces in.
+    """
+    import xarray as xr
+
+    accuracy = as_number("accuracy", accuracy, Range(1e-6, 0.1, unit="(in L)"))
+    tip_map = as_tip_map(arm)
+    found = ClearanceMap(tip_map, accuracy, as_flag("itself", itself))
+    found.warn_at_rest()
+    gamma = tip_map.check_activations("activations", np.atleast_2d(np.asarray(activations)))
+    each, rates = found.with_slopes(gamma) if as_flag("slopes", slopes) else (found.of(gamma), None)
+    variables: dict[str, Any] = found.variables(each)
+    if rates is not None:
+        variables["clearance_slope"] = (("sample", "bundle"), rates, {"units": "m per unit"})
+    names = {"bundle": list(tip_map.box.names)} if rates is not None else {}
+    return xr.Dataset(variables, names)
 
 
 @dataclass(frozen=True, repr=False)

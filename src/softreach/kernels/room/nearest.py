@@ -1,9 +1,9 @@
 """Where arms come nearest to solids around them, and to themselves.
 
 Between two edges of its steps an arm is the cubic through their centers and tangents, which are as
-long as the arc, and its radius is linear. Half-spaces take the least value of that cubic. Other
-solids are marched past along a polyline of it, by steps that nothing nearer can lie in, as
-distances change no faster than places. Two pieces come near each other only if the arm turns
+long as the arc, and its radius is linear. Half-spaces take the least value of that cubic. Past
+others it is cut into halves where a nearer point may be, as distances change no faster than
+places. Two pieces come near each other only if the arm turns
 by 1.77 rad between them: less keeps the chord of an arc above 2/π of its length.
 """
 
@@ -13,11 +13,13 @@ import math
 
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.room.shapes import HALF_SPACE, MESH, signed_distance
-from softreach.kernels.room.triangles import nearest_in, node_near
-from softreach.kernels.vector import dot, minus, plus, row, times
+from softreach.kernels.room.triangles import in_field, nearest_in
+from softreach.kernels.vector import dot, minus, plus, row, spot, times
 
 NONE, ITSELF = -1, -2
 """In place of the number of a solid."""
+FIELD_ERROR = 0.87
+"""Of the spacing of a field: √3/2."""
 MOST_PARTS = 64
 """Chords of the polyline of a step."""
 _FARTHEST = 1e300  # as kernels know no infinity
@@ -58,7 +60,8 @@ def _at(points, tangents, i, k, length, t):
     """The point of the cubic of step k at a share t of its arc."""
     a, b = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
     c, d = length * t * (1.0 - t) ** 2, length * t * t * (t - 1.0)
-    p, q, u, v = points[i, k], points[i, k + 1], tangents[i, k], tangents[i, k + 1]
+    p, q = spot(points, i, k), spot(points, i, k + 1)
+    u, v = spot(tangents, i, k), spot(tangents, i, k + 1)
     return (
         a * p[0] + b * q[0] + c * u[0] + d * v[0],
         a * p[1] + b * q[1] + c * u[1] + d * v[1],
@@ -92,8 +95,8 @@ def _along(x, q):
 def _over_plane(points, tangents, radius, disks, lengths, i, q, first, last, best):
     """The least height over a plane that is below `best`, and its place; that itself if none is."""
     place = -1.0
-    below, r = _height(points[i, first], q), radius[i, first]
-    slope = _along(tangents[i, first], q)
+    below, r = _height(spot(points, i, first), q), radius[i, first]
+    slope = _along(spot(tangents, i, first), q)
     for k in range(first, last + 1):
         if below - r < best:
             best, place = below - r, k
@@ -101,8 +104,8 @@ def _over_plane(points, tangents, radius, disks, lengths, i, q, first, last, bes
             best, place = below - disks[k], k
         if k == last:
             break
-        above, rim = _height(points[i, k + 1], q), radius[i, k + 1]
-        end = _along(tangents[i, k + 1], q)
+        above, rim = _height(spot(points, i, k + 1), q), radius[i, k + 1]
+        end = _along(spot(tangents, i, k + 1), q)
         start, stop = below - r, above - rim
         one = below + lengths[k] * slope / 3.0 - (2.0 * r + rim) / 3.0
         two = above - lengths[k] * end / 3.0 - (r + 2.0 * rim) / 3.0
@@ -121,99 +124,171 @@ def _over_plane(points, tangents, radius, disks, lengths, i, q, first, last, bes
 
 
 @inline
-def _lay(points, tangents, radius, disks, tool, lengths, i, sag, line):
-    """Put the polyline of an arm into place; the number of its points."""
-    spots, widths, way, arc, share, firsts = line
+def _gap(
+    kind,
+    side,
+    wanted,
+    q,
+    meshes,
+    stack,
+    points,
+    tangents,
+    radius,
+    tool,
+    lengths,
+    i,
+    k,
+    t,
+    exact,
+    most,
+):
+    """Gap between a solid and the ball around a point of an arm.
+
+    Or to all but the solid where side is -1; to meshes by their fields, if not `exact` or `most`
+    is nearer by far.
+    """
+    width = wanted
+    if k < len(lengths):
+        x = _at(points, tangents, i, k, lengths[k], t)
+        width += radius[i, k] + t * (radius[i, k + 1] - radius[i, k])
+    else:  # a tool that the tip holds
+        x = spot(points, i, k)
+        x = plus(x, times(t, minus(row(tool, i), x)))
+    if kind == MESH:
+        return _of_mesh(side, int(q[0]), meshes, stack, x, exact, most + width) - width
+    return side * signed_distance(kind, q, x)[0] - width
+
+
+@inline
+def _of_mesh(side, m, meshes, stack, x, exact, most):
+    # Arrays of a tuple are counted when they have names: they have none here.
+    near, node = in_field(x, meshes[5], meshes[6], meshes[7], meshes[0][m, 2], m)
+    if not exact or side * near - FIELD_ERROR * meshes[5][m, 3] > most:
+        return side * near
+    root, begin = meshes[0][m, 0], meshes[0][m, 1]
+    found = nearest_in(
+        x, meshes[8][node], meshes[1], root, meshes[2], begin, meshes[0][m + 1, 1] - begin - 1,
+        meshes[3], meshes[4], stack, 1.0,
+    )  # fmt: skip
+    return side * found[0]
+
+
+@inline
+def _past_mesh(
+    side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths, parts, i,
+    first, last, best, tol
+):  # fmt: skip
+    """As `_past` by the field of a mesh, and exactly where that cannot tell whether arms touch."""
+    error = FIELD_ERROR * meshes[5][int(q[0]), 3]
+    near, place = _past(
+        MESH, side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths,
+        parts, i, first, last, best + error, tol, False,
+    )  # fmt: skip
+    if place < 0.0:
+        return best, place
+    k = min(int(place), max(len(lengths) - 1, last - 1))
+    gap = _gap(
+        MESH, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k,
+        place - k, True, _FARTHEST,
+    )  # fmt: skip
+    e = int(place)
+    if place == e and e < len(disks) and disks[e] > 0.0:
+        gap += radius[i, e] - disks[e]
+    place = place if gap < best else -1.0
+    best = min(gap, best)
+    if near - error < 0.0 < best:
+        again, its = _past(
+            MESH, side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths,
+            parts, i, first, last, best, tol, True,
+        )  # fmt: skip
+        if its >= 0.0:
+            best, place = again, its
+    return best, place
+
+
+@inline
+def _speed(points, tangents, radius, tool, lengths, i, k):
+    """How fast the gap of step k may change with the share of its arc at most."""
+    middle, apart = 0.0, 0.0
+    if k == len(lengths):
+        for axis in range(3):
+            apart += (tool[i, axis] - points[i, k, axis]) ** 2
+        return math.sqrt(apart)
+    for axis in range(3):
+        each = 3.0 * (points[i, k + 1, axis] - points[i, k, axis])
+        each -= lengths[k] * (tangents[i, k, axis] + tangents[i, k + 1, axis])
+        middle += each * each
+    change = abs(radius[i, k + 1] - radius[i, k])
+    return max(lengths[k], math.sqrt(middle)) + change
+
+
+@inline
+def _past(
+    kind, side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths, parts, i,
+    first, last, best, tol, exact
+):  # fmt: skip
+    """The least gap between two edges that is below `best`, and its place.
+
+    Between two points with gaps a and b, that may change by d between them, it is at least
+    (a + b - d)/2. Gaps at the edges come first, as the nearest of them spares most of the others.
+    """
+    place, steps, size = -1.0, len(lengths), 0
+    for e in range(first, last + 1):
+        k = min(e, steps - 1) if e <= steps else steps
+        gap = _gap(
+            kind, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k,
+            float(e - k), exact, best + tol,
+        )  # fmt: skip
+        parts[e, 4] = gap
+        if e <= steps and disks[e] > 0.0:
+            gap += radius[i, e] - disks[e]
+        if gap < best:
+            best, place = gap, float(e)
+    for k in range(first, last):
+        speed = _speed(points, tangents, radius, tool, lengths, i, k)
+        parts[0, 0], parts[0, 1], size = 0.0, parts[k, 4], 1
+        parts[0, 2], parts[0, 3] = 1.0, parts[k + 1, 4]
+        if k == steps:  # without the width of the tip
+            parts[0, 1] += radius[i, k]
+        while size:
+            size -= 1
+            lower, below, upper, above = (
+                parts[size, 0], parts[size, 1], parts[size, 2], parts[size, 3]
+            )  # fmt: skip
+            if 0.5 * (below + above - (upper - lower) * speed) >= best - tol:
+                continue
+            middle = 0.5 * (lower + upper)
+            gap = _gap(
+                kind, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k,
+                middle, exact, best + tol,
+            )  # fmt: skip
+            if gap < best:
+                best, place = gap, k + middle
+            parts[size, 2], parts[size, 3] = middle, gap
+            size += 1
+            parts[size, 0], parts[size, 1], parts[size, 2], parts[size, 3] = (
+                middle, gap, upper, above
+            )  # fmt: skip
+            size += 1
+    return best, place
+
+
+@inline
+def _lay(points, tangents, radius, lengths, i, sag, spots, widths, arc, share, firsts):
+    """Put a polyline of an arm into place."""
     n = 0
     for k in range(len(lengths)):
         firsts[k] = n
         bend = _bend(points, tangents, i, k, lengths[k])
         parts = min(max(math.ceil(math.sqrt(bend / (8.0 * sag))), 1), MOST_PARTS)
-        r, rim = radius[i, k], radius[i, k + 1]
         for j in range(parts + 1):
             t = j / parts
             x = _at(points, tangents, i, k, lengths[k], t)
-            if j == 0 and disks[k] > 0.0:
-                n = _put(spots, widths, way, arc, share, n, x, disks[k], k)
-            n = _put(spots, widths, way, arc, share, n, x, r + t * (rim - r), k + t)
-    edge = len(lengths)
-    firsts[edge] = n
-    if disks[edge] > 0.0 or len(tool):
-        x = row(points[i], edge)
-        n = _put(spots, widths, way, arc, share, n, x, disks[edge], edge)
-    if len(tool):
-        n = _put(spots, widths, way, arc, share, n, x, 0.0, edge)
-        n = _put(spots, widths, way, arc, share, n, row(tool, i), 0.0, edge + 1)
-    return n
-
-
-@inline
-def _put(spots, widths, way, arc, share, n, x, width, place):
-    spots[n, 0], spots[n, 1], spots[n, 2] = x
-    widths[n], share[n] = width, place
-    if n:
-        apart = minus(x, row(spots, n - 1))
-        step = math.sqrt(dot(apart, apart))
-        arc[n] = arc[n - 1] + step
-        way[n] = way[n - 1] + step + abs(width - widths[n - 1])
-    else:
-        arc[n], way[n] = 0.0, 0.0
-    return n + 1
-
-
-@inline
-def _between(spots, n, t):
-    return (
-        spots[n, 0] + t * (spots[n + 1, 0] - spots[n, 0]),
-        spots[n, 1] + t * (spots[n + 1, 1] - spots[n, 1]),
-        spots[n, 2] + t * (spots[n + 1, 2] - spots[n, 2]),
-    )
-
-
-@inline
-def _gap(kind, side, q, meshes, stack, x, most):
-    """Distance of x from a solid, or from all but it where side is -1; or less beyond `most`."""
-    if kind != MESH:
-        return side * signed_distance(kind, q, x)[0]
-    sizes, boxes, starts, corners, normals, grids, shapes, field, faces = meshes
-    m = int(q[0])
-    node, away = node_near(x, grids[m], shapes[m])
-    node += sizes[m, 3]
-    least = side * field[node] - away
-    if least > most:
-        return least
-    b, s, f = sizes[m, 0], sizes[m, 1], sizes[m, 2]
-    c, d, e = sizes[m + 1, 0], sizes[m + 1, 1], sizes[m + 1, 2]
-    tree = boxes[b:c], starts[s:d], corners[f:e], normals[f:e]
-    return side * nearest_in(x, faces[node], tree[0], tree[1], tree[2], tree[3], stack, 1.0)[0]
-
-
-@inline
-def _marched(solid, meshes, stack, line, first, last, best, tol):
-    """The least gap between points of a polyline that is below `best`, and its place."""
-    kind, side, bulges, wanted, q = solid
-    spots, widths, way, share = line[0], line[1], line[2], line[4]
-    place, n, t, here = -1.0, first, 0.0, way[first]
-    while True:
-        width = widths[n] + (t * (widths[n + 1] - widths[n]) if n < last else 0.0)
-        x = _between(spots, n, t) if n < last else row(spots, n)
-        ahead = _gap(kind, side, q, meshes, stack, x, best + width + wanted + tol)
-        value = ahead - width - wanted
-        if value < best:
-            best = value
-            place = share[n] + (t * (share[n + 1] - share[n]) if n < last else 0.0)
-        if n >= last:
-            return best, place
-        here += max(value - best, 0.0) + tol
-        while n < last and way[n + 1] <= here:
+            spots[n, 0], spots[n, 1], spots[n, 2] = x
+            widths[n], share[n] = radius[i, k] + t * (radius[i, k + 1] - radius[i, k]), k + t
+            arc[n] = (arc[n - 1] if n else 0.0) + (lengths[k] / parts if j else 0.0)
             n += 1
-        if n >= last:
-            n, t = last, 0.0
-        elif bulges:  # between two points the gap is no less than at one of them
-            n, t = n + 1, 0.0
-            here = way[n]
-        else:
-            t = (here - way[n]) / max(way[n + 1] - way[n], 1e-300)
+    firsts[len(lengths)] = n
 
 
 @inline
@@ -242,10 +317,11 @@ def _from_start_to_end(spots, a, b):
 
 
 @inline
-def _folded(points, tangents, radius, lengths, i, line, best):
-    """The least gap between two parts of an arm that is below `best`, and both places."""
-    spots, widths, _, arc, share, firsts = line
-    place, other, count = -1.0, -1.0, len(lengths)
+def _folded(
+    points, tangents, radius, lengths, i, sag, spots, widths, arc, share, firsts, best
+):  # fmt: skip
+    """The least gap between two parts of an arm below `best` and their width, and both places."""
+    place, other, count, laid = -1.0, -1.0, len(lengths), False
     for k in range(count):
         turn = _bend(points, tangents, i, k, lengths[k]) / max(lengths[k], 1e-300)
         passed = lengths[k]
@@ -260,12 +336,13 @@ def _folded(points, tangents, radius, lengths, i, line, best):
                 square += (0.5 * (here - points[i, m, axis] - points[i, m + 1, axis])) ** 2
             wide = max(radius[i, k], radius[i, k + 1]) + max(radius[i, m], radius[i, m + 1])
             least = math.sqrt(square) - 0.5 * (lengths[k] + lengths[m])
-            if least > _BACK * passed or least - wide > best:
+            if least > _BACK * passed or least - wide > min(best, wide):
                 continue
+            if not laid:
+                laid = True
+                _lay(points, tangents, radius, lengths, i, sag, spots, widths, arc, share, firsts)
             for a in range(firsts[k], firsts[k + 1] - 1):
                 for b in range(firsts[m], firsts[m + 1] - 1):
-                    if share[a + 1] == share[a] or share[b + 1] == share[b]:
-                        continue
                     s, t, gap = _apart(spots, a, b)
                     along = arc[b] + t * (arc[b + 1] - arc[b]) - arc[a] - s * (arc[a + 1] - arc[a])
                     if gap >= _BACK * along:  # where both are nearest; farther apart they may count
@@ -273,22 +350,14 @@ def _folded(points, tangents, radius, lengths, i, line, best):
                         gap = _from_start_to_end(spots, a, b)
                         if gap >= _BACK * along:
                             continue
-                    gap -= widths[a] + s * (widths[a + 1] - widths[a])
-                    gap -= widths[b] + t * (widths[b + 1] - widths[b])
-                    if gap < best:
+                    wide = widths[a] + s * (widths[a + 1] - widths[a])
+                    wide += widths[b] + t * (widths[b + 1] - widths[b])
+                    gap -= wide
+                    if gap < min(best, wide):
                         best = gap
                         place = share[a] + s * (share[a + 1] - share[a])
                         other = share[b] + t * (share[b + 1] - share[b])
     return best, place, other
-
-
-@inline
-def _is_folded(points, tangents, i, lengths):
-    """True if an arm turns far enough to come near itself."""
-    turn = 0.0
-    for k in range(len(lengths)):
-        turn += _bend(points, tangents, i, k, lengths[k]) / max(lengths[k], 1e-300)
-    return turn >= _TURN
 
 
 @kernel
@@ -312,53 +381,48 @@ def nearest(
 
     Arms are centers (n, edge, 3), tangents (n, edge, 3) and radii (n, edge); disks (edge,) have
     radii where there are some, and a tool is a point (n, 3) that a line leads to from the tip, or
-    (0, 3). Solids have a kind, the side that is free and whether that bulges (solid, 3), numbers,
+    (0, 3). Solids have a kind and the side that is free (solid, 2), numbers,
     and the distance wanted behind these; and first and last edges (solid, 2) of the part of the arm
     that they concern. The last row of each is no solid, and of the side 1 if the arm itself
     counts. Places are edges and shares of the arc to the next; the second is another on the arm.
     """
-    lengths, stack, line = room
+    lengths, stack, parts, spots, widths, arc, share, firsts = room
     solids, edge = len(kinds) - 1, len(disks) - 1
     for i in range(points.shape[0]):
         for k in range(edge):
             lengths[k] = _arc(points, tangents, i, k)
-        arm = points, tangents, radius, disks, lengths
         best, found, at, other = _FARTHEST, NONE, -1.0, -1.0
-        laid = kinds[solids, 1] > 0 and _is_folded(points, tangents, i, lengths)
-        folded, count = laid, 0
         for o in range(solids):
+            first, last, wanted = ends[o, 0], ends[o, 1], numbers[o, -1]
             if kinds[o, 0] == HALF_SPACE:
-                near, share = _over(arm, tool, i, numbers[o], ends[o, 0], ends[o, 1], best)
-                if share >= 0.0:
-                    best, found, at = near, o, share
+                near, its = _over_plane(
+                    points, tangents, radius, disks, lengths, i, numbers[o], first, last,
+                    best + wanted,
+                )  # fmt: skip
+                near -= wanted
+                if len(tool) and last == edge:
+                    height = _height(row(tool, i), numbers[o]) - wanted
+                    near, its = (height, edge + 1.0) if height < near else (near, its)
             else:
-                laid = True
-        if laid:
-            count = _lay(points, tangents, radius, disks, tool, lengths, i, tol, line)
-        for o in range(solids):
-            if kinds[o, 0] != HALF_SPACE:
-                solid = kinds[o, 0], kinds[o, 1], kinds[o, 2] > 0, numbers[o, -1], numbers[o]
-                first = line[5][ends[o, 0]]
-                last = count - 1 if ends[o, 1] == edge else line[5][ends[o, 1]]
-                near, share = _marched(solid, meshes, stack, line, first, last, best, tol)
-                if share >= 0.0:
-                    best, found, at = near, o, share
-        if folded:
-            near, share, its = _folded(points, tangents, radius, lengths, i, line, best)
-            if share >= 0.0:
-                best, found, at, other = near, ITSELF, share, its
+                last += len(tool) > 0 and last == edge
+                if kinds[o, 0] == MESH:
+                    near, its = _past_mesh(
+                        kinds[o, 1], wanted, numbers[o], meshes, stack, points, tangents, radius,
+                        disks, tool, lengths, parts, i, first, last, best, tol,
+                    )  # fmt: skip
+                else:
+                    near, its = _past(
+                        kinds[o, 0], kinds[o, 1], wanted, numbers[o], meshes, stack, points,
+                        tangents, radius, disks, tool, lengths, parts, i, first, last, best, tol,
+                        True,
+                    )  # fmt: skip
+            if its >= 0.0:
+                best, found, at = near, o, its
+        if kinds[solids, 1] > 0:
+            near, its, there = _folded(
+                points, tangents, radius, lengths, i, tol, spots, widths, arc, share, firsts, best
+            )
+            if its >= 0.0:
+                best, found, at, other = near, ITSELF, its, there
         value[i], which[i] = best, found
         place[i, 0], place[i, 1] = at, other
-
-
-@inline
-def _over(arm, tool, i, q, first, last, best):
-    """The same for a half-space with the distance wanted, and a tool that the tip holds."""
-    points, tangents, radius, disks, lengths = arm
-    wanted, edge = q[-1], len(disks) - 1
-    near, place = _over_plane(
-        points, tangents, radius, disks, lengths, i, q, first, last, best + wanted
-    )
-    if len(tool) and last == edge and _height(tool[i], q) < near:
-        near, place = _height(tool[i], q), edge + 1.0
-    return near - wanted, place
