@@ -3,69 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.arm.number import number
 from softreach.arm.stations import Span
-from softreach.geometry.meshes import Mesh
 from softreach.geometry.regions import Region
-from softreach.support.arguments import as_path
 from softreach.support.arrays import Array
-from softreach.support.errors import Fault, NotPossible
-from softreach.support.lazy import lazy
-
-
-@dataclass(frozen=True)
-class MeshFile(Region):
-    """Solid inside the closed triangles of a file, which is read when it is first asked for."""
-
-    path: str | PathLike[str]
-    """An STL, PLY, OBJ, OFF or GLB; see `Mesh.load`."""
-    unit: str | None = None
-    """Unit of length of the file; None for that which it names itself."""
-
-    convex: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "path", str(Path(as_path("path", self.path)).absolute()))
-
-    @lazy
-    def mesh(self) -> Mesh:
-        """Its triangles.
-
-        Raises:
-            InvalidInput: As `Mesh.load`.
-            NotPossible: A mesh with holes, or one that is inside out.
-        """
-        mesh = Mesh.load(self.path, unit=self.unit)
-        if mesh.is_turned:
-            raise NotPossible(
-                f"the triangles of {self.path} face in: turn them to face out of what is solid; "
-                "for an arm inside of a mesh, say inside = true"
-            )
-        return mesh
-
-    @property
-    def volume(self) -> float:
-        return self.mesh.volume
-
-    @property
-    def bounds(self) -> Array:
-        return self.mesh.bounds
-
-    def distance(self, points: ArrayLike) -> Array:
-        return self.mesh.distance(points)
-
-    def nearest(self, points: Array) -> tuple[Array, Array]:
-        return self.mesh.nearest(points)
-
-    def wireframe(self, around: Array) -> list[Array]:
-        return self.mesh.wireframe(around)
+from softreach.support.errors import Fault
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -227,6 +227,54 @@ class Mesh(Region):
         return np.concatenate([own, at_edges, at_vertices[self.faces]], axis=1)
 
 
+@dataclass(frozen=True)
+class MeshFile(Region):
+    """Solid inside the closed triangles of a file, which is read when it is first asked for."""
+
+    path: str | PathLike[str]
+    """An STL, PLY, OBJ, OFF or GLB; see `Mesh.load`."""
+    unit: str | None = None
+    """Unit of length of the file; None for that which it names itself."""
+
+    convex: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", str(Path(as_path("path", self.path)).absolute()))
+
+    @lazy
+    def mesh(self) -> Mesh:
+        """Its triangles.
+
+        Raises:
+            InvalidInput: As `Mesh.load`.
+            NotPossible: A mesh with holes, or one that is inside out.
+        """
+        mesh = Mesh.load(self.path, unit=self.unit)
+        if mesh.is_turned:
+            raise NotPossible(
+                f"the triangles of {self.path} face in: turn them to face out of what is solid; "
+                "for an arm inside of a mesh, say inside = true"
+            )
+        return mesh
+
+    @property
+    def volume(self) -> float:
+        return self.mesh.volume
+
+    @property
+    def bounds(self) -> Array:
+        return self.mesh.bounds
+
+    def distance(self, points: ArrayLike) -> Array:
+        return self.mesh.distance(points)
+
+    def nearest(self, points: Array) -> tuple[Array, Array]:
+        return self.mesh.nearest(points)
+
+    def wireframe(self, around: Array) -> list[Array]:
+        return self.mesh.wireframe(around)
+
+
 def _unit_of(name: str) -> str | None:
     """The unit that the beginning of the file of a mesh states, if it does."""
     path = Path(name)

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.obstacles import MeshFile, Obstacle, obstacle_names
+from softreach.arm.obstacles import Obstacle, obstacle_names
 from softreach.arm.stations import Marker
 from softreach.arm.tables import tables
-from softreach.geometry.meshes import STACK, DistanceField, Mesh
+from softreach.geometry.meshes import STACK, DistanceField, Mesh, MeshFile
 from softreach.kernels.rod.frames import centerlines
 from softreach.kernels.room.nearest import FIELD_ERROR, ITSELF, MOST_PARTS, NONE, nearest, swollen
 from softreach.kernels.room.shapes import HALF_SPACE, MESH, NUMBERS
