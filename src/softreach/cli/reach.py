@@ -201,6 +201,7 @@ def cloud(
     sampling: options.Sampling = options.SAMPLING,
     tol: Number = 1e-6,
     device: options.Device = "cpu",
+    free: bool = False,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
     output: options.Output = options.DEFAULT,
@@ -212,6 +213,7 @@ def cloud(
     Args:
         tol: Largest tip error, in L.
         device: What computes the tips: cpu, or cuda (a GPU), which takes arms without loads.
+        free: Keep only samples at which the whole arm is clear of its surroundings and of itself.
         out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
     from softreach.cloud.clouds import CLOUD_STORE
@@ -222,7 +224,10 @@ def cloud(
     options.check_output(out, CLOUD_STORE, output.overwrite)
     arguments = sampling.arguments
     start = perf_counter()
-    dataset = sr.compute_cloud(arm, **arguments, tol=tol, device=device)
+    dataset = sr.compute_cloud(arm, **arguments, tol=tol, device=device, clearance=free)
+    touching: Rows = {}
+    if free:
+        dataset, touching = _free(dataset)
     seconds = perf_counter() - start
     sr.save_cloud(dataset, out, overwrite=output.overwrite)
     rows: Rows = {
@@ -232,6 +237,7 @@ def cloud(
         "steps per arm": (sr.rod.as_tip_map(arm, tol).steps, ""),
         "device": (dataset.attrs["device"], ""),
         "time to compute": (round(seconds, 3), "s"),
+        **touching,
         **load_rows(arm),
         **{
             status.name.lower().replace("_", " "): (int((dataset.status == status).sum()), "")
@@ -242,6 +248,19 @@ def cloud(
         "cloud": (str(out), ""),
     }
     console.rows(f"cloud of {design}", rows, output.json, arm)
+
+
+def _free(cloud: Any) -> tuple[Any, Rows]:
+    """The samples that touch nothing, and a row for what the others touch."""
+    touches = cloud.clearance <= 0.0
+    left = cloud.isel(sample=(cloud.clearance > 0.0).values)
+    if not left.sizes["sample"]:
+        raise NotPossible("the arm touches something in every sample: look at its surroundings")
+    counts = {
+        f"touching {name}": (int((touches & (cloud.obstacle == k)).sum()), "")
+        for k, name in enumerate(cloud.clearance.names)
+    }
+    return left, {"free samples": (left.sizes["sample"], ""), **counts}
 
 
 def volume(

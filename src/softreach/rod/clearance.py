@@ -291,8 +291,8 @@ class ClearanceMap:
         z = np.interp(found.place[:, 0], edges, np.append(self.stations, self.arm.length))
         error = {"error": self.error, "error_apart": self.contact_error}
         return {
-            "clearance": ("sample", found.value, {"units": "m", **error}),
-            "obstacle": ("sample", np.maximum(number, -1), {"names": self.names}),
+            "clearance": ("sample", found.value, {"units": "m", "names": self.names, **error}),
+            "obstacle": ("sample", np.maximum(number, -1), {}),
             "station": ("sample", np.where(number < 0, np.nan, z), {"units": "m"}),
         }
 
@@ -427,10 +427,11 @@ def compute_clearance(
 
     Returns:
         Dataset over `sample` with `clearance` [m], beyond what is wanted; infinite where nothing is
-        near, NaN without an equilibrium. `obstacle`, its number in the attribute `names`, -1 for
-        none; `station`, Z of the place [m]. With `slopes`, `clearance_slope` (sample, bundle)
-        [m per unit]. The attribute `error` says how much smaller a clearance may be [m], and
-        `error_apart` that of arms that touch no mesh.
+        near, NaN without an equilibrium. `obstacle`, its number among the `names` in the attributes
+        of `clearance`, -1 for none; `station`, Z of the place [m]. With `slopes`, also
+        `clearance_slope` (sample, bundle) [m per unit]. The attribute `error` says how much smaller
+        a clearance may be [m], and `error_apart` that of arms that touch nothing, where a mesh is
+        near.
 
     Raises:
         InvalidInput: As for `tip_positions`, or an accuracy out of range.
