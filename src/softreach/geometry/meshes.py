@@ -29,7 +29,7 @@ _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
 _FEW = 4  # triangles of the smallest box around some
 _ENDS = np.minimum, np.maximum
 _ENOUGH = 0.97  # of a distance in a field, which is exact near by
-_NODES = 97  # along each edge of a field
+_NODES = 65  # along each edge of a field
 STACK = 128  # Room of a search in a tree: twice its depth
 
 

@@ -416,7 +416,7 @@ def compute_clearance(
 
     The arm is as wide as the widest of its body, R2 ζ^-ν, its tendons and its disks, and counts
     as balls around its centerline; so does the line to the point of a tool, without width. Parts of
-    the arm count where they come nearer to each other than the arm is wide and it has turned back.
+    the arm count where the gap between them is below half of its width and it has turned back.
 
     Args:
         arm: The design with its `surroundings`, or its tip map.

@@ -320,7 +320,7 @@ def _from_start_to_end(spots, a, b):
 def _folded(
     points, tangents, radius, lengths, i, sag, spots, widths, arc, share, firsts, best
 ):  # fmt: skip
-    """The least gap between two parts of an arm below `best` and their width, and both places."""
+    """The least gap between parts of an arm below `best` and half their width, and both places."""
     place, other, count, laid = -1.0, -1.0, len(lengths), False
     for k in range(count):
         turn = _bend(points, tangents, i, k, lengths[k]) / max(lengths[k], 1e-300)
@@ -336,7 +336,7 @@ def _folded(
                 square += (0.5 * (here - points[i, m, axis] - points[i, m + 1, axis])) ** 2
             wide = max(radius[i, k], radius[i, k + 1]) + max(radius[i, m], radius[i, m + 1])
             least = math.sqrt(square) - 0.5 * (lengths[k] + lengths[m])
-            if least > _BACK * passed or least - wide > min(best, wide):
+            if least > _BACK * passed or least - wide > min(best, 0.5 * wide):
                 continue
             if not laid:
                 laid = True
@@ -353,7 +353,7 @@ def _folded(
                     wide = widths[a] + s * (widths[a + 1] - widths[a])
                     wide += widths[b] + t * (widths[b + 1] - widths[b])
                     gap -= wide
-                    if gap < min(best, wide):
+                    if gap < min(best, 0.5 * wide):
                         best = gap
                         place = share[a] + s * (share[a + 1] - share[a])
                         other = share[b] + t * (share[b + 1] - share[b])
