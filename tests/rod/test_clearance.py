@@ -1,4 +1,4 @@
-"""Laws of clearance: against dense sampling, by differences, and where there is none to speak of."""
+"""Laws of clearance: against dense sampling, by differences, and of what is refused."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
 """Requirements of an arm: places, regions, bounds; met or missed, and by how much."""
 
 from softreach.geometry.meshes import Mesh
-from softreach.geometry.regions import Box, HalfSpace, Region, Sphere
+from softreach.geometry.regions import Box, Cylinder, HalfSpace, Region, Sphere, Tube
 from softreach.requirements.checks import Check, Coverage, check
 from softreach.requirements.findings import Finding, quick_excess
 from softreach.requirements.parts import Keep, Limits, Target
@@ -11,6 +11,7 @@ __all__ = [
     "Box",
     "Check",
     "Coverage",
+    "Cylinder",
     "Finding",
     "HalfSpace",
     "Keep",
@@ -20,6 +21,7 @@ __all__ = [
     "Requirements",
     "Sphere",
     "Target",
+    "Tube",
     "check",
     "quick_excess",
 ]

@@ -207,10 +207,7 @@ class ClearanceMap:
 
     @lazy
     def contact_error(self) -> float:
-        """How much smaller the clearance of arms that touch nothing may be [m].
-
-        Of solids as for all; of a mesh so much more as its field does not tell.
-        """
+        """How much smaller a clearance may be where the field of a mesh decides [m]."""
         meshes = self._prepared[-1]
         spacing = max(meshes[5][:, 3], default=0.0)
         return self.error + FIELD_ERROR * spacing
@@ -430,8 +427,7 @@ def compute_clearance(
         near, NaN without an equilibrium. `obstacle`, its number among the `names` in the attributes
         of `clearance`, -1 for none; `station`, Z of the place [m]. With `slopes`, also
         `clearance_slope` (sample, bundle) [m per unit]. The attribute `error` says how much smaller
-        a clearance may be [m], and `error_apart` that of arms that touch nothing, where a mesh is
-        near.
+        a clearance may be [m], `error_apart` that near a mesh, unless the arm just touches it.
 
     Raises:
         InvalidInput: As for `tip_positions`, or an accuracy out of range.
