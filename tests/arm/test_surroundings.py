@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import HalfSpace, Manipulator, Obstacle, Tube, designs
+from softreach.arm import Manipulator, Obstacle, designs
 from softreach.arm.design_reader import json_schema
+from softreach.requirements import HalfSpace, Tube
 from softreach.rod import compute_clearance
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from tests.requirements.test_regions import box_mesh
@@ -108,10 +109,10 @@ def test_a_mesh_that_is_missing_is_asked_for_when_it_is_used(tmp_path):
 def test_open_and_turned_meshes_and_archives_are_refused_by_name(tmp_path, cube):
     vertices, faces = cube
     hole = arm_beside(stl(tmp_path / "open.stl", (vertices, faces[:-1])), mesh_unit="m")
-    with pytest.raises(NotPossible, match="open.stl has holes: close its 3 open edges"):
+    with pytest.raises(NotPossible, match=r"open\.stl has holes: close its 3 open edges"):
         compute_clearance(hole, [0, 0, 0])
     turned = arm_beside(stl(tmp_path / "in.stl", (vertices, faces[:, ::-1])), mesh_unit="m")
-    with pytest.raises(NotPossible, match="in.stl face in: turn them to face out"):
+    with pytest.raises(NotPossible, match=r"in\.stl face in: turn them to face out"):
         compute_clearance(turned, [0, 0, 0])
     with zipfile.ZipFile(tmp_path / "packed.stl", "w", zipfile.ZIP_DEFLATED) as file:
         file.writestr("tank.stl", b"\0" * 10_000_000)

@@ -166,7 +166,7 @@ def test_gradients_are_unit_vectors_along_which_distances_grow(region):
 
 
 def test_cylinders_and_tubes_without_a_size_are_refused():
-    with pytest.raises(InvalidInput, match="end = .* another place than start"):
+    with pytest.raises(InvalidInput, match=r"end = .* another place than start"):
         Cylinder((0, 0, 0), (0, 0, 0), 1.0)
     with pytest.raises(InvalidInput, match="inner_radius = 1"):
         Tube((0, 0, 0), (0, 0, 1), 1.0, 1.0)

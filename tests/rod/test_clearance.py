@@ -3,18 +3,8 @@
 import numpy as np
 import pytest
 
-from softreach.arm import (
-    Box,
-    Cylinder,
-    HalfSpace,
-    Loads,
-    Marker,
-    Mesh,
-    Obstacle,
-    Sphere,
-    Tube,
-    designs,
-)
+from softreach.arm import Loads, Marker, Obstacle, designs
+from softreach.requirements import Box, Cylinder, HalfSpace, Mesh, Sphere, Tube
 from softreach.rod import as_tip_map, compute_clearance
 from softreach.rod.clearance import ITSELF, NONE, ClearanceMap
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, SoftreachWarning
@@ -155,6 +145,22 @@ def test_slopes_are_differences(name):
     assert np.quantile(off, 0.9) < 2e-3 * np.abs(slopes).max()
 
 
+def test_the_nearest_of_two_meshes_counts():
+    balls = [Obstacle(region=bumpy(0.2, (x, 0.1, 0.4), 2)) for x in (0.5, -0.5)]
+    gamma = samples(ClearanceMap(as_tip_map(TRUNK)), 200)
+
+    def clearance(*obstacles):
+        arm = TRUNK.replace(surroundings=obstacles)
+        return ClearanceMap(as_tip_map(arm), itself=False).of(gamma)
+
+    one, other = (clearance(ball).value for ball in balls)
+    both = clearance(*balls)
+    np.testing.assert_allclose(both.value, np.minimum(one, other), atol=0.03)
+    assert {*both.which} == {0, 1}
+    touch = both.value < 0
+    np.testing.assert_array_equal(touch, np.minimum(one, other) < 0)
+
+
 def test_slopes_of_the_gap_to_itself_are_differences():
     found, step = ClearanceMap(as_tip_map(TRUNK), 1e-5), 1e-4
     gamma = samples(found, 600)
@@ -164,7 +170,11 @@ def test_slopes_of_the_gap_to_itself_are_differences():
     assert (value.which == ITSELF).all()
     pairs = [(found.of(gamma + step * e), found.of(gamma - step * e)) for e in np.eye(3)]
     differences = np.stack([(a.value - b.value) / (2 * step) for a, b in pairs], axis=1)
-    np.testing.assert_allclose(slopes, differences, atol=1e-6)
+    # But where another pair of places takes over, a kink.
+    moved = [np.abs(each.place - value.place).max(axis=1) for pair in pairs for each in pair]
+    alike = np.max(moved, axis=0) < 0.2
+    assert alike.mean() > 0.9
+    np.testing.assert_allclose(slopes[alike], differences[alike], atol=1e-6)
 
 
 def test_a_distance_wanted_is_taken_off_and_an_exempt_part_does_not_count():
@@ -203,7 +213,7 @@ def test_a_loaded_arm_has_the_gaps_of_its_equilibria():
     radius = arm.profile.radius(z) * shape.extension**-found._poisson
     gaps = [each.region.distance(shape.position.reshape(-1, 3)) for each in (ball, floor)]
     least = (np.min(gaps, axis=0).reshape(20, -1) - radius).min(axis=1)
-    value, slopes = found.with_slopes(gamma[:3])
+    slopes = found.with_slopes(gamma[:3])[1]
     np.testing.assert_allclose(found.of(gamma).value, least, atol=2 * found.error, equal_nan=True)
     step = 1e-3 * found.whole.box.widths[0]
     ends = (found.of(gamma[:3] + sign * step * np.eye(3)[0]).value for sign in (1, -1))

@@ -18,15 +18,7 @@ from .lines import line_lengths as line_lengths
 from .loads import Loads as Loads
 from .loads import PointLoad as PointLoad
 from .manipulator import Manipulator as Manipulator
-from .obstacles import Box as Box
-from .obstacles import Cylinder as Cylinder
-from .obstacles import HalfSpace as HalfSpace
-from .obstacles import Mesh as Mesh
-from .obstacles import MeshFile as MeshFile
 from .obstacles import Obstacle as Obstacle
-from .obstacles import Region as Region
-from .obstacles import Sphere as Sphere
-from .obstacles import Tube as Tube
 from .part import AlongArm as AlongArm
 from .part import Pieces as Pieces
 from .part import Samples as Samples

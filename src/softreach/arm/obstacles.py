@@ -8,23 +8,9 @@ import numpy as np
 
 from softreach.arm.number import number
 from softreach.arm.stations import Span
-from softreach.geometry.meshes import Mesh, MeshFile
-from softreach.geometry.regions import Box, Cylinder, HalfSpace, Region, Sphere, Tube
+from softreach.geometry.regions import Region
 from softreach.support.arrays import Array
 from softreach.support.errors import Fault
-
-__all__ = [
-    "Box",
-    "Cylinder",
-    "HalfSpace",
-    "Mesh",
-    "MeshFile",
-    "Obstacle",
-    "Region",
-    "Sphere",
-    "Tube",
-    "obstacle_names",
-]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -167,7 +167,8 @@ class Mesh(Region):
         """Boxes around its triangles, by which the nearest one is found."""
         corners, count = self._corners, len(self.faces)
         order, middles, boxes = np.arange(count), corners.mean(axis=1), list[Array]()
-        for level in range(max(0, int(np.ceil(np.log2(count / _FEW)))) + 1):
+        depth = max(0, int(np.ceil(np.log2(count / _FEW))))
+        for level in range(depth + 1):
             starts = np.arange(2**level + 1) * count // 2**level
             own = corners[order]
             ends = own.min(axis=1), own.max(axis=1)
@@ -175,16 +176,9 @@ class Mesh(Region):
             boxes.append(np.concatenate([low, high], axis=1))
             block = np.repeat(np.arange(2**level), np.diff(starts))
             along = middles[order, (high - low).argmax(axis=1)[block]]
-            cut, order = order, order[np.lexsort((along, block))]
-        return TriangleTree(np.concatenate(boxes), starts, corners[cut], self._normals[cut])
-
-    def field(self, center: Array, half: float, nodes: int = _NODES) -> DistanceField:
-        """Distances at so many nodes along each edge of a cube around a center [m], shape (3,)."""
-        spacing = 2.0 * half / (nodes - 1)
-        steps = np.array(list(np.ndindex(nodes, nodes, nodes)), float)
-        low = np.asarray(center, float) - half
-        distance, _, face = self.tree.nearest(low + spacing * steps, _ENOUGH)
-        return DistanceField(np.append(low, spacing), np.full(3, nodes), distance, face)
+            order = order[np.lexsort((along, block))]  # within each box
+        starts = np.arange(2**depth + 1) * count // 2**depth
+        return TriangleTree(np.concatenate(boxes), starts, corners[order], self._normals[order])
 
     def wireframe(self, around: Array) -> list[Array]:
         edges, beside = self._edges[:2]
@@ -225,6 +219,15 @@ class Mesh(Region):
         at_edges = self._face_normals[beside].sum(axis=1)[edges]
         own = self._face_normals[:, None]
         return np.concatenate([own, at_edges, at_vertices[self.faces]], axis=1)
+
+
+def field_around(mesh: Mesh, center: Array, half: float, nodes: int = _NODES) -> DistanceField:
+    """Distances at so many nodes along each edge of a cube around a center [m], shape (3,)."""
+    spacing = 2.0 * half / (nodes - 1)
+    steps = np.array(list(np.ndindex(nodes, nodes, nodes)), float)
+    low = np.asarray(center, float) - half
+    distance, _, face = mesh.tree.nearest(low + spacing * steps, _ENOUGH)
+    return DistanceField(np.append(low, spacing), np.full(3, nodes), distance, face)
 
 
 @dataclass(frozen=True)

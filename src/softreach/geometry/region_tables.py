@@ -65,6 +65,7 @@ class RegionReader(toml.FaultReader):
         return self.region(raw, shapes[0], f"{path}.{shapes[0]}")
 
     def region(self, raw: dict[str, Any], shape: str, path: str) -> Any:
+        """The region that stands under the key of its shape."""
         table = raw[shape]
         if shape == "mesh" and isinstance(table, str):
             try:
@@ -98,7 +99,7 @@ class RegionReader(toml.FaultReader):
         if wrong and kind not in self.instead:
             return toml.WRONG
         if wrong & {"region", "places"}:
-            right = self.instead[kind] | right
+            right = {**self.instead[kind], **right}
         try:
             made = kind(**right)
             return toml.WRONG if wrong else made

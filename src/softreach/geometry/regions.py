@@ -317,7 +317,9 @@ class Cylinder(Region):
         first = np.cross(self.axis, np.eye(3)[int(np.abs(self.axis).argmin())])
         first /= np.linalg.norm(first)
         second = np.cross(self.axis, first)
-        ring = radius * (np.cos(_CIRCLE)[:, None] * first + np.sin(_CIRCLE)[:, None] * second)
+        ring: Array = radius * (
+            np.cos(_CIRCLE)[:, None] * first + np.sin(_CIRCLE)[:, None] * second
+        )
         ends = ring + self.start, ring + self.end
         return [*ends, *(np.stack([end[k] for end in ends]) for k in range(0, 48, 12))]
 

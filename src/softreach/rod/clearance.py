@@ -18,7 +18,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.obstacles import Obstacle, obstacle_names
 from softreach.arm.stations import Marker
 from softreach.arm.tables import tables
-from softreach.geometry.meshes import STACK, DistanceField, Mesh, MeshFile
+from softreach.geometry.meshes import STACK, DistanceField, Mesh, MeshFile, field_around
 from softreach.kernels.rod.frames import centerlines
 from softreach.kernels.room.nearest import FIELD_ERROR, ITSELF, MOST_PARTS, NONE, nearest, swollen
 from softreach.kernels.room.shapes import HALF_SPACE, MESH, NUMBERS
@@ -28,7 +28,7 @@ from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_number
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array, Index, rows
 from softreach.support.errors import NotPossible, Range, warn
 from softreach.support.lazy import lazy
 
@@ -45,6 +45,12 @@ _PILOTS = 64
 _MOST_EDGES = 2048
 _FIELD = 1.25  # half an edge of fields around meshes, over the longest arm
 _STRANGE = 300.0  # sizes of meshes over L, or the inverse, at which a wrong unit is likely
+
+
+_NOTHING: tuple[Any, ...] = (
+    *(np.empty((0, 6)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
+    *(np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64)),
+)  # trees and fields of no mesh
 
 
 class Clearances(NamedTuple):
@@ -124,10 +130,8 @@ class ClearanceMap:
     @lazy
     def stations(self) -> Array:
         """Z of the edges [m], from base to tip: so many that cubics between them are good."""
-        gamma = self.whole.box.clip(pilot_activations(self.arm, self.whole.box))[
-            :: 1 + len(self.whole.box.low)
-        ]
-        gamma, steps = gamma[:_PILOTS], max(2, self.tip_map.steps or 8)
+        gamma = pilot_activations(self.arm, self.whole.box)
+        gamma, steps = gamma[:: -(-len(gamma) // _PILOTS)], max(2, self.tip_map.steps or 8)
         allowed = _CUBICS * self.error
         while True:
             z = self._edges_of(steps)
@@ -161,10 +165,7 @@ class ClearanceMap:
         n = len(gamma)
         out = Clearances(np.empty(n), np.empty(n, np.int64), np.empty((n, 2)))
         self._prepared  # noqa: B018
-        tasks = (
-            partial(self._fill, gamma[b], Clearances(*(each[b] for each in out)))
-            for b in parallel.blocks(n, _BLOCK)
-        )
+        tasks = (partial(self._fill, gamma[b], rows(out, b)) for b in parallel.blocks(n, _BLOCK))
         parallel.run(tasks)
         return out
 
@@ -256,30 +257,17 @@ class ClearanceMap:
         kinds[count, 1] = self.itself
         return disks, kinds, numbers, ends, self._trees(meshes)
 
-    def _trees(self, meshes: list[Mesh]) -> tuple[Array, ...]:
-        """Trees and fields of all meshes, one after another, and where each begins."""
+    def _trees(self, meshes: list[Mesh]) -> tuple[Any, ...]:
+        """Where trees and fields of all meshes begin, and these one after another."""
         half = _FIELD * min(self.whole.farthest(), 1.5 * self.arm.length)
-        center = tuple(self.arm.base.position)
-        trees, fields = [mesh.tree for mesh in meshes], [_field(m, center, half) for m in meshes]
-        each = [
-            (t.boxes, t.starts, t.corners, f.distance) for t, f in zip(trees, fields, strict=True)
-        ]
-        sizes = np.cumsum([[0] * 4, *([len(x) for x in one] for one in each)], axis=0)
-        if not meshes:
-            empty = np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64)
-            shapes = (
-                np.empty((0, 6)),
-                np.empty(0, np.int64),
-                np.empty((0, 3, 3)),
-                np.empty((0, 7, 3)),
-            )
-            return sizes, *shapes, *empty
-        joined = [np.concatenate(parts) for parts in zip(*trees, strict=True)]
-        grids = np.stack([f.grid for f in fields]), np.stack([f.shape for f in fields])
-        known = (
-            np.concatenate([getattr(f, name) for f in fields]) for name in ("distance", "face")
-        )
-        return sizes, *joined, *grids, *known
+        sizes, parts = [np.zeros(4, np.int64)], [_NOTHING]
+        for mesh in meshes:
+            tree, field = mesh.tree, _field(mesh, tuple(self.arm.base.position), half)
+            first, counts = sizes[-1][3], (tree.boxes, tree.starts, field.distance, tree.corners)
+            grid = field.grid[None], field.shape[None], field.distance, field.face + first
+            parts.append((*tree._replace(starts=tree.starts + first), *grid))
+            sizes.append(sizes[-1] + [len(each) for each in counts])
+        return np.array(sizes), *(np.concatenate(each) for each in zip(*parts, strict=True))
 
     def variables(self, found: Clearances) -> dict[str, Any]:
         """The same as variables of a dataset over `sample`."""
@@ -341,9 +329,13 @@ class ClearanceMap:
         h = hermite(arc, t[:, None])
         weights = [w[:, 0] for w in h]
         terms = (p[:, 0], p[:, 1], u[:, 0], u[:, 1])
-        points = sum(w[:, None] * x for w, x in zip(weights, terms, strict=True))
+        points: Array = np.sum(
+            [w[:, None] * x for w, x in zip(weights, terms, strict=True)], axis=0
+        )
         each = (ends[0][0], ends[1][0], ends[0][1], ends[1][1])
-        moves[:, :3] = sum(w[:, None, None] * x for w, x in zip(weights, each, strict=True))
+        moves[:, :3] = np.sum(
+            [w[:, None, None] * x for w, x in zip(weights, each, strict=True)], axis=0
+        )
         bow = (weights[2][:, None] * u[:, 0] + weights[3][:, None] * u[:, 1]) / arc
         moves[:, :3] += bow[:, :, None] * rates[:, None]
         shrink = [self._swelling(edges, gamma, k + side) for side in (0, 1)]
@@ -455,7 +447,7 @@ class _Part(FreeRod):
 
 @lru_cache(maxsize=16)
 def _field(mesh: Mesh, center: tuple[float, float, float], half: float) -> DistanceField:
-    return mesh.field(np.array(center), half)
+    return field_around(mesh, np.array(center), half)
 
 
 def _check_size(obstacle: Obstacle, name: str, length: float) -> None:

@@ -125,23 +125,9 @@ def _over_plane(points, tangents, radius, disks, lengths, i, q, first, last, bes
 
 @inline
 def _gap(
-    kind,
-    side,
-    wanted,
-    q,
-    meshes,
-    stack,
-    points,
-    tangents,
-    radius,
-    tool,
-    lengths,
-    i,
-    k,
-    t,
-    exact,
-    most,
-):
+    kind, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k, t, exact,
+    most
+):  # fmt: skip
     """Gap between a solid and the ball around a point of an arm.
 
     Or to all but the solid where side is -1; to meshes by their fields, if not `exact` or `most`
@@ -362,21 +348,9 @@ def _folded(
 
 @kernel
 def nearest(
-    points,
-    tangents,
-    radius,
-    disks,
-    tool,
-    kinds,
-    numbers,
-    ends,
-    meshes,
-    tol,
-    room,
-    value,
-    which,
-    place,
-):
+    points, tangents, radius, disks, tool, kinds, numbers, ends, meshes, tol, room, value, which,
+    place
+):  # fmt: skip
     """Least gaps (n,), with which solid (n,), and where along the arm (n, 2), of arms at edges.
 
     Arms are centers (n, edge, 3), tangents (n, edge, 3) and radii (n, edge); disks (edge,) have
