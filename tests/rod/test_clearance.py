@@ -163,18 +163,17 @@ def test_the_nearest_of_two_meshes_counts():
 
 def test_slopes_of_the_gap_to_itself_are_differences():
     found, step = ClearanceMap(as_tip_map(TRUNK), 1e-5), 1e-4
-    gamma = samples(found, 600)
-    gamma = gamma[found.of(gamma).value < 0.04]
+    gamma = samples(found, 1500)
+    gamma = gamma[found.of(gamma).value < 0.025]
     value, slopes = found.with_slopes(gamma)
     assert len(gamma) > 2
     assert (value.which == ITSELF).all()
     pairs = [(found.of(gamma + step * e), found.of(gamma - step * e)) for e in np.eye(3)]
     differences = np.stack([(a.value - b.value) / (2 * step) for a, b in pairs], axis=1)
-    # But where another pair of places takes over, a kink.
-    moved = [np.abs(each.place - value.place).max(axis=1) for pair in pairs for each in pair]
-    alike = np.max(moved, axis=0) < 0.2
-    assert alike.mean() > 0.9
-    np.testing.assert_allclose(slopes[alike], differences[alike], atol=1e-6)
+    off = np.abs(slopes - differences).max(axis=1)
+    assert np.median(off) < 1e-8
+    # Places are ends of chords where these bulge toward the other part, and so jump a little.
+    assert off.max() < 0.05 * np.abs(slopes).max()
 
 
 def test_a_distance_wanted_is_taken_off_and_an_exempt_part_does_not_count():

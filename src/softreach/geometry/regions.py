@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -316,10 +316,8 @@ class Cylinder(Region):
         """Both ends as circles, and four lines between them."""
         first = np.cross(self.axis, np.eye(3)[int(np.abs(self.axis).argmin())])
         first /= np.linalg.norm(first)
-        second = np.cross(self.axis, first)
-        ring: Array = radius * (
-            np.cos(_CIRCLE)[:, None] * first + np.sin(_CIRCLE)[:, None] * second
-        )
+        turns = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)
+        ring: Any = radius * turns @ np.stack([first, np.cross(self.axis, first)])
         ends = ring + self.start, ring + self.end
         return [*ends, *(np.stack([end[k] for end in ends]) for k in range(0, 48, 12))]
 

@@ -368,7 +368,7 @@ class ClearanceMap:
         if edge not in known:
             rod = self.tip_map.rod
             if isinstance(rod, FreeRod):
-                part = _Part(rod.arm.replace(point=None), rod.tol, len(self._table))
+                part = FreeRod(rod.arm.replace(point=None), rod.tol, len(self._table))
                 vars(part)["_table"] = self._table[:edge]
                 known[edge] = replace(self.tip_map, rod=part)
             else:
@@ -438,11 +438,6 @@ def compute_clearance(
         variables["clearance_slope"] = (("sample", "bundle"), rates, {"units": "m per unit"})
     names = {"bundle": list(tip_map.box.names)} if rates is not None else {}
     return xr.Dataset(variables, names)
-
-
-@dataclass(frozen=True, repr=False)
-class _Part(FreeRod):
-    """A free rod up to an edge, by the beginning of the table of the whole."""
 
 
 @lru_cache(maxsize=16)
