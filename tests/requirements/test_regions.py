@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.requirements import Box, HalfSpace, Mesh, Sphere
+from softreach.requirements import Box, Cylinder, HalfSpace, Mesh, Sphere, Tube
 from softreach.support.errors import InvalidInput, NotPossible
 
 RNG = np.random.default_rng(3)
@@ -138,3 +138,35 @@ def test_faces_that_look_inward_are_turned():
     turned = Mesh(mesh.vertices, mesh.faces[:, ::-1])
     assert turned.distance([[0.1, 0.2, 0.3]])[0] < 0
     assert turned.volume == pytest.approx(BOX.volume)
+
+
+@pytest.mark.parametrize(
+    "region",
+    [
+        BOX,
+        BALL,
+        PLANE,
+        Cylinder((0.1, 0, -0.2), (0.4, 0.3, 0.5), 0.2),
+        Tube((0.1, 0, -0.2), (0.4, 0.3, 0.5), 0.3, 0.2),
+        box_mesh(BOX),
+    ],
+    ids=lambda region: type(region).__name__,
+)
+def test_gradients_are_unit_vectors_along_which_distances_grow(region):
+    points = RNG.uniform(-1, 1, (3000, 3))
+    distance, gradient = region.nearest(points)
+    np.testing.assert_allclose(distance, region.distance(points), atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(gradient, axis=1), 1.0, atol=1e-9)
+    feet = points - distance[:, None] * gradient  # lie on the boundary
+    np.testing.assert_allclose(region.distance(feet), 0.0, atol=1e-9)
+    if np.isfinite(region.volume):
+        share = (region.distance(RNG.uniform(-1, 1, (100_000, 3))) < 0).mean()
+        inside = np.clip(region.bounds, -1, 1) == region.bounds
+        assert not inside.all() or 8 * share == pytest.approx(region.volume, rel=0.1)
+
+
+def test_cylinders_and_tubes_without_a_size_are_refused():
+    with pytest.raises(InvalidInput, match=r"end = .* another place than start"):
+        Cylinder((0, 0, 0), (0, 0, 0), 1.0)
+    with pytest.raises(InvalidInput, match="inner_radius = 1"):
+        Tube((0, 0, 0), (0, 0, 1), 1.0, 1.0)

@@ -18,6 +18,7 @@ from .lines import line_lengths as line_lengths
 from .loads import Loads as Loads
 from .loads import PointLoad as PointLoad
 from .manipulator import Manipulator as Manipulator
+from .obstacles import Obstacle as Obstacle
 from .part import AlongArm as AlongArm
 from .part import Pieces as Pieces
 from .part import Samples as Samples

@@ -270,6 +270,23 @@ class Body:
             disk_ratio=np.concatenate([nothing, *(part.held_ratio for part in each)], axis=1),
         )
 
+    def widest(self, z: Array) -> Array:
+        """Radius of the widest of body, tendons, and disks that stand everywhere [m], (station,).
+
+        Before activation, at ascending Z [m].
+        """
+        radius = self.profile.radius(z)
+        if not self.bundles:
+            return radius
+        outline = self.outline(z)
+        placed = np.array(
+            [bool(part.disk_stations(self.profile)) for part in self.bundle_actuators]
+        )
+        ratio = np.where(placed, outline.outer_ratio, outline.held_ratio)
+        held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
+        held = held[2:] | held[1:-1] | held[:-2]
+        return radius * np.where(held, ratio, 0.0).max(axis=1).clip(1.0)
+
     @lazy
     def disks(self) -> Disks:
         """Those that hold tendons, at ascending Z."""

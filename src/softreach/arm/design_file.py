@@ -29,10 +29,12 @@ from softreach.arm.body import RestShape
 from softreach.arm.drives import Drive
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.number import NamedFloats, Number, Station, fields_of, unit_suffix
+from softreach.arm.obstacles import Obstacle
 from softreach.arm.part import AlongArm, Part, Samples
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.section import Material, Measured, Ring, Section
 from softreach.arm.stations import Marker, RigidPiece, Stations
+from softreach.geometry.region_tables import region_line
 from softreach.support import plugins
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.formats import FileFormat, Formats
@@ -67,6 +69,7 @@ TABLES: Mapping[str, type] = {
     "rigid_piece": RigidPiece,
     "marker": Marker,
     "drive": Drive,
+    "surrounding": Obstacle,
 }
 """Other parts that tables describe."""
 
@@ -95,6 +98,7 @@ LAYOUT: Mapping[str, Block] = {
     "rigid_pieces": Block(list, RigidPiece, "Where the arm is not deformed"),
     "drives": Block(list, Drive, "Inputs that activate bundles; others are inputs themselves"),
     "markers": Block(list, Marker, "Points that go with sections of the arm"),
+    "surroundings": Block(list, Obstacle, "Solids that the arm must not touch"),
     "loads": Block(dict, Loads),
     "base": Block(dict, Base),
     "rest": Block(dict, RestShape),
@@ -132,7 +136,7 @@ def keys_of(kind: type) -> Mapping[str, Key]:
         default = field.default if field.default_factory is MISSING else None
         if number is not None and number.named:  # text has no unit
             keys.append(Key(field.name, field.name, None, default, of_names=True))
-        if (kind, field.name) != (Section, "rings"):
+        if (kind, field.name) not in {(Section, "rings"), (Obstacle, "region")}:
             keys.append(Key(name, field.name, number, default))
     return MappingProxyType({key.name: key for key in keys})
 
@@ -323,6 +327,8 @@ def render(arm: Mapping[str, Any]) -> str:
         blocks.append(["[stations]", *places])
     for several in ("actuators", "rigid_pieces", "drives", "markers"):
         blocks += [[f"[[{several}]]", *_lines(part)] for part in arm[several]]
+    for each in arm["surroundings"]:
+        blocks.append(["[[surroundings]]", region_line(each.region), *_lines(each)])
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]

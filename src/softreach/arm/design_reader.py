@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Set
 from os import PathLike
+from pathlib import Path
 from typing import Any, TypeVar
 
 from softreach.arm.actuators import Actuator
@@ -32,6 +33,7 @@ from softreach.arm.design_file import (
 )
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.number import Number
+from softreach.arm.obstacles import Obstacle
 from softreach.arm.part import AlongArm, Part, Pieces, Samples
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import (
@@ -44,6 +46,7 @@ from softreach.arm.section import (
     named_material,
 )
 from softreach.arm.stations import Marker, Stations
+from softreach.geometry.region_tables import SHAPES, RegionReader
 from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 from softreach.support.files import toml
 from softreach.support.files.text import read_text
@@ -79,7 +82,7 @@ def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     if isinstance(version, bool) or version != 2:
         beside = "" if "profile" in document else ", and a design has a table [profile]"
         raise InvalidDesign([Fault("version", version, f"must be 2{beside}")], source)
-    reader = _Reader(document)
+    reader = _Reader(document, Path(source).parent)
     fields, faults, arm = reader.fields(), reader.faults, None
     if fields.keys() >= {"profile", "section", "stations"}:
         try:
@@ -91,11 +94,16 @@ def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     return arm
 
 
+class _Regions(RegionReader):
+    is_lazy = True
+
+
 class _Reader(FaultReader):
     """Makes the parts of an arm of tables, and gathers the faults."""
 
-    def __init__(self, document: dict[str, Any]) -> None:
+    def __init__(self, document: dict[str, Any], folder: Path) -> None:
         super().__init__()
+        self._folder = folder
         self.places: dict[str, Place] = {}
         self._document = document
         self._materials: dict[str, Any] = {}
@@ -110,7 +118,7 @@ class _Reader(FaultReader):
         fields["section"] = self._section()
         places = {"places": self._table(self._document, "stations")}
         fields["stations"] = self._made(Stations, Place("stations"), places)
-        for name in ("actuators", "rigid_pieces", "drives", "markers"):
+        for name in ("actuators", "rigid_pieces", "drives", "markers", "surroundings"):
             fields[name] = self._several(name, LAYOUT[name].kind)
         listed = self._document.get("actuators")
         if not isinstance(listed, list) or len(fields["actuators"]) < len(listed):
@@ -141,6 +149,8 @@ class _Reader(FaultReader):
 
     def _any(self, kind: type[Part], raw: dict[str, Any], path: str) -> Any:
         """The part of a table, whose kind the table says where there are several."""
+        if kind is Obstacle:
+            return self._obstacle(raw, path)
         if kind not in KINDS:
             return self._part(kind, raw, path)
         named = raw.get("kind", "linear" if kind is Profile else None)
@@ -155,6 +165,17 @@ class _Reader(FaultReader):
             return self._made(own, Place(path), values)
         except TypeError as error:
             return self._refuse(path, own.__name__, f"has other fields: {error}")
+
+    def _obstacle(self, raw: dict[str, Any], path: str) -> Any:
+        reader, keys = _Regions(self._folder, None), {*SHAPES, "mesh_unit"}
+        region = reader.one_of(raw, path)
+        self.faults += reader.faults
+        own = {name: value for name, value in raw.items() if name not in keys}
+        values, wrong = self._values(Obstacle, own, path)
+        if region is WRONG:
+            region, wrong = None, wrong | {"region"}
+        place = Place(path, field_keys(Obstacle), own)
+        return self._made(Obstacle, place, values | {"region": region}, wrong)
 
     def _part(
         self, kind: type[Part], raw: Any, path: str, without: tuple[str, ...] = (), **others: Any
@@ -352,6 +373,7 @@ def json_schema() -> dict[str, Any]:
             **{name: _table(kind) for name, kind in TABLES.items()},
             "material": _table(Material, without=("name",)),
             "inline_material": _table(Material),
+            "surrounding": _obstacle_table(),
             **{n: _table(part, kind=n) for kinds in KINDS.values() for n, part in kinds.items()},
             "own_actuator": _own(Actuator, "kind"),
             "own_profile": _own(Profile, "kind", "length"),
@@ -414,6 +436,15 @@ def _table(part: type, *, kind: str = "", without: tuple[str, ...] = ()) -> _Sch
     return {"description": about, **_object(properties, required)}
 
 
+def _obstacle_table() -> _Schema:
+    """A table of numbers, and one region: its kind is the key that its numbers stand under."""
+    table, about = _table(Obstacle), {"description": "A region: its numbers by name, with units"}
+    shapes: _Schema = {name: about | {"type": "object"} for name in SHAPES}
+    shapes["mesh"] = about | {"anyOf": [_TEXT, {"type": "object"}]}
+    table["properties"] |= shapes | {"mesh_unit": {"enum": ["m", "cm", "mm", "in"]}}
+    return table
+
+
 def _value(part: type, key: Key) -> _Schema:
     if key.of_names:
         return {**_TEXT, "description": f"Name of a station, in place of {key.field}_m"}
@@ -434,6 +465,7 @@ def _value(part: type, key: Key) -> _Schema:
             "anyOf": [{"enum": [*POINTS]}, _ROTATION, {**_NUMBERS, "minItems": 3, "maxItems": 4}],
         },
         "bounds": _PAIR,
+        "inside": {"type": "boolean"},
         "gains": _BY_NAME,
         "offsets": _BY_NAME,
         "point_loads": {"type": "array", "items": _of("point_load")},

@@ -16,6 +16,7 @@ from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.body import Body, actuator_faults, behind, mass
 from softreach.arm.drives import Drive, drive_faults
+from softreach.arm.obstacles import Obstacle
 from softreach.arm.part import gathered, kind_faults
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Material, Ring, Section, name_faults
@@ -52,6 +53,8 @@ class Manipulator(Body):
     point: str | None = None
     """Name of the marker that is asked for wherever tips are, such as that of a tool; None for the
     tip. Clouds, reachable sets, inverse solutions, paths, checks and searches are then of it."""
+    surroundings: tuple[Obstacle, ...] = ()
+    """Solids that it must not touch; they change nothing about the arm."""
     display_unit: str | None = field(default=None, compare=False)
     """Unit that it is shown in, "m", "cm", "mm", "in" or "L"; None for one that is handy.
     Designs that differ in it alone are equal, and `to_toml` leaves it out."""
@@ -61,6 +64,7 @@ class Manipulator(Body):
             "base": (Base, 'a Base, such as Base(points="down")'),
             "markers": ([Marker], "Markers"),
             "drives": ([Drive], "a sequence of Drive"),
+            "surroundings": ([Obstacle], "Obstacles"),
         }
         faults, unit = super()._faults() + kind_faults(self, kinds), self.display_unit
         if unit is None or (isinstance(unit, str) and unit in UNITS):
@@ -70,7 +74,9 @@ class Manipulator(Body):
     def _settle(self) -> list[Fault]:
         object.__setattr__(self, "drives", tuple(self.drives))
         markers = [(f"markers.{marker.name}", marker) for marker in self.markers]
-        return super()._settle() + self._place("markers", markers)
+        solids = [(f"surroundings[{k}]", each) for k, each in enumerate(self.surroundings)]
+        faults = super()._settle() + self._place("markers", markers)
+        return faults + self._place("surroundings", solids)
 
     def _fit_faults(self) -> list[Fault]:
         faults = [*name_faults([each.name for each in self.markers], "markers")]
@@ -79,6 +85,8 @@ class Manipulator(Body):
             return faults
         for marker in self.markers:
             faults += behind(f"markers.{marker.name}", marker.place_faults(self.length))
+        for k, each in enumerate(self.surroundings):
+            faults += behind(f"surroundings[{k}]", each.place_faults(self.length))
         if self.point is not None and self.pointed is None:
             faults.append(Fault("point", self.point, self._points))
         names = [actuator.name for actuator in self.actuators], self.bundle_names

@@ -195,7 +195,7 @@ def figures(
 
 def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
-) -> "sr.DesignSpace":
+) -> sr.DesignSpace:
     from softreach.arm.design_reader import LONGEST
     from softreach.atlas.space import parse_space
 
@@ -207,7 +207,7 @@ def _space_of(
     return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
 
 
-def grid_of(base: "sr.Manipulator", vary: list[str]) -> "sr.DesignSpace":
+def grid_of(base: sr.Manipulator, vary: list[str]) -> sr.DesignSpace:
     """The grid that `--vary` asks for."""
     from softreach.atlas.space import parse_parameter
 

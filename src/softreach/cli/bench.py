@@ -215,7 +215,7 @@ def plan_poses(
         plan.save(out, overwrite=output.overwrite)
 
 
-def free_names(arm: "sr.Manipulator", texts: Sequence[str]) -> list[str]:
+def free_names(arm: sr.Manipulator, texts: Sequence[str]) -> list[str]:
     """Names of free numbers as Python takes them, from names that may have their units."""
     from softreach.arm.parameters import Written
 
@@ -224,7 +224,7 @@ def free_names(arm: "sr.Manipulator", texts: Sequence[str]) -> list[str]:
     return [_tied(names, name) for name in given if name]
 
 
-def priors(arm: "sr.Manipulator", texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def priors(arm: sr.Manipulator, texts: Sequence[str]) -> dict[str, tuple[float, ...]]:
     """Width, or mean and width, of numbers in their units by name, from NAME=MEAN:WIDTH.
 
     Raises:
@@ -250,6 +250,6 @@ def priors(arm: "sr.Manipulator", texts: Sequence[str]) -> dict[str, tuple[float
     return result
 
 
-def _tied(names: "Written", name: str) -> str:
+def _tied(names: Written, name: str) -> str:
     parts = (part.strip() for part in name.split("="))
     return " = ".join(names.by_key[x].name if x in names.by_key else x for x in parts)

@@ -211,7 +211,7 @@ def _objectives() -> Table:
         yield one.name, one.unit, one.asks, "yes" if one.smooth else "no", one.meaning
 
 
-def _parameters(arm: "sr.Manipulator") -> Table:
+def _parameters(arm: sr.Manipulator) -> Table:
     from softreach.arm.parameters import parameters, written_name
 
     yield "parameter", "value", "unit", "symbol", "meaning"

@@ -88,7 +88,7 @@ def _is_drawn(path: Path) -> bool:
 
 def _write(
     reached: sr.workspace.ReachableSet,
-    arm: "sr.Manipulator",
+    arm: sr.Manipulator,
     path: Path,
     at: list[float] | None,
     overwrite: bool,
@@ -198,6 +198,7 @@ def cloud(
     sampling: options.Sampling = options.SAMPLING,
     tol: Number = 1e-6,
     device: options.Device = "cpu",
+    free: bool = False,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
     output: options.Output = options.DEFAULT,
@@ -209,6 +210,7 @@ def cloud(
     Args:
         tol: Largest tip error, in L.
         device: What computes the tips: cpu, or cuda (a GPU), which takes arms without loads.
+        free: Keep only samples at which the whole arm is clear of its surroundings and of itself.
         out: Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out.
     """
     from softreach.cloud.clouds import CLOUD_STORE
@@ -219,7 +221,10 @@ def cloud(
     options.check_output(out, CLOUD_STORE, output.overwrite)
     arguments = sampling.arguments
     start = perf_counter()
-    dataset = sr.compute_cloud(arm, **arguments, tol=tol, device=device)
+    dataset = sr.compute_cloud(arm, **arguments, tol=tol, device=device, clearance=free)
+    touching: Rows = {}
+    if free:
+        dataset, touching = _free(dataset)
     seconds = perf_counter() - start
     sr.save_cloud(dataset, out, overwrite=output.overwrite)
     named = {
@@ -229,7 +234,7 @@ def cloud(
         "steps per arm": sr.rod.as_tip_map(arm, tol).steps,
     }
     rows = fields_of(named | {"device": dataset.attrs["device"]})
-    rows |= {"time to compute": (round(seconds, 3), "s"), **load_rows(arm)}
+    rows |= {"time to compute": (round(seconds, 3), "s"), **touching, **load_rows(arm)}
     for status in sr.rod.TipStatus if "status" in dataset else ():
         count = int((dataset.status == status).sum())
         rows[status.name.lower().replace("_", " ")] = count, ""
@@ -237,6 +242,19 @@ def cloud(
     rows |= {"highest tip": (float(heights.max()), "m"), "lowest tip": (float(heights.min()), "m")}
     rows["cloud"] = str(out), ""
     console.rows(f"cloud of {design}", rows, output.json, arm)
+
+
+def _free(cloud: Any) -> tuple[Any, Rows]:
+    """The samples that touch nothing, and a row for what the others touch."""
+    touches = cloud.clearance <= 0.0
+    left = cloud.isel(sample=(cloud.clearance > 0.0).values)
+    if not left.sizes["sample"]:
+        raise NotPossible("the arm touches something in every sample: look at its surroundings")
+    counts = {
+        f"touching {name}": (int((touches & (cloud.obstacle == k)).sum()), "")
+        for k, name in enumerate(cloud.clearance.names)
+    }
+    return left, {"free samples": (left.sizes["sample"], ""), **counts}
 
 
 def volume(

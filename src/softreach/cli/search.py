@@ -171,7 +171,7 @@ class _Watch:
         return "searching" + f", best misses {self._excess:.3g}" * math.isfinite(self._excess)
 
 
-def _found(result: "sr.optimization.Search", out: Path) -> dict[str, Any]:
+def _found(result: sr.optimization.Search, out: Path) -> dict[str, Any]:
     front = []
     for each in result.front:
         known = {"excess": each.excess, "missed": dict(each.missed), "fault": each.fault}

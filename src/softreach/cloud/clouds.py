@@ -12,6 +12,7 @@ import numpy as np
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
+from softreach.rod.clearance import ClearanceMap
 from softreach.rod.rods import all_inputs, as_tip_map, with_unstable
 from softreach.rod.tip_map import Device, Frame, TipMap, TipOutputs
 from softreach.sampling import check_sampler, cube_blocks
@@ -50,6 +51,7 @@ def compute_cloud(
     frame: Frame = "world",
     point: str | None = None,
     device: Device = "cpu",
+    clearance: bool = False,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Sample the activation box and compute the tip of each sample (section 3).
@@ -69,19 +71,23 @@ def compute_cloud(
         point: Name of the marker that counts as the tip, such as that of a tool; by default that
             of the design. Of a tip map its own counts.
         device: What computes tips: "cpu", or "cuda" for a GPU, of arms without loads.
+        clearance: Whether to add the clearance of the whole arm, see `rod.compute_clearance`: what
+            is left by `cloud.isel(sample=cloud.clearance > 0)` touches nothing.
         progress: Called with the number of samples done since its last call; by default a bar is
             shown on a terminal when the cloud is large.
 
     Returns:
         Dataset with `tip` (sample, axis) [m] and `activation` (sample, bundle) [its unit]; its
         attributes hold the design, seed, sampler, tol and versions. For an arm under loads also
-        the coordinate `status` (sample), a `TipStatus`; a tip without equilibrium is NaN.
+        the coordinate `status` (sample), a `TipStatus`; a tip without equilibrium is NaN. With
+        `clearance`, `clearance` [m], `obstacle` and `station` [m] (sample) of where it is least.
 
     Raises:
         InvalidInput: An argument out of range, or more samples than fit into memory; the message
             says what to use instead.
         MissingExtra: `softreach[cuda]` is not installed.
-        NotPossible: There is no GPU, no driver for it, or the arm has loads.
+        NotPossible: There is no GPU, no driver for it, or the arm has loads; with `clearance`, the
+            base of the arm lies inside an obstacle, or a mesh cannot be used.
 
     Examples:
         >>> cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=1000)
@@ -92,8 +98,12 @@ def compute_cloud(
     whole = all_inputs(as_tip_map(arm, tol, frame=frame, point=point, device=device))
     tip_map = with_unstable(whole)
     bundles = tip_map.box.bundles
+    clearance = as_flag("clearance", clearance)
     n, seed = check_sampler(sampler, n, bundles, seed)
-    check_memory("n", n, 8 * (bundles + 3) * n)
+    room = ClearanceMap(all_inputs(as_tip_map(whole.arm, tol))) if clearance else None
+    check_memory("n", n, 8 * (bundles + 3 + 4 * clearance) * n)
+    if room is not None:
+        room.warn_at_rest()
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n, np.int8) if tip_map.supports_unstable else None
     show_bar = report is None and n > _LONG
@@ -115,6 +125,8 @@ def compute_cloud(
         parallel.run(tasks(shown))
     made = {"seed": seed, "sampler": sampler, "tol": tip_map.tol, "frame": tip_map.frame}
     cloud = schema.cloud_dataset(tip_map.arm, activation, tip, **made, device=tip_map.device)
+    if room is not None:
+        cloud = cloud.assign(room.variables(room.of(activation)))
     return cloud if status is None else schema.with_status(cloud, status)
 
 

@@ -16,6 +16,12 @@ def row(points, i):
 
 
 @inline
+def spot(points, i, j):
+    """Row j of array i of an array (n, m, 3), without a view, which would be counted."""
+    return points[i, j, 0], points[i, j, 1], points[i, j, 2]
+
+
+@inline
 def difference(points, i, j):
     """Row i minus row j of an array (n, 3)."""
     return points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]

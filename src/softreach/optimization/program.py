@@ -9,10 +9,10 @@ import numpy as np
 from softreach.arm.body import load_number, mass
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameters, parameters_by_every_name
+from softreach.geometry.regions import Region
 from softreach.optimization.free_parameters import Values
 from softreach.optimization.problem import SETS, DesignCase, Goal, Problem
 from softreach.requirements.poses import PoseRules, effort_scales
-from softreach.requirements.regions import Region
 from softreach.rod.rods import as_tip_map, effective, in_steps, refined
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.geometry.regions import Region
 from softreach.inverse.request import ANGLE_TOL
 from softreach.requirements.findings import (
     Finding,
@@ -21,7 +22,6 @@ from softreach.requirements.findings import (
 )
 from softreach.requirements.parts import TOL, Goals, Keep, Target
 from softreach.requirements.poses import Posed, PoseRules, solved
-from softreach.requirements.regions import Region
 from softreach.requirements.requirements import Requirements, with_payload
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map, in_steps

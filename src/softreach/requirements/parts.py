@@ -7,8 +7,8 @@ from typing import Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.geometry.regions import Region
 from softreach.inverse.request import ANGLE_TOL
-from softreach.requirements.regions import Region
 from softreach.support import arguments
 from softreach.support.arrays import Array, Mask, as_directions, as_points, read_only
 from softreach.support.errors import InvalidInput, Range

@@ -10,6 +10,7 @@ from softreach.arm.actuators import Tendon
 from softreach.arm.driving import Driving
 from softreach.arm.lines import line_lengths
 from softreach.arm.manipulator import Manipulator
+from softreach.geometry.regions import HalfSpace
 from softreach.inverse.direction import compromises, direction_errors
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.request import Request
@@ -17,7 +18,6 @@ from softreach.inverse.roots import placed
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.solve import solve_inverse
 from softreach.requirements.parts import LIMIT_UNITS, TOL, Goals, Keep
-from softreach.requirements.regions import HalfSpace
 from softreach.rod.bending import bending_over_bounds, bending_stations, some_corners, worst_inputs
 from softreach.rod.kinematics import configuration
 from softreach.rod.rods import as_tip_map
@@ -183,7 +183,7 @@ class Body(NamedTuple):
         """The sections between so many parts, and disks."""
         z = np.linspace(0.0, rod.length, parts + 1)
         frames, strains = rod.frames(gamma, z), rod.strains(gamma, z)
-        radius = np.fmax(_widest(rod.arm, z), _farthest_chords(rod, gamma, z, frames.position))
+        radius = np.fmax(rod.arm.widest(z), _farthest_chords(rod, gamma, z, frames.position))
         disks = rows(rod.arm.disks, rod.arm.disks.radius > rod.arm.disks.tendons)
         stand = Frames(*(every[:, :0] for every in frames))
         if len(disks.station):
@@ -223,19 +223,6 @@ class Body(NamedTuple):
         bound = np.maximum(between.max(axis=1), seen)
         seen[lost] = bound[lost] = np.nan
         return seen, bound
-
-
-def _widest(arm: Manipulator, z: Array) -> Array:
-    """Radius of the widest of body, tendons, and disks that stand everywhere at ascending Z [m]."""
-    radius = arm.profile.radius(z)
-    if not arm.bundles:
-        return radius
-    outline = arm.outline(z)
-    at_places = np.array([bool(part.disk_stations(arm.profile)) for part in arm.bundle_actuators])
-    ratio = np.where(at_places, outline.outer_ratio, outline.held_ratio)
-    held = np.pad(outline.acts, ((1, 1), (0, 0)))  # and one station beyond where it ends
-    held = held[2:] | held[1:-1] | held[:-2]
-    return radius * np.where(held, ratio, 0.0).max(axis=1).clip(1.0)
 
 
 def _farthest_chords(rod: TipMap, gamma: Array, z: Array, centers: Array) -> Array:

@@ -1,7 +1,6 @@
 """Requirements of an arm: what it is for, as a frozen value and as TOML with units."""
 
 import dataclasses
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -14,36 +13,23 @@ import numpy as np
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRIC_GROUPS, known_metric
+from softreach.geometry.region_tables import EXAMPLES, SHAPES, RegionReader, lines_of, region_line
+from softreach.geometry.regions import Region, Sphere
 from softreach.inverse.request import positions_in
 from softreach.requirements.parts import LIMIT_UNITS, MOST_PLACES, Goals, Keep, Limits, Target
-from softreach.requirements.regions import Box, HalfSpace, Mesh, Region, Sphere
 from softreach.support.arguments import POSITIVE, as_given, as_instance, as_number, as_path, as_text
 from softreach.support.arrays import Array, as_floats, joined
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, SoftreachError
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files import toml
 from softreach.support.files.text import MEGABYTE, read_text, write_text
-from softreach.support.quantity import read_quantity, unit_names
-from softreach.support.units import read_length
 
 LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
-Raw = dict[str, Any]  # A table of a file
-Units = Mapping[str, str]  # Field -> unit of its numbers
 
 _KEYS = ("version", "reach", "stay_inside", "avoid", "limits", "measures", "search")
 """At the top, beside payloads; `search` is read by the search of designs."""
-_EXAMPLES = {"m": "5cm", "kg": "200g", "N": "5N", "Pa": "50kPa", "rad": "5deg"}
-"""SI unit of numbers that have one -> how such a number may be written."""
-_SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
-    "box": (Box, {"low": "m", "high": "m"}),
-    "sphere": (Sphere, {"center": "m", "radius": "m"}),
-    "half_space": (HalfSpace, {"point": "m", "normal": ""}),
-    "mesh": (Mesh, {"vertices": "m", "faces": ""}),
-}
-"""Regions, with their numbers and the units of these."""
-_LISTS = {"payloads", "places", "direction", *(n for _, own in _SHAPES.values() for n in own)}
-_LISTS -= {"radius"}
 _BALL = {"region": Sphere((0.0, 0.0, 0.0), 1.0)}
-_INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}  # for faulty parts: others are judged too
+_INSTEAD = {Target: _BALL, Keep: _BALL, Limits: {}}
+"""In place of faulty parts, so that the others can be judged."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -171,25 +157,25 @@ class Requirements:
 
     def to_toml(self) -> str:
         """The text of a file in m and kg, from which `from_toml` makes the same."""
-        head = _lines({"version": 1, "payloads_kg": self.payloads or None})
+        head = lines_of({"version": 1, "payloads_kg": self.payloads or None})
         blocks = [["# softreach requirements", *head]]
         for target in self.targets:
-            lines = ["[[reach]]", *_lines({"name": target.name})]
+            lines = ["[[reach]]", *lines_of({"name": target.name})]
             if target.places is not None:
                 rows = (f"  {toml.value_text(row)}," for row in target.points.tolist())
                 lines += ["places_m = [", *rows, "]"]
             elif target.region is not None:
-                lines += [_region_line(target.region), *_lines({"share": target.share})]
+                lines += [region_line(target.region), *lines_of({"share": target.share})]
             way = None if target.direction is None else np.asarray(target.direction).tolist()
             words = {"within_m": target.within, "direction": way, "cone_rad": target.cone}
-            blocks.append(lines + _lines({key: word or None for key, word in words.items()}))
+            blocks.append(lines + lines_of({key: word or None for key, word in words.items()}))
         for keep in sorted(self.keeps, key=lambda keep: not keep.inside):
             words = {"of": keep.of, "when": keep.when, "clearance_m": keep.clearance or None}
-            start = [f"[[{keep.kind}]]", *_lines({"name": keep.name})]
-            blocks.append([*start, _region_line(keep.region), *_lines(words)])
+            start = [f"[[{keep.kind}]]", *lines_of({"name": keep.name})]
+            blocks.append([*start, region_line(keep.region), *lines_of(words)])
         if limits := self.limits.given:
             keys = (f"{name}_{LIMIT_UNITS[name].lower()}".rstrip("_") for name in limits)
-            blocks.append(["[limits]", *_lines(dict(zip(keys, limits.values(), strict=True)))])
+            blocks.append(["[limits]", *lines_of(dict(zip(keys, limits.values(), strict=True)))])
         blocks += [["[measures]"]] if self.measures else []
         for name, ends in self.measures.items():
             pairs = zip(("at_least", "at_most"), ends, strict=True)
@@ -212,9 +198,11 @@ class Requirements:
 
     def __repr__(self) -> str:
         payloads = ", ".join(f"{x:g}" for x in self.payloads) or "none"
-        counts = f"{len(self.targets)} targets with {len(self.places):,} places; "
-        counts += f"{len(self.keeps)} regions to keep to; {len(self.limits.given)} limits"
-        return f"Requirements: {counts}; payloads {payloads} kg; {len(self.measures)} measures"
+        return (
+            f"Requirements: {len(self.targets)} targets with {len(self.places):,} places; "
+            f"{len(self.keeps)} regions to keep to; {len(self.limits.given)} limits; "
+            f"payloads {payloads} kg; {len(self.measures)} measures"
+        )
 
 
 def with_payload(arm: Manipulator, payload: float | None) -> Manipulator:
@@ -270,10 +258,8 @@ def _contradictions(needs: Requirements) -> Iterator[Fault]:
                 yield Fault(f"{target.name}, place {wrong[0] + 1}", place, allowed)
 
 
-class _Reader(toml.FaultReader):
-    def __init__(self, folder: Path | None, length: float | None) -> None:
-        super().__init__()
-        self.folder, self.length = folder, length
+class _Reader(RegionReader):
+    instead = _INSTEAD
 
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""
@@ -281,21 +267,24 @@ class _Reader(toml.FaultReader):
         raw = self._table(document, "limits")
         if document.get("version", 1) != 1:
             self._refuse("version", document["version"], "must be 1")
-        targets = [self._target(*each) for each in self._tables(document, "reach")]
-        keeps = [self._keep(*each, True) for each in self._tables(document, "stay_inside")]
-        keeps += [self._keep(*each, False) for each in self._tables(document, "avoid")]
-        limits = self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS))
-        measures = self._measures(self._table(document, "measures"))
-        made = {"targets": targets, "keeps": keeps, "limits": limits, "measures": measures}
-        return payloads | made
+        return payloads | {
+            "targets": [self._target(*each) for each in self._tables(document, "reach")],
+            "keeps": [
+                self._keep(*each, kind == "stay_inside")
+                for kind in ("stay_inside", "avoid")
+                for each in self._tables(document, kind)
+            ],
+            "limits": self._made(Limits, raw, "limits", self._numbers(raw, "limits", LIMIT_UNITS)),
+            "measures": self._measures(self._table(document, "measures")),
+        }
 
-    def _target(self, raw: Raw, path: str) -> Any:
+    def _target(self, raw: dict[str, Any], path: str) -> Any:
         numbers = {"within": "m", "share": "", "places": "m", "direction": "", "cone": "rad"}
         values = self._part(raw, path, numbers, ("name", "file"))
         file = values.pop("file", None)
         count = sum(x is not None for x in (values.get("places"), file, values.get("region")))
         if count != 1:
-            allowed = f"needs one of places, file, {', '.join(_SHAPES)}, and has {count}"
+            allowed = f"needs one of places, file, {', '.join(SHAPES)}, and has {count}"
             return self._refuse(path, None, allowed)
         if file is not None:
             try:
@@ -306,54 +295,28 @@ class _Reader(toml.FaultReader):
                 values["places"] = self._refuse(f"{path}.file", file, allowed)
         return self._made(Target, raw, path, values)
 
-    def _beside(self, name: str, instead: str) -> Path:
-        if self.folder is not None:
-            return self.folder / name
-        allowed = f"part of the text: other files are not sent along; write {instead}"
-        raise InvalidInput("file", repr(name), allowed)
-
-    def _keep(self, raw: Raw, path: str, inside: bool) -> Any:
+    def _keep(self, raw: dict[str, Any], path: str, inside: bool) -> Any:
         values = self._part(raw, path, {"clearance": "m"}, ("name", "of", "when"))
         if "region" not in values:
-            return self._refuse(path, None, f"needs one of {', '.join(_SHAPES)}")
+            return self._refuse(path, None, f"needs one of {', '.join(SHAPES)}")
         return self._made(Keep, raw, path, values | {"inside": inside})
 
-    def _part(self, raw: Raw, path: str, numbers: Units, words: tuple[str, ...]) -> dict[str, Any]:
+    def _part(
+        self, raw: dict[str, Any], path: str, numbers: Mapping[str, str], words: tuple[str, ...]
+    ) -> dict[str, Any]:
         """Values of a table by field: numbers, words, and the region that it has."""
-        values = self._numbers(raw, path, numbers, (*words, *_SHAPES, "mesh_unit"))
+        values = self._numbers(raw, path, numbers, (*words, *SHAPES, "mesh_unit"))
         values |= {name: raw[name] for name in words if name in raw}
-        shapes = [name for name in _SHAPES if name in raw]
+        shapes = [name for name in SHAPES if name in raw]
         if len(shapes) > 1:
             values["region"] = self._refuse(path, None, f"has {' and '.join(shapes)}: give one")
         elif shapes:
-            values["region"] = self._region(raw, shapes[0], f"{path}.{shapes[0]}")
+            values["region"] = self.region(raw, shapes[0], f"{path}.{shapes[0]}")
         if "mesh_unit" in raw and "mesh" not in raw:
             self._refuse(f"{path}.mesh_unit", raw["mesh_unit"], "needs a mesh")
         return values
 
-    def _region(self, raw: Raw, shape: str, path: str) -> Any:
-        table = raw[shape]
-        if shape == "mesh" and isinstance(table, str):
-            try:
-                file = self._beside(table, "vertices_m and faces")
-                return Mesh.load(file, unit=raw.get("mesh_unit"))
-            except InvalidInput as error:
-                of_unit = error.name == "unit"
-                place, value = (f"{path}_unit", error.value) if of_unit else (path, table)
-                return self._refuse(place, value, f"must be {error.allowed}")
-            except SoftreachError as error:
-                return self._refuse(path, table, str(error))
-        if not isinstance(table, dict):
-            return self._refuse(path, table, "must be a table" + " or a file" * (shape == "mesh"))
-        kind, numbers = _SHAPES[shape]
-        values = self._numbers(table, path, numbers)
-        for name, unit in numbers.items():
-            if name not in values:
-                key = [*_keys(name, unit)][unit != ""]
-                return self._refuse(f"{path}.{key}", None, "required key is missing")
-        return self._made(kind, table, path, values)
-
-    def _measures(self, raw: Raw) -> dict[str, Any]:
+    def _measures(self, raw: dict[str, Any]) -> dict[str, Any]:
         measures = {}
         for name, table in raw.items():
             path = f"measures.{toml.key_text(name)}"
@@ -363,105 +326,8 @@ class _Reader(toml.FaultReader):
             elif not isinstance(table, dict):
                 self._refuse(path, table, "must be a table with at_least, at_most or both")
             else:
-                unit = metric.unit if metric.unit in _EXAMPLES else ""
+                unit = metric.unit if metric.unit in EXAMPLES else ""
                 ends: dict[str, str] = dict.fromkeys(("at_least", "at_most"), unit)
-                values = self._numbers(table, path, ends, bare=True)
+                values = self._numbers(table, path, ends, plain=True)
                 measures[name] = tuple(map(values.get, ends))
         return measures
-
-    def _made(self, kind: Any, raw: Raw, path: str, values: dict[str, Any]) -> Any:
-        """A part of checked numbers; `WRONG` and a fault where it refuses them."""
-        wrong = {name for name, value in values.items() if value is toml.WRONG}
-        # Of directions nothing can be said without their places.
-        of_places = {"direction", "cone"} if wrong & {"region", "places", "direction"} else set()
-        lost = wrong | of_places
-        right = {name: value for name, value in values.items() if name not in lost}
-        if wrong and kind not in _INSTEAD:
-            return toml.WRONG
-        if wrong & {"region", "places"}:
-            right = _INSTEAD[kind] | right
-        try:
-            made = kind(**right)
-            return toml.WRONG if wrong else made
-        except InvalidInput as error:
-            field = re.split(r"[ .\[]", error.name)[0]
-            key = next((key for key in raw if key.startswith(field)), "")
-            value = raw[key] if key else error.value
-            said = "" if key or error.name == field else f"{error.name} "
-            place = f"{path}.{key}" if key else path
-            return self._refuse(place, value, f"{said}must be {error.allowed}")
-        except SoftreachError as error:
-            return self._refuse(path, None, str(error))
-
-    def _numbers(
-        self, raw: Raw, path: str, numbers: Units, others: Sequence[str] = (), *, bare: bool = False
-    ) -> dict[str, Any]:
-        """Numbers of a table in SI units by field; keys beside these and `others` are refused.
-
-        `bare` ones may go without their unit.
-        """
-        known = {name: _keys(name, unit) for name, unit in numbers.items()}
-        self._check_keys(raw, path, (*numbers, *others), set().union(*known.values()))
-        start, values = f"{path}." if path else "", {}
-        for name, unit in numbers.items():
-            keys = [key for key in known[name] if key in raw]
-            if len(keys) > 1:
-                allowed = f"has {' and '.join(keys)}: give one"
-                values[name] = self._refuse(start + name, None, allowed)
-            elif keys:
-                value, symbol = raw[keys[0]], known[name][keys[0]]
-                fits = name not in _LISTS or isinstance(value, list | str)
-                try:
-                    own = value if fits else None
-                    values[name] = self._read(own, unit, symbol, bare or not unit)
-                except ValueError:
-                    allowed = self._allowed(unit, symbol, name) if fits else "must be a list"
-                    values[name] = self._refuse(start + keys[0], value, allowed)
-        return values
-
-    def _read(self, value: Any, unit: str, symbol: str, plain: bool) -> Any:
-        """Numbers in SI units, however nested; `ValueError` of anything else."""
-        if isinstance(value, str) and "," in value:
-            value = value.split(",")
-        if isinstance(value, list):
-            return [self._read(item, unit, symbol, plain) for item in value]
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if is_number and symbol in ("", unit) and (symbol or plain or value == 0):
-            return value
-        if is_number and symbol:
-            value = f"{value!r}{symbol}"
-        elif not isinstance(value, str) or not unit or symbol:
-            raise ValueError(value)
-        is_relative = unit == "m" and value.strip().endswith("L")
-        return read_length(value, self.length) if is_relative else read_quantity(value, unit)
-
-    def _allowed(self, unit: str, symbol: str, name: str) -> str:
-        if symbol == "L" and self.length is None:
-            return "the length L of the arm is not known here: give m, cm or mm"
-        if symbol or not unit:
-            return "must be finite numbers" + " without a unit, which the key holds" * bool(symbol)
-        more, hint = ("", "; L is not known here") if self.length is None else (", L", "")
-        more, hint = (more, hint) if unit == "m" else ("", "")
-        how = f'({", ".join(unit_names(unit))}{more}), such as "{_EXAMPLES[unit]}"'
-        return f"must have its unit {how}, or stand under {name}_{unit.lower()}{hint}"
-
-
-def _keys(name: str, unit: str) -> dict[str, str]:
-    units = {each.lower(): each for each in unit_names(unit) if each.isascii()} if unit else {}
-    units |= {"over_length": "L"} if unit == "m" else {}
-    return {name: ""} | {f"{name}_{suffix}": symbol for suffix, symbol in units.items()}
-
-
-def _lines(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {toml.value_text(x)}" for key, x in values.items() if x is not None]
-
-
-def _region_line(region: Region) -> str:
-    if isinstance(region, Mesh) and region.source:
-        place = str(Path(region.source).resolve())
-        return "\n".join(_lines({"mesh": place, "mesh_unit": region.unit}))
-    shapes = _SHAPES.items()
-    shape, numbers = next((name, own) for name, (kind, own) in shapes if isinstance(region, kind))
-    keys = (f"{name}_{unit}".rstrip("_") for name, unit in numbers.items())
-    values = (toml.value_text(np.asarray(getattr(region, name)).tolist()) for name in numbers)
-    return f"{shape} = {toml.inline_table(zip(keys, values, strict=True))}"

@@ -1,4 +1,5 @@
 from . import rest as rest
+from .clearance import compute_clearance as compute_clearance
 from .inputs import ActivationBox as ActivationBox
 from .kinematics import configuration as configuration
 from .kinematics import marker_positions as marker_positions

@@ -56,27 +56,6 @@ def segment(p, a, b):
 
 
 @strict
-def nearest_faces(points, vertices, faces, centers, radii, face, out):
-    """Nearest triangle of each point (n, 3) and the distance to it; spheres around triangles cull.
-
-    These have centers (f, 3) and radii (f,).
-    """
-    for i in range(len(points)):
-        best, near, p = np.inf, np.inf, row(points, i)
-        face[i] = 0
-        for f in range(len(faces)):
-            apart = minus(p, row(centers, f))
-            limit = near + radii[f]
-            if dot(apart, apart) >= limit * limit:
-                continue
-            a, b, c = faces[f]
-            square = squared_distance(p, row(vertices, a), row(vertices, b), row(vertices, c))
-            if square < best:
-                best, near, face[i] = square, np.sqrt(square), f
-        out[i] = near
-
-
-@strict
 def fill_triangles(triangles, work, keys):
     """Keep the larger key, of depth above color, at every pixel whose center lies in a triangle.
 

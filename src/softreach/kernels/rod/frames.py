@@ -9,7 +9,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel, strict
 from softreach.kernels.rod.magnus import act, exp_coefficients, exponent
-from softreach.kernels.rod.tips import BEND_ROWS
+from softreach.kernels.rod.tips import BEND_ROWS, LANES, load, node_values, nodes_at, room
 from softreach.kernels.vector import combination, cross
 
 _BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)
@@ -63,6 +63,61 @@ def frames(table, ends, gamma, position, directors):
                 d1, d2, d3 = _rotated(d1, d2, d3, omega)
                 k += 1
             _store(position, directors, sample, station, r, d1, d2, d3)
+
+
+def centerlines(table, gamma, start, points, tangents):
+    """Centers r (n, step + 1, 3) and tangents d3 of rods at the ends of all of their steps.
+
+    Many side by side, of packed node tables and activations (n, bundle); `start` (12,) are r, d1,
+    d2 and d3 of the clamped end.
+    """
+    _centerlines(table, gamma, *room(table), np.empty(12 * LANES), start, points, tangents)
+
+
+@kernel
+def _centerlines(table, gamma, work, lanes, state, start, points, tangents):
+    for first in range(0, gamma.shape[0], LANES):
+        count = min(LANES, gamma.shape[0] - first)
+        load(lanes, gamma, first, count)
+        for row in range(12):
+            for i in range(LANES):
+                state[row * LANES + i] = start[row]
+        for k in range(table.shape[0] + 1):
+            for i in range(count):
+                for axis in range(3):
+                    points[first + i, k, axis] = state[axis * LANES + i]
+                    tangents[first + i, k, axis] = state[(9 + axis) * LANES + i]
+            if k < table.shape[0]:
+                node_values(work, lanes, table, k)
+                for i in range(LANES):
+                    base, middle, tip = nodes_at(work, i)
+                    omega = exponent(base, middle, tip)
+                    r, d1 = _three(state, i, 0), _three(state, i, 3)
+                    d2, d3 = _three(state, i, 6), _three(state, i, 9)
+                    r = _moved(r, d1, d2, d3, act(omega, (0.0, 0.0, 0.0)))
+                    d1, d2, d3 = _turned_by(d1, d2, d3, omega)
+                    for axis in range(3):
+                        state[axis * LANES + i] = r[axis]
+                        state[(3 + axis) * LANES + i] = d1[axis]
+                        state[(6 + axis) * LANES + i] = d2[axis]
+                        state[(9 + axis) * LANES + i] = d3[axis]
+
+
+@inline
+def _turned_by(d1, d2, d3, omega):
+    """The directors after exp(ω), by its matrix: fewer multiplications than three turns."""
+    s, c, _ = exp_coefficients(omega)
+    x, y, z = omega[0], omega[1], omega[2]
+    xx, yy, zz, xy, xz, yz = c * x * x, c * y * y, c * z * z, c * x * y, c * x * z, c * y * z
+    u, v, w, d = s * x, s * y, s * z, (d1, d2, d3)
+    first = combination((1.0 - yy - zz, xy + w, xz - v), d)
+    second = combination((xy - w, 1.0 - xx - zz, yz + u), d)
+    return first, second, combination((xz + v, yz - u, 1.0 - xx - yy), d)
+
+
+@inline
+def _three(state, i, row):
+    return state[row * LANES + i], state[(row + 1) * LANES + i], state[(row + 2) * LANES + i]
 
 
 @inline
