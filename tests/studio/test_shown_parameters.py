@@ -12,6 +12,7 @@ from softreach.arm import designs, edits
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
+from softreach.rod.kinematics import tip_positions
 from softreach.studio.fields import attribute
 from softreach.studio.shown_parameters import (
     body_numbers,
@@ -47,13 +48,30 @@ def named(request):
     return getattr(designs, request.param)()
 
 
-def test_a_moved_slider_shows_its_own_value_in_the_new_design(named):
+def bent_tip(arm):
+    """Where the tip is with every bundle at another share of its range."""
+    low, high = arm.input_bounds.T
+    return tip_positions(arm, [low + (high - low) * np.linspace(0.8, 0.3, len(low))])[0]
+
+
+def test_a_moved_slider_shows_its_own_value_in_the_new_design_and_moves_its_tip(named):
+    before = bent_tip(named)
     for control in slider_parameters(named):
-        to = 0.95 * control.shown + 0.05 * control.limits[0]
+        to = 0.95 * control.shown + 0.05 * control.limits[control.shown == control.limits[0]]
         to = 2 if control.name.endswith(".bundles") else to
         made = changed(named, {control.name: to * control.scale})
         again = {one.name: one.shown for one in slider_parameters(made)}
         assert again[control.name] == pytest.approx(to, abs=1e-6)
+        assert np.linalg.norm(bent_tip(made) - before) > 1e-5 * named.length, control.name
+
+
+def test_sliders_end_at_numbers_that_a_person_would_type(named):
+    typed = changed(named, {"taper": find_parameter(named, "taper").value(named) - 0.0123456789})
+    for arm in (named, typed, named.replace(display_unit="in")):
+        ends = slider_ends(arm, {}, lambda: None)
+        for control in slider_parameters(arm):
+            for end in (*control.limits, *ends[control.name]):
+                assert f"{end:.12g}" == f"{float(f'{end:.3g}'):.12g}"
 
 
 def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
