@@ -57,10 +57,11 @@ def sizes_agree(tab) -> None:
 def bars_agree(tab) -> None:
     """The change of the volume by every number that a slider moves continuously."""
     show(tab, ARM)
-    form = re.compile(r"∂V/∂\((.+)\) = (-?[\d.]+) ± ([\d.]+) liters")
+    form = re.compile(r"∂V/∂\((.+)\) = \(?(-?[\d.]+) ± ([\d.]+)\)?(e-\d+|) liters")
     bars = tab.page.locator("[role=img][title*='change of V']")
-    titles = [bar.get_attribute("title") for bar in bars.all()]
-    rows = {name: (float(v), float(e)) for name, v, e in (form.search(t).groups() for t in titles)}
+    tab.wait(bars.count, "the bars are there")
+    found = [form.search(bar.get_attribute("title")).groups() for bar in bars.all()]
+    rows = {name: (float(value + ten), float(error + ten)) for name, value, error, ten in found}
     scales = {one.name: 1e3 * one.scale for one in slider_parameters(ARM)}
     assert set(rows) == {name for name in scales if not parameters(ARM)[name].whole}
     theirs = volume_gradient(ARM, list(rows), accuracy=0.01)
