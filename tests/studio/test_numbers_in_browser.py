@@ -82,7 +82,9 @@ def motion_agrees(tab) -> None:
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
     tab.settle()
     target = np.array(tab.field("target [cm]").input_value().split(","), float) / 100
-    pulls = [float(tab.field(f"γ {name}").input_value()) for name in ARM.input_names]
+    beside = "xpath=//label[normalize-space()='γ {}']/following::form[1]//input"
+    fields = [tab.page.locator(beside.format(name)).first for name in ARM.input_names]
+    pulls = [float(field.input_value()) for field in fields]
     others = sr.solve_inverse(ARM, [target])[0].activations
     assert np.abs(others - pulls).max(axis=1).min() < 1e-3
     assert read(tab, "# activation") == [len(others)]
