@@ -181,14 +181,11 @@ def bench(session) -> Session:
     return session
 
 
-def measured_poses(inputs):
-    columns = table(PLACES, inputs, NAMES, MARKERS).items()
-    return read_measurements(MARKED, {name.removesuffix("_N"): [*row] for name, row in columns})
-
-
 def shown(session, number=0, inputs=INPUTS) -> None:
     """Load measured poses, and bring the arm to one of them."""
-    bench = Bench(data=measured_poses(inputs), arm=MARKED, number=number, free=("pose", "taper"))
+    columns = table(PLACES, inputs, NAMES, MARKERS).items()
+    data = read_measurements(MARKED, {name.removesuffix("_N"): [*row] for name, row in columns})
+    bench = Bench(data=data, arm=MARKED, number=number, free=("pose", "taper"))
     session.update(bench.posed)
     session.learn({"bench": bench})
     session.settle()

@@ -11,10 +11,9 @@ from softreach.arm.parameters import changed, parameters
 from softreach.calibration import calibrate
 from softreach.geometry.surface import plane_cut, section_area
 from softreach.rod.kinematics import marker_positions
-from softreach.studio.found import Bench
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.workspace import volume_gradient
-from tests.studio.test_goals import INPUTS, MARKED, PLACES, measured_poses
+from tests.studio.test_goals import INPUTS, MARKED, PLACES, shown
 
 ARM = changed(designs.minimal_trunk(), {"length": 0.3, "outer_radius": 0.02})
 ARM = ARM.replace(display_unit="cm")
@@ -113,8 +112,8 @@ def loads_agree(tab) -> None:
 def poses_agree(tab) -> None:
     """The error of a fit to measured poses, from the places of its own arm."""
     show(tab, MARKED)
-    data = measured_poses(INPUTS)
-    tab.session.learn({"bench": Bench(data=data, arm=MARKED, free=("pose", "taper"))})
+    shown(tab.session)
+    data = tab.session.found.bench.data
     tab.open("Goals")
     tab.unfold("measured poses")
     tab.press("Fit")

@@ -107,7 +107,7 @@ class Studio(AbstractContextManager["Studio"]):
         with self._lock:
             self.sessions[client.client_id] = session
         with session.lock:  # what a person changes meanwhile waits
-            self._open(session)
+            self._show_what_needs_no_library(session)
             self._libraries.join()
             session.begin()
         if self.work is not None and self.work.complaint:
@@ -117,8 +117,7 @@ class Studio(AbstractContextManager["Studio"]):
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)
 
-    def _open(self, session: Session) -> None:
-        """Show a tab what needs no library."""
+    def _show_what_needs_no_library(self, session: Session) -> None:
         furnish(session)
         session.client.camera.on_update(lambda _: session.follow("camera"))
         session.draw_rest()

@@ -84,7 +84,7 @@ class ShownParameter(NamedTuple):
 
     def read(self, arm: Manipulator) -> float:
         """The value of a design, in the shown unit; 0 where it leaves the number out."""
-        value = _rounded(values_of(arm)[self.name] / self.scale)
+        value = float(f"{values_of(arm)[self.name] / self.scale:.12g}")
         return 0.0 if math.isnan(value) else value
 
     def write(self, arm: Manipulator, shown: float) -> Manipulator:
@@ -96,10 +96,6 @@ class ShownParameter(NamedTuple):
 def values_of(arm: Manipulator) -> dict[str, float]:
     """Values of all parameters by their names; NaN where the design leaves one out."""
     return {name: each.value(arm) for name, each in parameters(arm).items()}
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.12g}")
 
 
 def three_digits(value: float, way: int = 1) -> float:
@@ -303,7 +299,7 @@ def _shown(
     arm: Manipulator, parameter: Parameter, name: str, hint: str, lengths: LengthUnit | None = None
 ) -> ShownParameter:
     unit, scale = _unit(parameter, lengths)
-    value, label = _rounded(values_of(arm)[parameter.name] / scale), _titled(name, unit)
+    value, label = float(f"{values_of(arm)[parameter.name] / scale:.12g}"), _titled(name, unit)
     return ShownParameter(parameter.name, label, hint, scale, value, whole=parameter.whole)
 
 

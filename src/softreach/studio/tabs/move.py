@@ -372,15 +372,11 @@ def _at_point(state: StudioState, activations: np.ndarray, point: int) -> Studio
     return state.replace(path=path, activation=tuple(activations[point].tolist()))
 
 
-_OF_TARGET: dict[str, Any] = {
-    "wanted": "target",
-    "makes": "answer takes_nearest",
-    "draws": "/ghosts /target /gap",
-}
+_AIM: Any = {"wanted": "target", "makes": "answer takes_nearest", "draws": "/ghosts /target /gap"}
 _OF_PATH: dict[str, Any] = {"wanted": "path", "makes": "track", "doing": "following the path"}
 JOBS = (
     # The activations that reach the target, and their shapes
-    Job("inverse", "design target", _solve, _draw_answer, **_OF_TARGET),
+    Job("inverse", "design target", _solve, _draw_answer, **_AIM),
     # The arm follows its dragged tip on its branch; where that rests, every branch is looked for
     Job("drag", "found.pull", _follow_tip, makes="pull lag"),
     Job("path", "design path.points path.start", _follow, _draw_path, **_OF_PATH),

@@ -151,8 +151,7 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     read = lambda state: float(f"{over * center.read(state):.9g}")
     at = Attribute(read, lambda state, value: center.write(state, value / over))
     end = three_digits(1.5 * over)
-    about = "Middle of the slab along the axis"
-    panel.slider(unit.label("center"), (-end, end), 0.01 * end, at, about)
+    panel.slider(unit.label("center"), (-end, end), 0.01 * end, at, "Middle of the slab")
 
 
 def plots(panel: Fields) -> None:
