@@ -61,9 +61,7 @@ def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk
     assert none.refusal == "to 10 % it needs more than 30 s"
 
 
-def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_given(
-    trunk, monkeypatch
-):
+def test_five_bundles_show_a_cloud_before_their_set_within_their_memory(trunk, monkeypatch):
     exact, given = reaching.reachable_set, []
 
     def noted(*arguments, **options):

@@ -47,9 +47,7 @@ def shake(session: Session, times: int, pause: float = 0.0) -> None:
         time.sleep(pause)
 
 
-def test_arm_and_axes_are_drawn_while_libraries_load_and_before_anything_is_computed(
-    studio, monkeypatch
-):
+def test_arm_and_axes_are_drawn_while_libraries_load_and_before_any_work(studio, monkeypatch):
     seen, drawn, loaded = [], threading.Event(), threading.Event()
 
     def compute(given):
@@ -80,9 +78,7 @@ def test_a_tab_is_dark_where_its_system_is(studio):
 
 
 @pytest.mark.large
-def test_memory_is_returned_once_a_tab_rests_and_of_those_that_are_gone_nothing_stays(
-    studio, monkeypatch
-):
+def test_memory_is_returned_once_a_tab_rests_and_nothing_stays_of_gone_ones(studio, monkeypatch):
     returned: list[int] = []
     monkeypatch.setattr(work, "return_memory", lambda: returned.append(len(studio.sessions)))
     with page(studio):
@@ -107,9 +103,7 @@ def test_memory_is_returned_once_a_tab_rests_and_of_those_that_are_gone_nothing_
 
 
 @pytest.mark.large
-def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_lets_another_have_its_turn(
-    studio, monkeypatch
-):
+def test_a_shaken_tab_computes_its_last_place_and_lets_another_have_its_turn(studio, monkeypatch):
     computed = []
     plain = stages.compute_cloud
     monkeypatch.setattr(

@@ -14,18 +14,10 @@ from softreach.cloud.clouds import compute_cloud
 from softreach.picture.gltf import ColoredSkin
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.tip_map import TipStatus, has_tip
+from softreach.studio import reach as reaching
 from softreach.studio.captions import legend_text, picture_text, size_text
 from softreach.studio.found import Found
-from softreach.studio.reach import (
-    Quality,
-    Reach,
-    Size,
-    affordable_level,
-    cloud_points,
-    reached,
-    shown_samples,
-    stages,
-)
+from softreach.studio.reach import Quality, Reach, shown_samples, stages
 from softreach.studio.scene import colors
 from softreach.studio.scene.scene import Scene, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
@@ -52,10 +44,10 @@ def test_the_coarse_cloud_is_the_beginning_of_the_fine_one_which_has_what_is_sho
 
 
 def test_a_grid_from_a_file_is_thinned_evenly(trunk):
-    grid = reached(compute_cloud(trunk, 16**3, sampler="grid"), SMALL)
+    grid = reaching.reached(compute_cloud(trunk, 16**3, sampler="grid"), SMALL)
     few = grid.cloud.activation.values[shown_samples(grid, 9)]
     np.testing.assert_allclose(few.mean(axis=0), trunk.bounds.mean(axis=1), atol=0.1)
-    uniform = reached(compute_cloud(trunk, 1000), SMALL)
+    uniform = reaching.reached(compute_cloud(trunk, 1000), SMALL)
     np.testing.assert_array_equal(shown_samples(uniform, 14), np.arange(1000))
 
 
@@ -241,7 +233,7 @@ def test_samples_are_counted_by_status_and_those_without_a_tip_are_not_shown(tor
     assert sum(shares) == pytest.approx(1.0)
     assert shares[TipStatus.STABLE] > 0.98
     assert shares[TipStatus.SNAPS] > 0
-    points = cloud_points(torn, 13)
+    points = reaching.cloud_points(torn, 13)
     assert np.isfinite(points).all()
     assert len(points) == has_tip(torn.status).sum()
 
@@ -291,8 +283,8 @@ def test_an_arm_loaded_beyond_what_can_be_computed_is_refused_and_remembered(lce
 
 def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
     rod = solvable_rod(hanging(lce, 5.0))
-    assert affordable_level(rod, 1e6, 12) == 12
-    assert affordable_level(rod, 0.0, 17) == 10
+    assert reaching.affordable_level(rod, 1e6, 12) == 12
+    assert reaching.affordable_level(rod, 0.0, 17) == 10
     hasty = Quality(coarse_level=12, fine_seconds=0.0, coarse_accuracy=0.1, fine_accuracy=0.1)
     *_, fine = stages(rod.arm, 14, hasty, lambda: None)
     assert (fine.samples, fine.wanted) == (1 << 10, 1 << 14)
@@ -300,4 +292,4 @@ def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
 
 def test_digits_of_a_size_follow_its_error(trunk):
     for error, text in ((9e-5, "0.25642 ± 0.00009"), (4e-9, "0.256423 ± 0.000001")):
-        assert size_text(Size("volume", 0.2564231, error, 3), trunk) == f"volume {text} m³"
+        assert size_text(reaching.Size("volume", 0.2564231, error, 3), trunk) == f"volume {text} m³"

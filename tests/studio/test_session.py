@@ -12,13 +12,7 @@ from softreach.arm.parameters import changed
 from softreach.cli.studio import begun
 from softreach.rod.rods import as_tip_map
 from softreach.studio.fields import Attribute, Fields
-from softreach.studio.reach import (
-    Quality,
-    Reach,
-    cloud_points,
-    count_activations,
-    stages,
-)
+from softreach.studio.reach import Quality, Reach, cloud_points, count_activations, stages
 from softreach.studio.scene.colors import key_html, sample_colors, sample_values
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, work_on
@@ -171,9 +165,7 @@ def test_work_is_found_again_and_a_folder_that_cannot_be_written_is_named(tmp_pa
     assert work.latest == STATE
 
 
-def test_the_command_goes_on_with_the_work_on_its_design_unless_it_is_to_begin_afresh(
-    tmp_path, monkeypatch
-):
+def test_the_command_goes_on_with_work_on_its_design_unless_it_begins_afresh(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     bent = STATE.replace(activation=(-0.5, 0.0, 0.0))
     work_on(TRUNK).keep(bent)
