@@ -111,11 +111,10 @@ def poses_agree(tab) -> None:
     """The error of a fit to measured poses, from the places of its own arm."""
     show(tab, MARKED)
     shown(tab.session)
-    data = tab.session.found.bench.data
     tab.open("Goals")
     tab.unfold("measured poses")
     tab.press("Fit")
-    fitted = calibrate(MARKED, data, free=("pose", "taper")).arm
+    fitted = calibrate(MARKED, tab.session.found.bench.data, free=("pose", "taper")).arm
     rms = np.sqrt(((marker_positions(fitted, INPUTS) - PLACES) ** 2).sum(axis=2).mean())
     assert read(tab, "fitted error # mm rms") == pytest.approx([1e3 * rms], rel=2e-3)
 
@@ -124,4 +123,3 @@ def test_ten_numbers_in_the_page_are_those_of_the_library(tab):
     for agree in (sizes_agree, bars_agree, motion_agrees, loads_agree, poses_agree):
         tab.open("Design")
         agree(tab)
-    tab.session.learn({"bench": None})
