@@ -70,8 +70,8 @@ class DragBall:
         self._grip(halo, halo, lambda _, seen: seen)
         for axis, (name, color) in enumerate(_AXES.items()):
             path, direction = f"/grip/{name}", np.eye(3)[axis]
-            across = (np.tile(np.roll(direction, k), (len(heights), 1)) for k in (1, 2))
-            mesh = tube_surface(np.outer(heights, direction), *across, radii, sides=12)
+            first, second = (np.tile(np.roll(direction, k), (len(heights), 1)) for k in (1, 2))
+            mesh = tube_surface(np.outer(heights, direction), first, second, radii, sides=12)
             vertices = mesh.vertices.astype(np.float32)
             arrow = api.add_mesh_simple(path, vertices, mesh.faces, color=color, **look)
             add_label(api, f"{path}/letter", name, _LETTER * direction)
