@@ -9,27 +9,17 @@ import numpy as np
 import pytest
 
 from softreach import reachable_set, tip_positions
-from softreach.arm import designs
-from softreach.arm.parameters import changed, parameters
+from softreach.arm.parameters import changed
 from softreach.geometry.surface import section_area
 from softreach.studio import figures
 from softreach.studio import reach as reaching
 from softreach.studio import work as budget
-from softreach.studio.figures import (
-    Slope,
-    VolumeSlopes,
-    section_curves,
-    slope_bars,
-    swept_volumes,
-    volume_slopes,
-)
 from softreach.studio.markup import bar
 from softreach.studio.reach import Quality, Reach, stages
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import MOST_POINTS, Slice, TipPath
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.workspace import volume_gradient
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -71,9 +61,7 @@ def test_a_set_without_time_keeps_what_was_known_or_says_why_there_is_none(trunk
     assert none.refusal == "to 10 % it needs more than 30 s"
 
 
-def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_given(
-    trunk, monkeypatch
-):
+def test_five_bundles_show_a_cloud_before_their_set_within_their_memory(trunk, monkeypatch):
     exact, given = reaching.reachable_set, []
 
     def noted(*arguments, **options):
@@ -104,31 +92,6 @@ def reach_of(arm) -> Reach:
     return list(stages(arm, 10, QUALITY, nothing))[-1]
 
 
-@pytest.fixture(scope="module")
-def small_arm():
-    """In other units than L = 1 m."""
-    return changed(designs.minimal_trunk(), {"length": 0.3, "outer_radius": 0.02})
-
-
-@pytest.fixture(scope="module")
-def slopes(small_arm) -> VolumeSlopes:
-    return volume_slopes(reach_of(small_arm), QUALITY, nothing)
-
-
-def test_each_slider_that_moves_continuously_has_the_slope_of_the_library_in_its_unit(
-    small_arm, slopes
-):
-    theirs = volume_gradient(small_arm, list(slopes.slopes), accuracy=QUALITY.fine_accuracy)
-    sliders = {each.name: each for each in slider_parameters(small_arm)}
-    rows = zip(theirs.parameters, theirs.volume, theirs.volume_error, strict=True)
-    for name, value, error in rows:
-        scale, ours = sliders[name].scale, slopes.slopes[name]
-        assert abs(ours.value - value * scale) <= ours.error + error * scale
-        assert ours.error < 10 * error * scale
-    known = parameters(small_arm)
-    assert {name for name in sliders if known[name].whole} == {*sliders} - {*slopes.slopes} != set()
-
-
 def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, monkeypatch):
     plain = figures.gradient_of
 
@@ -138,18 +101,18 @@ def test_one_parameter_that_cannot_be_differentiated_leaves_the_others(trunk, mo
         return plain(solid, names, *rest)
 
     monkeypatch.setattr(figures, "gradient_of", without_taper)
-    slopes = volume_slopes(reach_of(trunk), QUALITY, nothing).slopes
+    slopes = figures.volume_slopes(reach_of(trunk), QUALITY, nothing).slopes
     assert "taper" not in slopes
     assert len(slopes) > 5
 
 
 def test_a_set_that_is_flat_or_torn_has_no_slopes_and_what_takes_too_long_is_left_out(trunk):
     flat = trunk.replace(actuators=trunk.actuators[1:])
-    assert volume_slopes(reach_of(flat), QUALITY, nothing).slopes == {}
+    assert figures.volume_slopes(reach_of(flat), QUALITY, nothing).slopes == {}
     reach = reach_of(trunk)
     torn = SimpleNamespace(dimension=3, volume=1.0, lost_share=0.1, is_torn=False)
-    assert volume_slopes(replace(reach, exact=torn), QUALITY, nothing).slopes == {}
-    assert volume_slopes(reach, replace(QUALITY, most_seconds=0.0), nothing).slopes == {}
+    assert figures.volume_slopes(replace(reach, exact=torn), QUALITY, nothing).slopes == {}
+    assert figures.volume_slopes(reach, replace(QUALITY, most_seconds=0.0), nothing).slopes == {}
 
 
 def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter_or_stage(trunk):
@@ -161,7 +124,7 @@ def test_work_that_is_no_longer_wanted_ends_before_the_next_parameter_or_stage(t
             raise Dropped
 
     with pytest.raises(Dropped):
-        volume_slopes(reach, QUALITY, check)
+        figures.volume_slopes(reach, QUALITY, check)
     assert len(calls) == 5
     with pytest.raises(Dropped):
         next(stages(trunk, 11, SMALL, check))
@@ -175,9 +138,10 @@ def share_of(html: str) -> float:
 
 def test_bars_are_on_one_scale_and_say_number_unit_and_error(trunk):
     sliders = {each.name: (each, each.high - each.low) for each in slider_parameters(trunk)}
-    slopes = {"taper": Slope(-0.1, 0.001), "extent": Slope(0.01, 0.0), "upper": Slope(0, 0)}
-    found = VolumeSlopes(trunk, 0.7, slopes)
-    told = slope_bars(found, sliders)
+    taper, extent = figures.Slope(-0.1, 0.001), figures.Slope(0.01, 0.0)
+    slopes = {"taper": taper, "extent": extent, "upper": figures.Slope(0, 0)}
+    found = figures.VolumeSlopes(trunk, 0.7, slopes)
+    told = figures.slope_bars(found, sliders)
     bars = {name: each.html(old=False) for name, each in told.items()}
     assert list(bars) == [name for name in sliders if name in found.slopes]
     changes = np.array([found.slopes[name].value * sliders[name][1] for name in bars])
@@ -205,7 +169,7 @@ QUICK = Quality(coarse_level=10, fine_level=10, coarse_accuracy=0.1, fine_accura
 
 def swept(arm, name):
     parameter = next(each for each in slider_parameters(arm) if each.name == name)
-    return dict(swept_volumes(arm, parameter, QUICK))
+    return dict(figures.swept_volumes(arm, parameter, QUICK))
 
 
 def test_a_sweep_has_the_volumes_of_the_designs_and_none_where_there_is_no_design(trunk):
@@ -222,25 +186,13 @@ def test_a_sweep_has_the_volumes_of_the_designs_and_none_where_there_is_no_desig
     assert None in volumes.values()
 
 
-def test_a_sweep_of_a_design_on_the_same_curve_computes_its_own_volume_alone(trunk, monkeypatch):
-    swept(trunk, "taper")
-    computed = []
-    monkeypatch.setattr(
-        "softreach.studio.figures.exact_set",
-        lambda arm, *_: computed.append(arm) or SimpleNamespace(volume=1.0),
-    )
-    arm = changed(trunk, {"taper": np.radians(0.95)})
-    assert swept(arm, "taper")[0.95] == 1.0
-    assert computed == [arm]
-
-
 def test_the_areas_of_sections_sum_up_to_the_volume(trunk):
     *_, reach = stages(trunk, 10, QUICK, nothing)
     heights = reach.exact.surface().vertices[:, 2] / trunk.length
     edges = np.linspace(heights.min(), heights.max(), 41)
     middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
     cuts = (Slice(axis="z", center=float(at)) for at in middles)
-    areas = [section_area(section_curves(reach, cut), 2) for cut in cuts]
+    areas = [section_area(figures.section_curves(reach, cut), 2) for cut in cuts]
     assert sum(areas) * width == pytest.approx(reach.volume / trunk.length**3, rel=0.02)
 
 

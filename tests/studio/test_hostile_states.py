@@ -147,9 +147,7 @@ def test_a_design_file_changes_the_design_alone(trunk):
         saved("x.toml", tight.to_toml().encode())
 
 
-def test_a_design_is_begun_with_at_rest_and_a_saved_state_as_it_is_but_not_a_large_file(
-    trunk, tmp_path
-):
+def test_a_design_begins_at_rest_and_a_saved_state_as_it_is_but_no_large_file(trunk, tmp_path):
     assert start_on_design(trunk).state.activation == (0.0, 0.0, 0.0)
     state = StudioState(design=trunk, activation=(-1.0, 0.0, -0.2)).showing(level=14)
     (tmp_path / "state.json").write_text(state.to_json(), encoding="utf-8")

@@ -7,7 +7,6 @@ import pytest
 
 import softreach as sr
 from softreach.arm import designs
-from softreach.arm.parameters import changed
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.captions import size_text
 from softreach.support import palette
@@ -123,7 +122,6 @@ def test_the_tip_is_dragged_sent_to_a_target_with_ghosts_and_led_along_a_path(ta
 def test_a_design_is_kept_and_what_a_change_costs_is_read_beside_it(tab):
     page = tab.page
     tab.show_surface()
-    before = size_text(tab.reach_of(TRUNK).size, TRUNK)
     tab.open("Compare")
     tab.press("Keep this design")
     page.get_by_role("cell", name="volume [m³]").wait_for()
@@ -135,10 +133,6 @@ def test_a_design_is_kept_and_what_a_change_costs_is_read_beside_it(tab):
     tab.wait(lambda: "taper φ [deg]" in rows.last.inner_text(), "the taper has a row")
     title, kept, now, change = rows.last.inner_text().split("\t")
     assert (title, kept, now, change) == ("taper φ [deg]", "2", "1", "\N{MINUS SIGN}1")
-    volume = rows.nth(1).inner_text().split("\t")
-    design = changed(TRUNK, {"taper": np.radians(1)})
-    after = size_text(tab.reach_of(design).size, design)
-    assert volume[1:3] == [text.split()[1] for text in (before, after)]
     both = tab.pixels()
     tab.press("Swap")
     tab.wait(lambda: rows.last.inner_text().split("\t")[1:3] == ["1", "2"], "they are swapped")
@@ -191,11 +185,9 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     tab.upload("Load measured poses (CSV)", bench)
     page.get_by_text("bench.csv: 20 samples of half, tool").wait_for()
     assert like(tab.pixels(), ORANGE) > 20
-    for sample in (0, 1):
-        predicted = marker_positions(MARKED, INPUTS[sample])[0]
-        half, tool = 1e3 * np.linalg.norm(PLACES[sample] - predicted, axis=1)
-        page.get_by_text(f"half {half:.3g} mm, tool {tool:.3g} mm").wait_for()
-        tab.slider("sample").press("ArrowRight")
+    tab.slider("sample").press("ArrowRight")
+    half, tool = 1e3 * np.linalg.norm(PLACES[1] - marker_positions(MARKED, INPUTS[1])[0], axis=1)
+    page.get_by_text(f"half {half:.3g} mm, tool {tool:.3g} mm").wait_for()
     page.get_by_label("taper φ", exact=True).check()
     tab.press("Fit")
     page.get_by_text("20 fitted").first.wait_for()

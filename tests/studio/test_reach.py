@@ -13,38 +13,16 @@ from softreach.arm.loads import GRAVITIES, Loads
 from softreach.cloud.clouds import compute_cloud
 from softreach.picture.gltf import ColoredSkin
 from softreach.plot.coloring import BundleKey, ScalarKey
-from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import TipStatus, has_tip
+from softreach.studio import reach as reaching
 from softreach.studio.captions import legend_text, picture_text, size_text
 from softreach.studio.found import Found
-from softreach.studio.reach import (
-    Quality,
-    Reach,
-    Size,
-    affordable_level,
-    cloud_points,
-    reached,
-    shown_samples,
-    stages,
-)
-from softreach.studio.scene.colors import (
-    color_names,
-    key_html,
-    sample_colors,
-    sample_values,
-    surface_colors,
-)
+from softreach.studio.reach import Quality, Reach, shown_samples, stages
+from softreach.studio.scene import colors
 from softreach.studio.scene.scene import Scene, in_slice, sliced
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
-from softreach.studio.tabs.design import (
-    base_field,
-    gravity_name,
-    load_field,
-    other_loads,
-    setting_text,
-)
+from softreach.studio.tabs import design
 from softreach.support.errors import InvalidDesign, InvalidInput
-from tests.laws import differences
 from tests.studio.test_scene import Meshes
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -66,34 +44,26 @@ def test_the_coarse_cloud_is_the_beginning_of_the_fine_one_which_has_what_is_sho
 
 
 def test_a_grid_from_a_file_is_thinned_evenly(trunk):
-    grid = reached(compute_cloud(trunk, 16**3, sampler="grid"), SMALL)
+    grid = reaching.reached(compute_cloud(trunk, 16**3, sampler="grid"), SMALL)
     few = grid.cloud.activation.values[shown_samples(grid, 9)]
     np.testing.assert_allclose(few.mean(axis=0), trunk.bounds.mean(axis=1), atol=0.1)
-    uniform = reached(compute_cloud(trunk, 1000), SMALL)
+    uniform = reaching.reached(compute_cloud(trunk, 1000), SMALL)
     np.testing.assert_array_equal(shown_samples(uniform, 14), np.arange(1000))
 
 
 def test_every_color_that_is_offered_colors_every_point_that_is_shown(both):
     fine = both[1]
-    for color in color_names(fine.arm):
-        coloring = sample_colors(fine, 10, color)
+    for color in colors.color_names(fine.arm):
+        coloring = colors.sample_colors(fine, 10, color)
         assert coloring.rgb.shape == (1 << 10, 3)
-        assert "url(" not in key_html(coloring.key)
-    multiplicity = sample_colors(fine, 10, "multiplicity").key
+        assert "url(" not in colors.key_html(coloring.key)
+    multiplicity = colors.sample_colors(fine, 10, "multiplicity").key
     assert isinstance(multiplicity, BundleKey)
     assert multiplicity.names[0].startswith("1: ")
-    assert "multiplicity" not in color_names(designs.redundant_trunk())  # where it is not finite
-    unknown, plain = (sample_colors(fine, 10, color).rgb for color in ("bundle 9", "rgb"))
+    names = colors.color_names(designs.redundant_trunk())
+    assert "multiplicity" not in names  # where it is not finite
+    unknown, plain = (colors.sample_colors(fine, 10, color).rgb for color in ("bundle 9", "rgb"))
     np.testing.assert_array_equal(unknown, plain)
-
-
-def test_points_are_colored_by_the_determinant_of_the_tips_velocities(both, trunk):
-    reach = both[-1]
-    shown = sample_values(reach, 8, "manipulability").values
-    sample = int(np.argsort(shown)[len(shown) // 2])  # the few largest and smallest are clipped
-    gamma = reach.cloud.activation.values[[sample]]
-    (slopes,) = differences(lambda gamma: tip_positions(trunk, gamma, 1e-9), gamma, 1e-4)
-    assert shown[sample] == pytest.approx(abs(np.linalg.det(slopes)), rel=1e-3)
 
 
 def test_a_slice_shows_what_lies_within_its_thickness(rng):
@@ -119,18 +89,18 @@ def test_a_slice_cuts_a_surface_at_its_planes_and_its_colors_with_it():
 
 def test_a_surface_is_colored_by_its_own_activations_with_the_key_of_that_color(both):
     reach = both[1]
-    effort = surface_colors(reach, "effort")
+    effort = colors.surface_colors(reach, "effort")
     assert isinstance(effort.key, ScalarKey)
     pulls = np.abs(reach.sheets.activation / reach.arm.bounds[:, 0]).mean(axis=1)
     brightest = np.all(effort.rgb == effort.rgb[pulls.argmax()], axis=1)
     assert pulls[brightest].min() > pulls.max() - 0.01
-    multiplicity = surface_colors(reach, "multiplicity").key
+    multiplicity = colors.surface_colors(reach, "multiplicity").key
     assert isinstance(multiplicity, BundleKey)
     assert multiplicity.names[0] == "1"
     *_, four = stages(designs.redundant_trunk(), 11, SMALL, lambda: None)
     for each in (reach, four):
-        for color in color_names(each.arm):
-            assert surface_colors(each, color).rgb.shape == each.sheets.vertices.shape
+        for color in colors.color_names(each.arm):
+            assert colors.surface_colors(each, color).rgb.shape == each.sheets.vertices.shape
 
 
 def test_samples_without_a_tip_tell_nothing_of_a_boundary():
@@ -159,12 +129,12 @@ def loaded(arm, **typed):
     """The arm under loads that are typed one after another."""
     state = StudioState(design=arm)
     for name, value in typed.items():
-        state = load_field(name).write(state, value)
+        state = design.load_field(name).write(state, value)
     return state.design
 
 
 def typed_loads(arm):
-    return {name: load_field(name).read(StudioState(design=arm)) for name in LOADS}
+    return {name: design.load_field(name).read(StudioState(design=arm)) for name in LOADS}
 
 
 def hanging(arm, grams: float):
@@ -186,13 +156,13 @@ def test_what_is_typed_is_what_the_design_has(lce):
 def test_directions_are_known_by_name(lce):
     for name, gravity in (GRAVITIES | {"": (0.0, 0.0, -1.62)}).items():
         arm = loaded(lce, gravity=gravity)
-        assert gravity_name(StudioState(design=arm)) == name
+        assert design.gravity_name(StudioState(design=arm)) == name
         assert typed_loads(arm)["gravity"] == gravity
 
 
 def test_place_and_turn_of_the_base_are_typed_in_mm_and_degrees_and_the_rest_of_it_stays(lce):
     state = StudioState(design=lce.replace(base=sr.Base(points="down", position=(1 / 3, 0, 0))))
-    place, turn = base_field("position"), base_field("turn")
+    place, turn = design.base_field("position"), design.base_field("turn")
     moved = turn.write(place.write(state, (10.0, 0.0, 250.0)), -30.0)
     assert (place.read(moved), turn.read(moved)) == ((10.0, 0.0, 250.0), -30.0)
     base = sr.Base(points="down", position=(0.01, 0.0, 0.25), turn=math.radians(-30))
@@ -204,10 +174,10 @@ def test_place_and_turn_of_the_base_are_typed_in_mm_and_degrees_and_the_rest_of_
 
 def test_loads_without_a_field_stay(lce):
     twisted = lce.replace(loads=sr.Loads(gravity=HANGING, tip_moment=(0.0, 0.0, 1e-4)))
-    assert other_loads(twisted) == ["tip moment"]
+    assert design.other_loads(twisted) == ["tip moment"]
     changed = loaded(twisted, gravity=(0.0, 0.0, 0.0))
     assert changed.loads.tip_moment == (0.0, 0.0, 1e-4)
-    assert other_loads(lce) == []
+    assert design.other_loads(lce) == []
 
 
 def test_a_caption_says_how_an_arm_stands_and_what_acts_on_it_where_that_is_not_usual(lce):
@@ -222,7 +192,7 @@ def test_a_caption_says_how_an_arm_stands_and_what_acts_on_it_where_that_is_not_
         standing.replace(loads=Loads(tip_moment=(0.0, 0.0, 1e-4))): "tip moment",
         hung: f"{words}, base turned by 30°",
     }.items():
-        assert setting_text(StudioState(design=arm)) == text
+        assert design.setting_text(StudioState(design=arm)) == text
 
 
 def test_matter_that_lacks_what_loads_need_is_named_in_one_line(trunk):
@@ -263,7 +233,7 @@ def test_samples_are_counted_by_status_and_those_without_a_tip_are_not_shown(tor
     assert sum(shares) == pytest.approx(1.0)
     assert shares[TipStatus.STABLE] > 0.98
     assert shares[TipStatus.SNAPS] > 0
-    points = cloud_points(torn, 13)
+    points = reaching.cloud_points(torn, 13)
     assert np.isfinite(points).all()
     assert len(points) == has_tip(torn.status).sum()
 
@@ -313,8 +283,8 @@ def test_an_arm_loaded_beyond_what_can_be_computed_is_refused_and_remembered(lce
 
 def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
     rod = solvable_rod(hanging(lce, 5.0))
-    assert affordable_level(rod, 1e6, 12) == 12
-    assert affordable_level(rod, 0.0, 17) == 10
+    assert reaching.affordable_level(rod, 1e6, 12) == 12
+    assert reaching.affordable_level(rod, 0.0, 17) == 10
     hasty = Quality(coarse_level=12, fine_seconds=0.0, coarse_accuracy=0.1, fine_accuracy=0.1)
     *_, fine = stages(rod.arm, 14, hasty, lambda: None)
     assert (fine.samples, fine.wanted) == (1 << 10, 1 << 14)
@@ -322,4 +292,4 @@ def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
 
 def test_digits_of_a_size_follow_its_error(trunk):
     for error, text in ((9e-5, "0.25642 ± 0.00009"), (4e-9, "0.256423 ± 0.000001")):
-        assert size_text(Size("volume", 0.2564231, error, 3), trunk) == f"volume {text} m³"
+        assert size_text(reaching.Size("volume", 0.2564231, error, 3), trunk) == f"volume {text} m³"

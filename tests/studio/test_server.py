@@ -10,28 +10,20 @@ from urllib.parse import urlencode
 import pytest
 
 import softreach.studio
-from softreach.studio.serve import (
-    headed,
-    page_address,
-    page_headers,
-    reachable_hosts,
-    refusal,
-    start_server,
-    stop_server,
-)
+from softreach.studio import serve
 from softreach.support.errors import InvalidInput
 
 
 @pytest.fixture(scope="module", params=[""])
 def server(request):
     """One that asks for a token, or for none."""
-    running = start_server(token=request.param)
+    running = serve.start_server(token=request.param)
     yield running
-    stop_server(running)
+    serve.stop_server(running)
 
 
 def address_of(server):
-    return page_address(server.get_host(), server.get_port())
+    return serve.page_address(server.get_host(), server.get_port())
 
 
 def test_only_this_machine_can_connect_nobody_opens_a_tunnel_and_a_taken_port_is_refused(server):
@@ -39,18 +31,18 @@ def test_only_this_machine_can_connect_nobody_opens_a_tunnel_and_a_taken_port_is
     assert address_of(server) == f"http://127.0.0.1:{server.get_port()}"
     assert server.request_share_url() is None
     with pytest.raises(InvalidInput, match="a free port"):
-        start_server(port=server.get_port())
+        serve.start_server(port=server.get_port())
     with pytest.raises(InvalidInput, match=r"203\.0\.113\.7"):
-        start_server(host="203.0.113.7")
+        serve.start_server(host="203.0.113.7")
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8080", "localhost:8080", "rebound.example:8080"])
 def test_pages_from_elsewhere_are_turned_away(host):
     for origin in (f"http://{host}", None):
         headers = {"Host": host} | ({"Origin": origin} if origin else {})
-        assert (refusal("127.0.0.1", "", "/", headers) == "") is ("rebound" not in host)
+        assert (serve.refusal("127.0.0.1", "", "/", headers) == "") is ("rebound" not in host)
     for origin in ("https://elsewhere.example", "http://127.0.0.1:9999", "null"):
-        assert refusal("127.0.0.1", "", "/", {"Host": host, "Origin": origin})
+        assert serve.refusal("127.0.0.1", "", "/", {"Host": host, "Origin": origin})
 
 
 def socket_of(server, **options):
@@ -76,7 +68,7 @@ def test_a_page_from_elsewhere_gets_no_data(server):
     [("localhost:80", True), ("[::1]:80", True), ("a b", False), ("x; script-src *", False)],
 )
 def test_only_a_plain_host_is_named_as_a_place_to_connect_to(host, named):
-    rules = page_headers(host)["Content-Security-Policy"].split("; ")
+    rules = serve.page_headers(host)["Content-Security-Policy"].split("; ")
     allowed = "".join(rule for rule in rules if rule.startswith("connect-src"))
     assert (f"ws://{host}" in allowed) is named
     assert not any(rule.startswith("script-src *") for rule in rules)
@@ -117,20 +109,20 @@ def test_without_the_token_there_is_no_page_and_no_socket(server):
 
 
 def test_others_are_told_addresses_that_they_can_use():
-    assert reachable_hosts("127.0.0.1") == []
-    assert reachable_hosts("192.0.2.7") == ["192.0.2.7"]
-    assert not {"0.0.0.0", "127.0.0.1"} & set(reachable_hosts("0.0.0.0"))
-    assert page_address("::", 80) == "http://127.0.0.1:80"
-    assert page_address("fe80::1", 80) == "http://[fe80::1]:80"
+    assert serve.reachable_hosts("127.0.0.1") == []
+    assert serve.reachable_hosts("192.0.2.7") == ["192.0.2.7"]
+    assert not {"0.0.0.0", "127.0.0.1"} & set(serve.reachable_hosts("0.0.0.0"))
+    assert serve.page_address("::", 80) == "http://127.0.0.1:80"
+    assert serve.page_address("fe80::1", 80) == "http://[fe80::1]:80"
 
 
 def test_an_address_that_names_another_server_is_refused():
     headers = {"Host": "127.0.0.1:8080"}
-    assert not refusal("127.0.0.1", "", "/", headers)
+    assert not serve.refusal("127.0.0.1", "", "/", headers)
     own = urlencode({"websocket": "ws://127.0.0.1:8080/?state=x"})
-    assert not refusal("127.0.0.1", "", f"/?{own}", headers)
+    assert not serve.refusal("127.0.0.1", "", f"/?{own}", headers)
     for foreign in ("ws://elsewhere.example", "wss://127.0.0.1:9999", "", "x", "ws://[", "//"):
-        told = refusal("127.0.0.1", "", "/?" + urlencode({"websocket": foreign}), headers)
+        told = serve.refusal("127.0.0.1", "", "/?" + urlencode({"websocket": foreign}), headers)
         assert bool(told) is bool(foreign)
 
 
@@ -144,9 +136,9 @@ def test_our_head_is_for_this_viser_and_another_page_stays_as_it_is():
     assert viser.__version__.startswith("1.1.")
     page = files(viser).joinpath("client/build/index.html").read_bytes()
     assert page.count(b"<title>Viser</title>") == 1
-    assert b"<title>softreach</title>" in headed(page, zipped=False)
+    assert b"<title>softreach</title>" in serve.headed(page, zipped=False)
     other = b"<html><head><title>Another</title></head></html>"
-    assert headed(other, zipped=False) == other
+    assert serve.headed(other, zipped=False) == other
 
 
 @pytest.mark.parametrize(
@@ -169,4 +161,4 @@ def test_a_server_whose_requests_cannot_be_checked_does_not_start(monkeypatch):
     own.asyncio = SimpleNamespace(server=SimpleNamespace(**vars(sockets)))
     monkeypatch.setattr(infra, "websockets", own)
     with pytest.raises(InvalidInput, match="viser"):
-        start_server(token="secret")
+        serve.start_server(token="secret")

@@ -10,17 +10,9 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.cli.studio import begun
-from softreach.inverse import solve_inverse
 from softreach.rod.rods import as_tip_map
 from softreach.studio.fields import Attribute, Fields
-from softreach.studio.reach import (
-    Quality,
-    Reach,
-    cloud_points,
-    count_activations,
-    shown_samples,
-    stages,
-)
+from softreach.studio.reach import Quality, Reach, cloud_points, count_activations, stages
 from softreach.studio.scene.colors import key_html, sample_colors, sample_values
 from softreach.studio.session import Session
 from softreach.studio.start import KeptWork, work_on
@@ -119,16 +111,6 @@ def test_places_counted_once_for_every_activation_make_up_the_volume(revolution,
     assert (stretch / counts).mean() == pytest.approx(volume, abs=error + 0.003 * volume)
 
 
-def test_away_from_folds_points_have_the_colors_of_what_the_inverse_finds(folded):
-    rows = shown_samples(folded, 9)
-    found = solve_inverse(folded.arm, folded.cloud.tip.values[rows])  # with its own tolerance
-    worst = [one.conditions.max(initial=np.inf if not len(one) else 0.0) for one in found]
-    regular = np.array(worst) < 100
-    shown = sample_values(folded, 9, "multiplicity")
-    assert regular.mean() > 0.5
-    np.testing.assert_array_equal(shown[regular], found.counts[regular])
-
-
 def test_the_key_has_the_color_and_the_share_of_each_number_of_activations(folded):
     counts = sample_values(folded, LEVEL, "multiplicity").values
     rgb, key = sample_colors(folded, LEVEL, "multiplicity")
@@ -183,9 +165,7 @@ def test_work_is_found_again_and_a_folder_that_cannot_be_written_is_named(tmp_pa
     assert work.latest == STATE
 
 
-def test_the_command_goes_on_with_the_work_on_its_design_unless_it_is_to_begin_afresh(
-    tmp_path, monkeypatch
-):
+def test_the_command_goes_on_with_work_on_its_design_unless_it_begins_afresh(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     bent = STATE.replace(activation=(-0.5, 0.0, 0.0))
     work_on(TRUNK).keep(bent)

@@ -12,16 +12,10 @@ from softreach.arm import designs, edits
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
+from softreach.rod.kinematics import tip_positions
+from softreach.studio import shown_parameters as shown
 from softreach.studio.fields import attribute
-from softreach.studio.shown_parameters import (
-    body_numbers,
-    named_parameters,
-    part_parameters,
-    parts,
-    refusal,
-    slider_ends,
-    slider_parameters,
-)
+from softreach.studio.shown_parameters import part_parameters, parts, slider_ends, slider_parameters
 from softreach.studio.state import Slice, StudioState
 from softreach.studio.widgets import number_kind, unit_in, vector_kind
 from softreach.support.errors import InvalidDesign
@@ -47,13 +41,30 @@ def named(request):
     return getattr(designs, request.param)()
 
 
-def test_a_moved_slider_shows_its_own_value_in_the_new_design(named):
+def bent_tip(arm):
+    """Where the tip is with every bundle at another share of its range."""
+    low, high = arm.input_bounds.T
+    return tip_positions(arm, [low + (high - low) * np.linspace(0.8, 0.3, len(low))])[0]
+
+
+def test_a_moved_slider_shows_its_own_value_in_the_new_design_and_moves_its_tip(named):
+    before = bent_tip(named)
     for control in slider_parameters(named):
-        to = 0.95 * control.shown + 0.05 * control.limits[0]
+        to = 0.95 * control.shown + 0.05 * control.limits[control.shown == control.limits[0]]
         to = 2 if control.name.endswith(".bundles") else to
         made = changed(named, {control.name: to * control.scale})
         again = {one.name: one.shown for one in slider_parameters(made)}
         assert again[control.name] == pytest.approx(to, abs=1e-6)
+        assert np.linalg.norm(bent_tip(made) - before) > 1e-5 * named.length, control.name
+
+
+def test_sliders_end_at_numbers_that_a_person_would_type(named):
+    typed = changed(named, {"taper": find_parameter(named, "taper").value(named) - 0.0123456789})
+    for arm in (named, typed, named.replace(display_unit="in")):
+        ends = slider_ends(arm, {}, lambda: None)
+        for control in slider_parameters(arm):
+            for end in (*control.limits, *ends[control.name]):
+                assert f"{end:.12g}" == f"{float(f'{end:.3g}'):.12g}"
 
 
 def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
@@ -106,11 +117,11 @@ def test_ends_are_those_of_the_design_when_they_are_looked_for_near_others(trunk
 
 def test_refusals_use_the_words_of_the_panel(trunk):
     """No name of a file, and no symbol that the page does not show."""
-    shown = slider_parameters(trunk)
+    sliders = slider_parameters(trunk)
     for change, value in ((changed, {"taper": 0.1}), (edits.with_actuator, "tendon")):
         with pytest.raises(InvalidDesign) as refused:
             change(trunk, value)
-        said = refusal(refused.value, shown, trunk)
+        said = shown.refusal(refused.value, sliders, trunk)
         assert not re.search(r"R2|_|rings\[", said)
     assert said.startswith("modulus [kPa] of ring 0: must be given")
 
@@ -129,7 +140,7 @@ def test_what_differs_between_fibers_is_on_sliders_and_in_fields_of_each():
     assert own <= found.keys()
     assert not shared & found.keys()
     assert found["a.revolution"] == pytest.approx(-0.5)
-    assert not shared & {one.name for one in body_numbers(differing)}
+    assert not shared & {one.name for one in shown.body_numbers(differing)}
 
 
 def test_sliders_of_fibers_bear_their_names_whatever_these_are():
@@ -159,9 +170,9 @@ def test_sliders_of_a_design_are_made_once_and_none_of_what_it_leaves_open(trunk
 
 def test_a_parameter_is_shown_in_one_part_and_is_its_value_in_the_unit_that_is_shown(named):
     typed = [one for part in parts(named).values() for one in part_parameters(named, part)]
-    typed += body_numbers(named)
+    typed += shown.body_numbers(named)
     assert len({one.name for one in typed}) == len(typed)
-    for one in [*typed, *named_parameters(named), *slider_parameters(named)]:
+    for one in [*typed, *shown.named_parameters(named), *slider_parameters(named)]:
         value = find_parameter(named, one.name).value(named)
         assert one.shown * one.scale == pytest.approx(value, rel=1e-11, nan_ok=True)
 

@@ -14,16 +14,7 @@ from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.loads import Loads
 from softreach.arm.parameters import changed
 from softreach.requirements import Requirements, Target
-from softreach.studio.state import (
-    LEVELS,
-    MOUSE,
-    Appearance,
-    Camera,
-    History,
-    Slice,
-    StudioState,
-    TipPath,
-)
+from softreach.studio.state import MOUSE, Appearance, Camera, History, Slice, StudioState, TipPath
 from softreach.support.errors import InvalidDesign
 from tests.laws import arm_of, arms
 
@@ -38,7 +29,7 @@ NEEDS = Requirements(targets=(Target([(0.1, 0.0, 0.8)]),), payloads=(0.2,)).to_t
 def states(draw: st.DrawFn) -> StudioState:
     axis = draw(st.sampled_from(["none", "x", "y", "z"]))
     look = Appearance(
-        level=draw(st.sampled_from(LEVELS)),
+        level=draw(st.integers(12, 21)),
         color=draw(st.sampled_from(["rgb", "bundle 0", "multiplicity"])),
         slice=Slice(axis=axis, center=draw(numbers), thickness=draw(st.floats(0.01, 1))),
         surface=draw(st.booleans()),

@@ -7,11 +7,9 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed, find_parameter
-from softreach.geometry.surface import section_area
 from softreach.studio import Quality, Studio
 from softreach.studio import reach as stages
 from softreach.studio.captions import size_text
-from softreach.studio.figures import section_curves
 from softreach.studio.start import KeptWork
 from softreach.studio.state import Slice
 from softreach.studio.work import all_cores
@@ -71,15 +69,17 @@ def test_what_is_typed_may_have_a_unit_lie_beyond_the_slider_or_be_refused_below
     tab.open("Design")
     thumb = tab.slider("revolution Ω [deg]")
 
-    def is_shown(text: str) -> None:
+    def is_shown(text: str, value: float = 0.0) -> None:
         page.locator(f"input[value='{text}']").locator("visible=true").first.wait_for()
-        near = pytest.approx(float(text), abs=1e-6)
+        near = pytest.approx(value or float(text), abs=1e-6)
         tab.wait(lambda: float(thumb.get_attribute("aria-valuenow")) == near, "the thumb follows")
 
     tab.type("revolution Ω [deg]", "400")
     is_shown("400")
     tab.type("revolution Ω [deg]", "0.5 rad")
-    is_shown("28.6478897565")
+    is_shown("28.648", np.degrees(0.5))
+    page.locator("input[value='28.648']").locator("visible=true").first.press("Enter")
+    page.wait_for_timeout(500)  # what a field shows rounded is held as it was
     design = tab.session.state.design
     assert find_parameter(design, "revolution").value(design) == pytest.approx(0.5)
     before = tab.session.state
@@ -173,18 +173,13 @@ def test_plots_follow_the_slice_and_the_design(tab):
         images = tab.page.locator("img[src^=blob]").all()
         return {image.get_attribute("src") for image in images}
 
-    def area() -> float:
-        return section_area(section_curves(tab.session.found.reach, cut), 2)
-
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
-    tab.page.get_by_text(f"{area():.4g} m²").wait_for()
     tab.page.get_by_text("values make no design").wait_for()
     pictures = sources()
     tab.open("Design")
     tab.drag("taper φ [deg]", -20)
     tab.settle()
     assert tab.session.found.sweep.arm == tab.session.found.section.arm == tab.session.state.design
-    tab.page.get_by_text(f"{area():.4g} m²").wait_for()
     tab.wait(lambda: not sources() & pictures, "both pictures follow")
 
 
@@ -193,8 +188,7 @@ def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_
     tab.wait(lambda: tab.session.found.slopes and bars.count(), "the bars are there")
     slopes = tab.session.found.slopes
     assert bars.count() == len(slopes.slopes)
-    slope, first = slopes.slopes["revolution"], bars.first
-    assert f"∂V/∂(revolution) = {slope.value:.5f}"[:22] in first.get_attribute("title")
+    first = bars.first
     box, thumb = first.bounding_box(), tab.slider("revolution Ω [deg]").bounding_box()
     assert 0 < box["y"] - thumb["y"] < 45
     old = tab.page.locator("[role=img][title^='of the design before']").first

@@ -369,7 +369,7 @@ class ClearanceMap:
             rod = self.tip_map.rod
             if isinstance(rod, FreeRod):
                 part = FreeRod(rod.arm.replace(point=None), rod.tol, len(self._table))
-                vars(part)["_table"] = self._table[:edge]
+                vars(part)["table"] = self._table[:edge]
                 known[edge] = replace(self.tip_map, rod=part)
             else:
                 marker = Marker(name="an edge", station=float(self.stations[edge]))

@@ -102,24 +102,29 @@ class Studio(AbstractContextManager["Studio"]):
         start = self.start
         if self._dark:
             start = replace(start, state=start.state.showing(dark=True))
-        self._libraries.join()
         session = Session(client, start, JOBS, work=self.work, compilation=self._compilation)
         goes_on = session.is_touched
         with self._lock:
             self.sessions[client.client_id] = session
-        furnish(session)
-        client.camera.on_update(lambda _: session.follow("camera"))
-        session.begin()
-        if (camera := session.state.camera) is not None:
-            session.look_as(camera)
-        elif session.camera.aspect < UPRIGHT:
-            session.look_from("oblique")
+        with session.lock:  # what a person changes meanwhile waits
+            self._show_what_needs_no_library(session)
+            self._libraries.join()
+            session.begin()
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
         elif goes_on:
             session.say(_GOES_ON)
         if client.client_id not in self.server.get_clients():  # closed before it was furnished
             self._disconnected(client)
+
+    def _show_what_needs_no_library(self, session: Session) -> None:
+        furnish(session)
+        session.client.camera.on_update(lambda _: session.follow("camera"))
+        session.draw_rest()
+        if (camera := session.state.camera) is not None:
+            session.look_as(camera)
+        elif session.camera.aspect < UPRIGHT:
+            session.look_from("oblique")
 
     def _disconnected(self, client: ClientHandle) -> None:
         with self._lock:

@@ -169,7 +169,7 @@ class Fields:
 
         def show(state: StudioState, found: Found) -> None:
             value, last = at(state, found)
-            slider.max, slider.value = max(last, 1), value
+            slider.max, slider.value, slider.visible = max(last, 1), value, last > 0
 
         last = lambda: at(session.state, session.found)[1]
         slider.on_update(self._by_hand(lambda: move(min(int(slider.value), last()))))

@@ -69,12 +69,15 @@ class Session:
         self._jobs = {job.name: job for job in (*jobs, *([kept] if work else []))}
         self._workers = {name: Latest(self.fail, self._rested) for name in self._jobs}
 
-    def begin(self) -> None:
-        """Do everything once; first what needs no kernel, which may have to be compiled."""
+    def draw_rest(self) -> None:
+        """Draw what needs no kernel, which may have to be compiled, and no library."""
         if self.found.reach is None:
             with self.client.atomic():
                 self.scene.draw_rest(self.state)
             self.report("computing")
+
+    def begin(self) -> None:
+        """Do everything once."""
         self._follow_change(None)
         self.show()
 

@@ -79,12 +79,12 @@ class ShownParameter(NamedTuple):
 
     @property
     def limits(self) -> Ends:
-        """Ends of the slider: wide enough for a design from a file."""
-        return min(self.low, self.shown), max(self.high, self.shown)
+        """Ends of the slider: wide enough for a design from a file, as a person would type them."""
+        return three_digits(min(self.low, self.shown), -1), three_digits(max(self.high, self.shown))
 
     def read(self, arm: Manipulator) -> float:
         """The value of a design, in the shown unit; 0 where it leaves the number out."""
-        value = _rounded(values_of(arm)[self.name] / self.scale)
+        value = float(f"{values_of(arm)[self.name] / self.scale:.12g}")
         return 0.0 if math.isnan(value) else value
 
     def write(self, arm: Manipulator, shown: float) -> Manipulator:
@@ -98,8 +98,12 @@ def values_of(arm: Manipulator) -> dict[str, float]:
     return {name: each.value(arm) for name, each in parameters(arm).items()}
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.12g}")
+def three_digits(value: float, way: int = 1) -> float:
+    """The next number of three digits from here on, upward or, with -1, downward."""
+    near = float(f"{value:.3g}")
+    if math.isclose(near, value, rel_tol=1e-9) or way * (near - value) > 0:
+        return near
+    return float(f"{near + way * 10.0 ** (math.floor(math.log10(abs(value))) - 2):.3g}")
 
 
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
@@ -126,7 +130,7 @@ def _slider_parameters(arm: Manipulator, unit: LengthUnit) -> tuple[ShownParamet
         names += [name for name in known if name in own and known[name].owner == owner]
         for parameter in (known[name] for name in dict.fromkeys(names) if name in known):
             is_own = parameter.name in own
-            offered = is_own or _is_offered(values, parameter)
+            offered = is_own or _is_offered(arm, values, parameter)
             if offered and not math.isnan(values[parameter.name]):
                 shown.append(_on_slider(arm, parameter, is_own=is_own))
     return tuple(slider for slider in shown if slider is not None)
@@ -185,9 +189,14 @@ def owner_label(path: str) -> str:
     return path.removesuffix(".material").replace("rings[", "ring ").replace("]", "")
 
 
-def _is_offered(values: Mapping[str, float], parameter: Parameter) -> bool:
+def _is_offered(arm: Manipulator, values: Mapping[str, float], parameter: Parameter) -> bool:
     """True if a parameter changes an arm of these values, and no other slider does the same."""
     owner, field = parameter.owner, parameter.field
+    if len(arm.section.rings) == 1 and arm.section.core is None:  # the matter is one
+        if field == "young_modulus" and arm.loads is None and {*arm.input_units} == {"1"}:
+            return False
+        if (owner, field) == ("", "radius_ratio"):
+            return any(isinstance(each, SectorActuator) for each in arm.actuators)
     if owner and field in _ONE_FOR_ALL and not math.isnan(values.get(field, math.nan)):
         return False
     if field == "revolution":
@@ -213,7 +222,9 @@ def slider_ends(arm: Manipulator, before: Mapping[str, Ends], check: StaleCheck)
 
         limit = slider.limits[which]
         near = before[slider.name][which] if slider.name in before else None
-        return limit if near == limit else last_value(slider.shown, limit, near, exists)
+        if near == limit:
+            return limit
+        return three_digits(last_value(slider.shown, limit, near, exists), 1 - 2 * which)
 
     return {each.name: (end(each, 0), end(each, 1)) for each in slider_parameters(arm)}
 
@@ -288,7 +299,7 @@ def _shown(
     arm: Manipulator, parameter: Parameter, name: str, hint: str, lengths: LengthUnit | None = None
 ) -> ShownParameter:
     unit, scale = _unit(parameter, lengths)
-    value, label = _rounded(values_of(arm)[parameter.name] / scale), _titled(name, unit)
+    value, label = float(f"{values_of(arm)[parameter.name] / scale:.12g}"), _titled(name, unit)
     return ShownParameter(parameter.name, label, hint, scale, value, whole=parameter.whole)
 
 

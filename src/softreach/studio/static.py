@@ -23,17 +23,8 @@ from softreach.picture.page import packed, script_text, web_page
 from softreach.plot.axes import bounding_box
 from softreach.plot.coloring import ScalarKey
 from softreach.plot.figure_3d import HELP, Detail, Scene, page_keys
-from softreach.support import parallel
+from softreach.support import errors, parallel
 from softreach.support.arguments import as_flag, as_path
-from softreach.support.errors import (
-    InvalidDesign,
-    InvalidInput,
-    MissingExtra,
-    NotWritten,
-    SoftreachError,
-    check_installed,
-    no_warnings,
-)
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.progress import Progress, silent
 from softreach.support.quantity import quantity
@@ -77,10 +68,10 @@ def write_static(
     The folder gets `index.html` and a folder of designs. Lengths are in a unit, by default that of
     the design file; `progress` is called with the number of designs done.
     """
-    check_installed("matplotlib", "skimage")
+    errors.check_installed("matplotlib", "skimage")
     place, overwrite = Path(as_path("folder", folder)), as_flag("overwrite", overwrite)
     if space.layout != "grid" or space.size > _MOST:
-        raise InvalidInput("designs", f"{space.size:,}", f"a grid of {_MOST:,} at most")
+        raise errors.InvalidInput("designs", f"{space.size:,}", f"a grid of {_MOST:,} at most")
     index, base = place / "index.html", space.base
     check_place(index, overwrite=overwrite, name="static")
     name = base.length_unit.name if unit is None else as_unit(unit, base.length).name
@@ -102,12 +93,12 @@ def _design(space: DesignSpace, number: int, unit: str, path: Path, overwrite: b
     """Numbers and box of a design whose file is written, or the reason why there is none."""
     try:
         arm = space.design(number)
-        with parallel.undivided(), no_warnings():
+        with parallel.undivided(), errors.no_warnings():
             content = _content(arm, as_unit(unit, arm.length))
-    except (MissingExtra, NotWritten):
+    except (errors.MissingExtra, errors.NotWritten):
         raise
-    except SoftreachError as error:
-        shown = in_file_terms(error, "") if isinstance(error, InvalidDesign) else error
+    except errors.SoftreachError as error:
+        shown = in_file_terms(error, "") if isinstance(error, errors.InvalidDesign) else error
         return {"gap": "; ".join(str(shown).strip().splitlines())}
     with writing(path, overwrite=overwrite) as file:
         file.write(f'receive("{number}", {script_text(content)});\n'.encode())
@@ -129,13 +120,9 @@ def _content(arm: Manipulator, unit: LengthUnit) -> Entry:
             percent = quantity(100 * value, "%", 100 * error)
             text = unit.text(value, power, error) if power else percent
             numbers[name] = [value, error if np.isfinite(error) else None, text]
-    return {
-        "numbers": numbers,
-        "box": box.tolist(),
-        "keys": [key._asdict() for key in scene.keys],
-        "note": ". ".join([*notes, _HELP]),
-        "parts": [packed(part, box) for part in scene.parts],
-    }
+    shown = {"keys": [key._asdict() for key in scene.keys], "note": ". ".join([*notes, _HELP])}
+    parts = [packed(part, box) for part in scene.parts]
+    return shown | {"numbers": numbers, "box": box.tolist(), "parts": parts}
 
 
 def _page(
@@ -144,7 +131,9 @@ def _page(
     """The page, with the design in the middle of those that there are."""
     known = [k for k, entry in enumerate(entries) if "gap" not in entry]
     if not known:
-        raise InvalidInput("designs", entries[0]["gap"], "some that can exist and reach something")
+        raise errors.InvalidInput(
+            "designs", entries[0]["gap"], "some that can exist and reach something"
+        )
     first = known[len(known) // 2]
     boxes = np.array([entries[k]["box"] for k in known])
     box = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
@@ -152,20 +141,21 @@ def _page(
     (scale,) = page_keys(ScalarKey("", 0.0, 1.0))
     base, varied = space.base, space.varied()
     sliders = [_slider(base, varied[name], values, unit) for name, values in space.parameters]
+    designs = [
+        entry if "gap" in entry else {"file": str(k), "numbers": entry["numbers"]}
+        for k, entry in enumerate(entries)
+    ]
     sheet = {
         "folder": _FOLDER,
         "parameters": sliders,
-        "designs": [
-            entry if "gap" in entry else {"file": str(k), "numbers": entry["numbers"]}
-            for k, entry in enumerate(entries)
-        ],
+        "designs": designs,
         "first": first,
         "keys": content["keys"],
         "note": content["note"],
         "help": _HELP,
-        "colors": scale._asdict()["colors"],
         "name": title,
     }
+    sheet["colors"] = scale._asdict()["colors"]
     more = files("softreach.studio").joinpath("static.html").read_text(encoding="utf-8")
     more, caption = more.replace("@SHEET@", script_text(sheet)), f"Reachable set of {title}"
     words = {"caption": title and caption, "note": content["note"]}
@@ -179,10 +169,7 @@ def _slider(
     symbol, scale = readable_unit(parameter.unit, max(map(abs, values)), lengths)
     if parameter.unit == "m" and lengths.relative:  # of which arm, if it is the length that varies?
         symbol, scale = "m", 1.0
-    return {
-        "key": written_name(parameter.name, parameter.unit),
-        "label": parameter.name.replace("_", " "),
-        "unit": symbol,
-        "hint": f"{parameter.symbol}: {parameter.meaning}",
-        "values": [float(f"{value / scale:.10g}") for value in values],
-    }
+    label, hint = parameter.name.replace("_", " "), f"{parameter.symbol}: {parameter.meaning}"
+    shown = [float(f"{value / scale:.10g}") for value in values]
+    key = written_name(parameter.name, parameter.unit)
+    return {"key": key, "label": label, "unit": symbol, "hint": hint, "values": shown}

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.studio import markup
-from softreach.support.quantity import sizes_in
+from softreach.support.quantity import five_digits, sizes_in
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -74,14 +74,14 @@ class TextKind(NamedTuple):
 def number_kind(unit: str, length: Callable[[], float]) -> TextKind:
     """Numbers in a unit, "" for plain ones; L [m] of the arm is a unit of lengths, too."""
     demand = "a number" + _with_units(unit, length())
-    return TextKind(demand, lambda text: read_number(text, unit, length()), "{:.12g}".format)
+    return TextKind(demand, lambda text: read_number(text, unit, length()), five_digits)
 
 
 def vector_kind(unit: str, length: Callable[[], float]) -> TextKind:
     """Three of them, as `number_kind`."""
     demand = "three numbers, such as 0, 0, -9.81" + _with_units(unit, length())
     value = lambda text: numbers_in(text, 3, unit, length())
-    return TextKind(demand, value, lambda vector: ", ".join(f"{x:.12g}" for x in vector))
+    return TextKind(demand, value, lambda vector: ", ".join(map(five_digits, vector)))
 
 
 def numbers_in(text: str, count: int, unit: str, length: float) -> tuple[float, ...] | None:
@@ -173,12 +173,20 @@ class TypedField:
             self._message.warn(f"{text!r}: must be {self._kind.demand}")
             return
         with self._lock:
-            self._value = value
+            self._value = self._kept(value)
             self.warn("")
         self._apply(event)
         has_units, plain = None in map(number_of, _parts(text)), self._kind.text(self._value)
         if has_units and not self._is_refused and text != plain:
             self._text.value = plain
+
+    def _kept(self, value: Any) -> Any:
+        """What was typed, but what the text shows rounded stays as it was held."""
+        held, shown = self._value, self._kind.value(self._kind.text(self._value))
+        if not isinstance(value, tuple) or shown is None:
+            return held if value == shown else value
+        known = zip(value, shown, held, strict=True)
+        return tuple(old if new == seen else new for new, seen, old in known)
 
     def _apply(self, event: Any) -> None:
         self._follow()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.geometry.rays import along_axis
+from softreach.geometry.surface import tube_surface
 from softreach.studio.scene.camera import add_label
 from softreach.support.arrays import Array
 
@@ -62,16 +63,16 @@ class DragBall:
         self._api.add_label("/lag/label", f"{gap} short", anchor="bottom-center")
 
     def _drawn(self, tip: Array) -> tuple[Any, Any]:
-        from trimesh.creation import revolve
-
-        api, mesh = self._api, revolve(_ARROW, sections=12)
+        api, (radii, heights) = self._api, _ARROW.T
         look: Any = {"cast_shadow": False}
         halo: Any = api.add_icosphere("/grip", _HALO, _COLOR, opacity=0.25, position=tip, **look)
         ball = api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, **look)
         self._grip(halo, halo, lambda _, seen: seen)
         for axis, (name, color) in enumerate(_AXES.items()):
             path, direction = f"/grip/{name}", np.eye(3)[axis]
-            vertices = np.roll(mesh.vertices, axis + 1, axis=1).astype(np.float32)
+            first, second = (np.tile(np.roll(direction, k), (len(heights), 1)) for k in (1, 2))
+            mesh = tube_surface(np.outer(heights, direction), first, second, radii, sides=12)
+            vertices = mesh.vertices.astype(np.float32)
             arrow = api.add_mesh_simple(path, vertices, mesh.faces, color=color, **look)
             add_label(api, f"{path}/letter", name, _LETTER * direction)
             way = lambda begin, seen, d=direction: along_axis(begin, d, self._eye(), seen) * d

@@ -49,8 +49,7 @@ def click(session: Session, origin: Any, direction: Any) -> None:
     }
     use, answer = uses.get(session.state.appearance.mouse), session.found.answer
     if use is not None:
-        place = session.picked_place(origin, direction)
-        if place is not None:
+        if (place := session.picked_place(origin, direction)) is not None:
             use(place)
     elif answer is not None:
         ghost = session.scene.ghost_under(origin, direction)

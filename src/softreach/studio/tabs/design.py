@@ -14,21 +14,12 @@ from softreach.arm.design_file import in_file_terms
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.section import material_names
+from softreach.studio import shown_parameters
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
 from softreach.studio.figures import NO_BAR, SlopeBar, slope_bars
 from softreach.studio.found import Found
-from softreach.studio.shown_parameters import (
-    Part,
-    ShownParameter,
-    body_numbers,
-    owner_label,
-    part_parameters,
-    parts,
-    refusal,
-    slider_parameters,
-    typed_unit,
-)
+from softreach.studio.shown_parameters import Part, ShownParameter, part_parameters, parts
 from softreach.studio.state import StudioState, rod_of, vector
 from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector_kind
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
@@ -60,8 +51,8 @@ _LOADS = {
 
 def design(panel: Fields) -> None:
     """Sliders of a design, each with the change of the volume by it."""
-    _numbers(panel, "design", slider_parameters, _sliders)
-    _numbers(panel, "body", body_numbers, _typed)
+    _numbers(panel, "design", shown_parameters.slider_parameters, _sliders)
+    _numbers(panel, "body", shown_parameters.body_numbers, _typed)
     names = {"": "this design"} | {name: name for name in designs.__all__}
     read = lambda state: next((name for name, arm in _designs().items() if arm == state.design), "")
     write = lambda state, name: state.replace(design=_designs()[name]) if name else state
@@ -76,7 +67,7 @@ def _numbers(panel: Fields, label: str, shown: Numbers, build: Build) -> None:
     def words(error: SoftreachError) -> str:
         session.learn({"ends": {}})  # perhaps a slider does not end where it should
         session.follow("slopes")
-        return refusal(error, shown(arm()), arm())
+        return shown_parameters.refusal(error, shown(arm()), arm())
 
     def remake(fields: Fields, _: object) -> None:
         fields.words = words
@@ -167,7 +158,7 @@ def arm_parts(panel: Fields) -> None:
 
     def words(error: SoftreachError) -> str:
         arm, (known, label, _) = session.state.design, _chosen(session.state, session.found)
-        return refusal(error, part_parameters(arm, known[label]), arm)
+        return shown_parameters.refusal(error, part_parameters(arm, known[label]), arm)
 
     panel.anew("part", "design", "found.part", key=_chosen, build=build)
     message = panel.kept(Line(panel.gui))
@@ -227,7 +218,7 @@ def _material(panel: Fields, label: str, none: str, at: Attribute) -> None:
 def loads(panel: Fields) -> None:
     """Base, gravity, a payload and a force on the tip, as they are typed."""
     loaded = panel.session.state.design.loads is not None
-    unit = lambda state, _: typed_unit(state.design)
+    unit = lambda state, _: shown_parameters.typed_unit(state.design)
     panel.anew("base and loads", "design", key=unit, build=_base_and_loads, expanded=loaded)
 
 
@@ -273,7 +264,7 @@ def setting_text(state: StudioState) -> str:
         if getattr(state.design.loads or _NONE, name) != getattr(Loads(), name):
             value, known = load_field(name).read(state), name == "gravity" and gravity_name(state)
             text = f"({', '.join(f'{v:g}' for v in value)})" if name != "payload" else f"{value:g}"
-            unit = unit or typed_unit(state.design).name
+            unit = unit or shown_parameters.typed_unit(state.design).name
             told.append(f"gravity {known}" if known else f"{label} {text} {unit}")
     told += other_loads(state.design)
     way = base.points if isinstance(base.points, str) else ""
@@ -291,7 +282,8 @@ def gravity_name(state: StudioState) -> str:
 
 def base_field(name: str) -> Attribute:
     """Position in the unit of lengths that are typed, or turn in degrees."""
-    scale = lambda arm: math.radians(1.0) if name == "turn" else typed_unit(arm).size
+    size = lambda arm: shown_parameters.typed_unit(arm).size
+    scale = lambda arm: math.radians(1.0) if name == "turn" else size(arm)
     read = lambda arm: _over(getattr(arm.base, name), scale(arm))
     moved = lambda arm, value: arm.base.replace(**{name: _times(value, scale(arm))})
     return of_design(read, lambda arm, value: arm.replace(base=moved(arm, value)))
@@ -301,10 +293,10 @@ def load_field(name: str) -> Attribute:
     """A load as it is typed; other loads stay, and without any the arm has no loads."""
     label, symbol, size, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
-    scale = lambda arm: size or typed_unit(arm).size
+    scale = lambda arm: size or shown_parameters.typed_unit(arm).size
 
     def write(arm: Manipulator, value: Any) -> Manipulator:
-        unit = symbol or typed_unit(arm).name
+        unit = symbol or shown_parameters.typed_unit(arm).name
         for number in value if isinstance(value, tuple) else (value,):
             if not low <= number <= _MOST:
                 allowed = f"{low:,.0f} to {_MOST:,.0f} {unit}"
@@ -334,7 +326,7 @@ def _in_words(error: InvalidDesign) -> InvalidDesign:
         owner, _, field = fault.path.rpartition(".")
         if field not in _NEEDED:
             return in_file_terms(error, "")
-        lacking.setdefault(owner_label(owner), []).append(_NEEDED[field])
+        lacking.setdefault(shown_parameters.owner_label(owner), []).append(_NEEDED[field])
     needed = "; ".join(f"{' and '.join(what)} of {owner}" for owner, what in lacking.items())
     line = f"need {needed}: choose a material or type the numbers on the tab Parts"
     return InvalidDesign([Fault("loads", None, line)])

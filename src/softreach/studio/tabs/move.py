@@ -22,6 +22,7 @@ from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
 from softreach.studio.scene.scene import DARK, MARK, MOST_BUNDLES, pieces
 from softreach.studio.session import Session
+from softreach.studio.shown_parameters import three_digits
 from softreach.studio.state import MOUSE, StudioState, TipPath, rod_of, solvable_rod, vector
 from softreach.studio.widgets import TypedField, vector_kind
 from softreach.support.errors import InvalidInput
@@ -100,12 +101,13 @@ def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
         return state.replace(activation=(*before[:bundle], value, *before[bundle + 1 :]))
 
     for bundle, (label, low, high) in enumerate(ends[:_MOST]):
-        room = 1e-6 * max(1.0, abs(low))
-        upper = max(high, low + room)  # a slider needs room; the state keeps to the bounds
-        hint = f"{label}: activation of a bundle, from {low:g} to {upper:g}; 0 is at rest"
-        step = 10.0 ** (math.floor(math.log10(upper - low)) - 3)  # round
+        if low == high:  # it is held
+            continue
+        hint = f"{label}: activation of a bundle, from {low:g} to {high:g}; 0 is at rest"
+        step = 10.0 ** (math.floor(math.log10(high - low)) - 3)  # round
         at = Attribute(lambda state, k=bundle: state.activation[k], partial(write, bundle))
-        panel.slider(label, (low, upper), step, at, hint)
+        around = three_digits(low, -1), three_digits(high)  # the state keeps to the bounds
+        panel.slider(label, around, step, at, hint)
     if (hidden := len(ends) - _MOST) > 0:
         drawn = "" if len(ends) <= MOST_BUNDLES else "; no bundle is drawn"
         panel.say(f"{hidden} more bundles have no slider here{drawn}.")
@@ -370,15 +372,11 @@ def _at_point(state: StudioState, activations: np.ndarray, point: int) -> Studio
     return state.replace(path=path, activation=tuple(activations[point].tolist()))
 
 
-_OF_TARGET: dict[str, Any] = {
-    "wanted": "target",
-    "makes": "answer takes_nearest",
-    "draws": "/ghosts /target /gap",
-}
+_AIM: Any = {"wanted": "target", "makes": "answer takes_nearest", "draws": "/ghosts /target /gap"}
 _OF_PATH: dict[str, Any] = {"wanted": "path", "makes": "track", "doing": "following the path"}
 JOBS = (
     # The activations that reach the target, and their shapes
-    Job("inverse", "design target", _solve, _draw_answer, **_OF_TARGET),
+    Job("inverse", "design target", _solve, _draw_answer, **_AIM),
     # The arm follows its dragged tip on its branch; where that rests, every branch is looked for
     Job("drag", "found.pull", _follow_tip, makes="pull lag"),
     Job("path", "design path.points path.start", _follow, _draw_path, **_OF_PATH),

@@ -18,7 +18,7 @@ from softreach.studio.markup import Part, Strong
 from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.colors import color_names, key_html, shown_color
 from softreach.studio.session import Session
-from softreach.studio.shown_parameters import slider_parameters
+from softreach.studio.shown_parameters import slider_parameters, three_digits
 from softreach.studio.state import AXES, StudioState
 from softreach.studio.tabs.goals import verdict_text
 from softreach.support.units import UNITS, LengthUnit
@@ -150,8 +150,8 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     over = length / unit.size
     read = lambda state: float(f"{over * center.read(state):.9g}")
     at = Attribute(read, lambda state, value: center.write(state, value / over))
-    ends = -1.5 * over, 1.5 * over
-    panel.slider(unit.label("center"), ends, 0.01 * over, at, "Middle of the slab along the axis")
+    end = three_digits(1.5 * over)
+    panel.slider(unit.label("center"), (-end, end), 0.01 * end, at, "Middle of the slab")
 
 
 def plots(panel: Fields) -> None:
