@@ -49,7 +49,7 @@ class Region(ABC):
 
     @property
     def numbers(self) -> Array:
-        """Its numbers as `kernels.room.shapes` takes them."""
+        """Numbers of the solid as `kernels.room.shapes` takes them [m], axes [-]."""
         return np.empty(0)
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
@@ -289,7 +289,7 @@ class Cylinder(Region):
 
     @property
     def axis(self) -> Array:
-        """Unit vector from start to end, shape (3,)."""
+        """Unit vector from start to end [-], shape (3,)."""
         return np.subtract(self.end, self.start) / self.length
 
     @property

@@ -145,16 +145,8 @@ def _page(
         entry if "gap" in entry else {"file": str(k), "numbers": entry["numbers"]}
         for k, entry in enumerate(entries)
     ]
-    sheet = {
-        "folder": _FOLDER,
-        "parameters": sliders,
-        "designs": designs,
-        "first": first,
-        "keys": content["keys"],
-        "note": content["note"],
-        "help": _HELP,
-        "name": title,
-    }
+    sheet = {"folder": _FOLDER, "parameters": sliders, "designs": designs, "first": first}
+    sheet |= {"keys": content["keys"], "note": content["note"], "help": _HELP, "name": title}
     sheet["colors"] = scale._asdict()["colors"]
     more = files("softreach.studio").joinpath("static.html").read_text(encoding="utf-8")
     more, caption = more.replace("@SHEET@", script_text(sheet)), f"Reachable set of {title}"
