@@ -33,9 +33,6 @@ from softreach.support.errors import NotPossible, Range, warn
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
-    pass
-
-if TYPE_CHECKING:
     import xarray as xr
 
 ACCURACY = 1e-3  # over L: largest error of a clearance
@@ -306,11 +303,9 @@ class ClearanceMap:
             if which == ITSELF:
                 other, its_move = self._moved(part, its, found.place[own, 1])
                 away = place - other
-                normal, move[:] = (
-                    away / np.linalg.norm(away, axis=1, keepdims=True),
-                    move - its_move,
-                )
-                move[:, 3] += 2.0 * its_move[:, 3]  # radii add up
+                normal = away / np.linalg.norm(away, axis=1, keepdims=True)
+                move[:, :3] -= its_move[:, :3]
+                move[:, 3] += its_move[:, 3]  # radii add up
             else:
                 normal = self.obstacles[which].gap(place)[1]
             slopes[own] = np.einsum("na,nab->nb", normal, move[:, :3]) - move[:, 3]
@@ -383,10 +378,8 @@ class ClearanceMap:
         inner, of_drives = inputs.with_slopes(gamma)
         zeta = 1.0 + (inner * self._rates[edge]).sum(axis=1)
         factor = -self._poisson * edges.radius[rows, edge] / zeta
-        along, out = (
-            (factor[:, None] * self._rates[edge])[:, None],
-            np.empty((len(gamma), 1, gamma.shape[1])),
-        )
+        along = (factor[:, None] * self._rates[edge])[:, None]
+        out = np.empty((len(gamma), 1, gamma.shape[1]))
         if inputs.are_activations:
             return along[:, 0]
         inputs.along_x(along, of_drives, out)
