@@ -21,7 +21,7 @@ from softreach.rod.response import NodeTables, linear_response, node_tables, rod
 from softreach.rod.rods import ArmMap, as_tip_map
 from softreach.stiffness import tip_compliance, yielding_rod
 from softreach.support.arguments import as_number
-from softreach.support.arrays import Array
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidDesign, NotPossible, Range
 
 if TYPE_CHECKING:
@@ -30,7 +30,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LocalModel:
-    """An arm near an equilibrium, in the frame of the world: it moves, yields and vibrates."""
+    """An arm near an equilibrium, linearized, in the frame of the world.
+
+    A change δγ of activation and a force f on the tip move the tip by Σ q `tip_modes`, where
+    q̈ + 2ζω q̇ + ω² q = ω² `gains`·δγ + `tip_modes`·f for each mode, ω = 2π `frequencies`.
+    """
 
     arm: Manipulator
     """The design."""
@@ -42,22 +46,18 @@ class LocalModel:
     """∂r/∂γ of the tip at rest [m per unit of each activation], shape (3, bundle)."""
     compliance: Array
     """∂r/∂F of the tip at rest [m/N], shape (3, 3), as `tip_compliance`."""
-    mass: Array
-    """∫ (∂r/∂γ)ᵀ (∂r/∂γ) dm, with which ½ γ̇·Mγ̇ is the kinetic energy of an arm that follows its
-    activations [kg m² per unit of two activations], shape (bundle, bundle)."""
     frequencies: Array
-    """Natural frequencies without damping, lowest first [Hz], shape (mode,)."""
+    """The first six natural frequencies, without damping [Hz], shape (mode,)."""
     tip_modes: Array
     """Movement of the tip in each mode of unit modal mass [1/√kg], shape (mode, 3)."""
-    damping: float
-    """Viscosity over stiffness [s]."""
+    gains: Array
+    """q of each mode at rest [√kg m per unit of each activation], shape (mode, bundle)."""
+    mass: Array
+    """M of the kinetic energy ½ γ̇·Mγ̇ [kg m² per unit of two inputs], shape (bundle, bundle)."""
+    damping_ratio: float
+    """ζ of all modes, as given [-]."""
     error: float
     """Largest error of the frequencies, relative [-], an estimate from half the masses."""
-
-    @property
-    def damping_ratios(self) -> Array:
-        """ζ of each mode, damping times ω/2 [-], shape (mode,)."""
-        return math.pi * self.damping * self.frequencies
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `axis`, `bundle` and `mode`."""
@@ -70,31 +70,30 @@ class LocalModel:
             "compliance": (("axis", "force"), self.compliance, {"units": "m/N"}),
             "mass": (("bundle", "other_bundle"), self.mass),
             "frequency": ("mode", self.frequencies, {"units": "Hz", "error": self.error}),
-            "damping_ratio": ("mode", self.damping_ratios, {"units": "1"}),
             "tip_mode": (("mode", "axis"), self.tip_modes, {"units": "kg-0.5"}),
+            "gain": (("mode", "bundle"), self.gains),
         }
         names = {"axis": list(schema.AXES), **schema.bundle_coordinates(self.arm)}
-        return xr.Dataset(values, names, schema.provenance(self.arm) | {"damping": self.damping})
+        attrs = {**schema.provenance(self.arm), "damping_ratio": self.damping_ratio}
+        return xr.Dataset(values, names, attrs)
 
     def __str__(self) -> str:
         most, _, least = np.linalg.svd(self.compliance)[1]
-        tip, error = self.arm.length_unit.place(self.tip), f"frequencies to {self.error:.0e}"
-        head = f"tip {tip}, yields by {least:.3g} to {most:.3g} m/N; {error}:"
-        pairs = zip(self.frequencies, self.damping_ratios, strict=True)
-        return "\n  ".join([head, *(f"{f:.4g} Hz, damping ratio {z:.2g}" for f, z in pairs)])
+        tip, hertz = self.arm.length_unit.place(self.tip), [f"{f:.4g}" for f in self.frequencies]
+        head = f"tip {tip}, yields by {least:.3g} to {most:.3g} m/N"
+        return f"{head}; {', '.join(hertz)} Hz to {self.error:.0e}"
 
 
-def local_model(arm: Manipulator, activation: ArrayLike, damping: float = 0.05) -> LocalModel:
+def local_model(arm: Manipulator, activation: ArrayLike, damping_ratio: float = 0.05) -> LocalModel:
     """How an arm moves, yields and vibrates about its posture at an activation.
 
-    Tensions and pressures are held. Sections have no rotary inertia and do not shear, so that modes
-    of mere torsion are missing. There are six frequencies, or fewer of an arm almost without mass.
+    Tensions and pressures are held; rotary inertia, shear and modes of mere torsion are left out.
 
     Args:
         arm: The design, with moduli and densities or measured sections. Of loads it may have
             gravity, a payload and forces that keep their direction.
         activation: γ [unit of each input], shape (bundles,).
-        damping: Viscosity over stiffness of the arm [s], as of `mujoco`.
+        damping_ratio: ζ of all modes [-], from 0 up to 1 (critical).
 
     Raises:
         InvalidInput: An argument is out of its range or has another shape; or other loads.
@@ -102,23 +101,23 @@ def local_model(arm: Manipulator, activation: ArrayLike, damping: float = 0.05) 
         NotPossible: The arm has no stable posture there, or no mass.
     """
     section, why = a_manipulator("arm", arm).section, "for a local model"
-    damping = as_number("damping", damping, Range(0.0, 10.0, unit="s"))
+    damping = as_number("damping_ratio", damping_ratio, Range(0.0, 1.0))
     if faults := section.modulus_faults(why) + section.density_faults(why):
         raise InvalidDesign(faults)
     known = as_tip_map(arm if arm.loads else arm.replace(loads=Loads(gravity=(0.0, 0.0, 0.0))))
-    x = known.check_activations("activation", [activation])
+    x = known.check_activations("activation", as_floats("activation", activation)[None])
     (tip,), (jacobian,) = known.tips_and_slopes(x)
     if not np.isfinite(tip).all():
         raise NotPossible("the arm has no stable posture at this activation: lighten its loads")
-    (compliance,), (coarse, *_) = tip_compliance(known, x), _modes(known, x, 4)
-    natural, modes, mass = _modes(known, x, 8)
-    change = natural[: len(coarse)] / coarse[: len(natural)] - 1.0
+    (compliance,), coarse = tip_compliance(known, x), _modes(known, x, 4)[0]
+    modes = _modes(known, x, 8)
+    change = modes[0][: len(coarse)] / coarse[: len(modes[0])] - 1.0
     error = float(np.abs(change).max()) / 3.0  # falls with the square of the elements, or faster
-    return LocalModel(arm, x[0], tip, jacobian, compliance, mass, natural, modes, damping, error)
+    return LocalModel(arm, x[0], tip, jacobian, compliance, *modes, damping, error)
 
 
-def _modes(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array]:
-    """Frequencies, movements of the tip, and the mass of a `LocalModel`."""
+def _modes(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array, Array]:
+    """Frequencies, movements of the tip, gains and the mass of a `LocalModel`."""
     flexibility, tip, slopes, masses = _moves(known, x, elements)
     root = np.sqrt(masses)[:, None]
     squares, shapes = np.linalg.eigh(root * (flexibility + flexibility.T) * root.T / 2.0)
@@ -127,7 +126,8 @@ def _modes(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array]
         raise NotPossible("the arm has no mass: give its materials densities, or it a payload")
     squares, moved = squares[first], root * shapes[:, first]  # 1/ω² and M φ, with φ = ω² F M φ
     tip_modes = known.pose.directions_to_world((tip @ moved / squares).T)
-    return 0.5 / math.pi / np.sqrt(squares), tip_modes, slopes.T @ (root**2 * slopes)
+    frequencies, gains = 0.5 / math.pi / np.sqrt(squares), moved.T @ slopes
+    return frequencies, tip_modes, gains, slopes.T @ (root**2 * slopes)
 
 
 def _moves(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array, Array]:
