@@ -14,7 +14,7 @@ from tests.bodies import of_body, rubber, uniform
 
 TRUNK = sr.designs.minimal_trunk(taper=0.0)  # L = 1 m
 STRAIGHT, BENT, PULLED = np.zeros(3), np.array([60e3, 20e3, 0.0]), [4.0, 1.0, 0.0]
-CHAMBERS = sr.designs.three_chamber_arm()
+CHAMBERS, TENDONS = sr.designs.three_chamber_arm(), sr.designs.three_tendon_robot()
 
 
 def beam_frequencies(arm, elements=40):
@@ -61,8 +61,7 @@ def test_weight_stiffens_a_hanging_arm_and_softens_an_upright_one():
 
 def test_compliance_and_jacobian_are_those_of_the_tip_and_made_up_of_modes():
     loads, base = sr.Loads(payload=0.005, payload_arm=(0.01, 0.0, 0.01)), sr.Base(points="down")
-    arm = sr.designs.three_tendon_robot().replace(loads=loads, base=base)
-    found = sr.models.local_model(arm, PULLED)
+    found = sr.models.local_model(arm := TENDONS.replace(loads=loads, base=base), PULLED)
     np.testing.assert_array_equal(found.compliance, sr.stiffness.tip_compliance(arm, [PULLED])[0])
     np.testing.assert_array_equal(found.jacobian, as_tip_map(arm).tips_and_slopes([PULLED])[1][0])
     by_rate = found.tip_modes / (2 * math.pi * found.frequencies[:, None])

@@ -1,7 +1,6 @@
 """How an arm moves, yields and vibrates about its posture at one activation.
 
-Flexibility F, movements of masses by unit forces on them, is the linear response of the posture,
-which weight bends, stiffens or softens: √M F √M has the eigenvalues 1/ω².
+Flexibility F, moves of masses by unit forces, is the linear response of the loaded arm.
 """
 
 from __future__ import annotations
@@ -79,15 +78,16 @@ class LocalModel:
 
     def __str__(self) -> str:
         most, _, least = np.linalg.svd(self.compliance)[1]
-        tip, hertz = self.arm.length_unit.place(self.tip), [f"{f:.4g}" for f in self.frequencies]
+        tip, each = self.arm.length_unit.place(self.tip), (f"{f:.4g}" for f in self.frequencies)
         head = f"tip {tip}, yields by {least:.3g} to {most:.3g} m/N"
-        return f"{head}; {', '.join(hertz)} Hz to {self.error:.0e}"
+        return f"{head}; {', '.join(each)} Hz to {self.error:.0e}"
 
 
 def local_model(arm: Manipulator, activation: ArrayLike, damping_ratio: float = 0.05) -> LocalModel:
     """How an arm moves, yields and vibrates about its posture at an activation.
 
-    Tensions and pressures are held; rotary inertia, shear and modes of mere torsion are left out.
+    Tensions and pressures are held. Sections do not shear and have no rotary inertia, without which
+    modes of torsion are missing and those above the first two of a thick bent arm are too high.
 
     Args:
         arm: The design, with moduli and densities or measured sections. Of loads it may have
