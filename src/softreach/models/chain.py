@@ -21,7 +21,7 @@ from softreach.support.arrays import Array
 
 MOST_BODIES = 500
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,12 +52,12 @@ def chain_of(arm: Manipulator, bodies: int) -> Chain:
     edges = np.append(np.concatenate(ends), arm.length)
     half = np.repeat(np.diff(edges) / 4.0, 2)  # of the halves of elements
     starts = np.sort(np.concatenate([edges[:-1], 0.5 * (edges[1:] + edges[:-1])]))
-    z = (starts[:, None] + half[:, None] * (1.0 + NODES)).ravel()
-    weights = (half[:, None] * WEIGHTS).ravel()
+    z = (starts[:, None] + half[:, None] * (1.0 + _NODES)).ravel()
+    weights = (half[:, None] * _WEIGHTS).ravel()
 
     def integrals(values: Array) -> Array:
         each = (weights * np.asarray(values).T).T
-        return each.reshape(len(half), len(NODES), *each.shape[1:]).sum(axis=1)
+        return each.reshape(len(half), len(_NODES), *each.shape[1:]).sum(axis=1)
 
     def of_elements(values: Array) -> Array:
         return integrals(values).reshape(len(half) // 2, 2, *values.shape[1:]).sum(axis=1)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.models.chain import NODES, WEIGHTS, chain_of
+from softreach.models.chain import chain_of
 from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.rod.rods import ArmMap, as_tip_map
 from softreach.stiffness import tip_compliance, yielding_rod
@@ -80,7 +80,7 @@ class LocalModel:
         most, _, least = np.linalg.svd(self.compliance)[1]
         tip, each = self.arm.length_unit.place(self.tip), (f"{f:.4g}" for f in self.frequencies)
         head = f"tip {tip}, yields by {least:.3g} to {most:.3g} m/N"
-        return f"{head}; {', '.join(each)} Hz to {self.error:.0e}"
+        return f"{head}; {', '.join(each)} Hz (error {self.error:.0e})"
 
 
 def local_model(arm: Manipulator, activation: ArrayLike, damping_ratio: float = 0.05) -> LocalModel:
@@ -109,16 +109,16 @@ def local_model(arm: Manipulator, activation: ArrayLike, damping_ratio: float = 
     (tip,), (jacobian,) = known.tips_and_slopes(x)
     if not np.isfinite(tip).all():
         raise NotPossible("the arm has no stable posture at this activation: lighten its loads")
-    (compliance,), coarse = tip_compliance(known, x), _modes(known, x, 4)[0]
-    modes = _modes(known, x, 8)
+    (compliance,), coarse = tip_compliance(known, x), _modes(known, x, 2)[0]
+    modes = _modes(known, x, 4)
     change = modes[0][: len(coarse)] / coarse[: len(modes[0])] - 1.0
-    error = float(np.abs(change).max()) / 3.0  # falls with the square of the elements, or faster
+    error = float(np.abs(change).max()) / 3.0  # falls with the square of the nodes, or faster
     return LocalModel(arm, x[0], tip, jacobian, compliance, *modes, damping, error)
 
 
-def _modes(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array, Array]:
+def _modes(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Array]:
     """Frequencies, movements of the tip, gains and the mass of a `LocalModel`."""
-    flexibility, tip, slopes, masses = _moves(known, x, elements)
+    flexibility, tip, slopes, masses = _moves(known, x, nodes)
     root = np.sqrt(masses)[:, None]
     squares, shapes = np.linalg.eigh(root * (flexibility + flexibility.T) * root.T / 2.0)
     first = np.flatnonzero(squares > 1e-12 * squares[-1])[:-7:-1]
@@ -130,10 +130,10 @@ def _modes(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array,
     return frequencies, tip_modes, gains, slopes.T @ (root**2 * slopes)
 
 
-def _moves(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array, Array]:
+def _moves(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Array]:
     """F of masses, of the tip under forces on them, ∂r/∂γ of the masses, and these, each thrice."""
     rod, (inner, of_drives) = yielding_rod(known), known.inputs.with_slopes(x)
-    z, masses = _masses(rod.arm, elements)
+    z, masses = _masses(rod.arm, nodes)
     table = node_tables(rod.arm, z, step_grid(rod.arm, z, max(48, rod.steps)))
     state = rod_state(rod, inner, table)
     moves, turns, _ = linear_response(table, state, _unit_forces(table))
@@ -144,12 +144,12 @@ def _moves(known: ArmMap, x: Array, elements: int) -> tuple[Array, Array, Array,
     return rows[:, bundles:], tip[:, bundles:], slopes, np.repeat(masses, 3)
 
 
-def _masses(arm: Manipulator, elements: int) -> tuple[Array, Array]:
+def _masses(arm: Manipulator, nodes: int) -> tuple[Array, Array]:
     """Z of Gauss nodes of elements and of the tip [m], and the masses there [kg]."""
-    edges = chain_of(arm, elements).edges[:, None]
+    edges, (at, weights) = chain_of(arm, 12).edges[:, None], np.polynomial.legendre.leggauss(nodes)
     width = np.diff(edges, axis=0) / 2.0
-    z = (edges[:-1] + width * (1.0 + NODES)).ravel()
-    masses = (width * WEIGHTS).ravel() * arm.section.mass_per_length_at(arm.profile, z)
+    z = (edges[:-1] + width * (1.0 + at)).ravel()
+    masses = (width * weights).ravel() * arm.section.mass_per_length_at(arm.profile, z)
     return np.append(z, arm.length), np.append(masses, arm.loads.payload if arm.loads else 0.0)
 
 
