@@ -74,6 +74,7 @@ def test_the_version_is_that_of_the_package(capsys):
         "import softreach",
         "from softreach.cli.app import run; run(['--help'])",
         "from softreach.cli.app import run; run(['nonsense'])",
+        "import softreach as sr; arm = sr.designs.lce_arm(); arm.from_toml(arm.to_toml())",
     ],
 )
 def test_importing_and_helping_load_no_heavy_library(code):

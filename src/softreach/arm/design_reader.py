@@ -94,10 +94,6 @@ def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     return arm
 
 
-class _Regions(RegionReader):
-    is_lazy = True
-
-
 class _Reader(FaultReader):
     """Makes the parts of an arm of tables, and gathers the faults."""
 
@@ -167,7 +163,7 @@ class _Reader(FaultReader):
             return self._refuse(path, own.__name__, f"has other fields: {error}")
 
     def _obstacle(self, raw: dict[str, Any], path: str) -> Any:
-        reader, keys = _Regions(self._folder, None), {*SHAPES, "mesh_unit"}
+        reader, keys = RegionReader(self._folder, None, is_lazy=True), {*SHAPES, "mesh_unit"}
         region = reader.one_of(raw, path)
         self.faults += reader.faults
         own = {name: value for name, value in raw.items() if name not in keys}

@@ -12,7 +12,6 @@ import numpy as np
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.clearance import ClearanceMap
 from softreach.rod.rods import all_inputs, as_tip_map, with_unstable
 from softreach.rod.tip_map import Device, Frame, TipMap, TipOutputs
 from softreach.sampling import check_sampler, cube_blocks
@@ -36,6 +35,8 @@ from softreach.support.progress import Progress, bar
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from softreach.rod.clearance import ClearanceMap
 
 _CHUNK = 1 << 19  # samples of a stored array that are held at once
 _LONG = 5_000_000  # samples from which a bar is worth showing
@@ -100,10 +101,8 @@ def compute_cloud(
     bundles = tip_map.box.bundles
     clearance = as_flag("clearance", clearance)
     n, seed = check_sampler(sampler, n, bundles, seed)
-    room = ClearanceMap(all_inputs(as_tip_map(whole.arm, tol))) if clearance else None
     check_memory("n", n, 8 * (bundles + 3 + 4 * clearance) * n)
-    if room is not None:
-        room.warn_at_rest()
+    room = _room(whole.arm, tol) if clearance else None
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n, np.int8) if tip_map.supports_unstable else None
     show_bar = report is None and n > _LONG
@@ -128,6 +127,14 @@ def compute_cloud(
     if room is not None:
         cloud = cloud.assign(room.variables(room.of(activation)))
     return cloud if status is None else schema.with_status(cloud, status)
+
+
+def _room(arm: Manipulator, tol: float) -> ClearanceMap:
+    from softreach.rod.clearance import ClearanceMap
+
+    room = ClearanceMap(all_inputs(as_tip_map(arm, tol)))
+    room.warn_at_rest()
+    return room
 
 
 def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:

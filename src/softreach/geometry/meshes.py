@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from softreach.geometry.regions import Region
 from softreach.geometry.surface import enclosed_volume
-from softreach.kernels.room.triangles import nearest_triangles
 from softreach.support import arrays, parallel
 from softreach.support.arguments import as_path
 from softreach.support.arrays import Array, Index
@@ -46,12 +45,11 @@ class TriangleTree(NamedTuple):
 
         With `enough` below 1 distances may be too large, but not so if they are multiplied by it.
         """
+        from softreach.kernels.room.triangles import nearest_triangles
+
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        face, points, table = (
-            np.empty(len(points), np.int64),
-            np.ascontiguousarray(points),
-            (*self,),
-        )
+        face, table = np.empty(len(points), np.int64), (*self,)
+        points = np.ascontiguousarray(points)
 
         def fill(b: slice) -> None:
             room = np.empty(STACK, np.int64)

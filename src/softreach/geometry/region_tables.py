@@ -27,11 +27,6 @@ SHAPES: Mapping[str, tuple[type[Region], Mapping[str, str]]] = {
     "mesh": (Mesh, {"vertices": "m", "faces": ""}),
 }
 """Regions, with their numbers and the units of these."""
-_LISTS = {"payloads", "places", "direction", *(n for _, own in SHAPES.values() for n in own)} - {
-    "radius",
-    "inner_radius",
-}
-"""Numbers of which there are several."""
 
 
 class RegionReader(toml.FaultReader):
@@ -41,14 +36,14 @@ class RegionReader(toml.FaultReader):
     as "0.05L", if that is known.
     """
 
-    instead: ClassVar[Mapping[Any, Mapping[str, Any]]] = {}
-    """Fields in place of faulty ones of some parts, so that the others can be judged."""
-    is_lazy: ClassVar[bool] = False
-    """Whether meshes are read when they are first asked for."""
+    lists: ClassVar[set[str]] = {name for _, own in SHAPES.values() for name in own}
+    lists -= {"radius", "inner_radius"}
+    """Names of numbers of which there are several."""
 
-    def __init__(self, folder: Path | None, length: float | None) -> None:
+    def __init__(self, folder: Path | None, length: float | None, *, is_lazy: bool = False) -> None:
+        """With `is_lazy` the files of meshes are read at their first use."""
         super().__init__()
-        self.folder, self.length = folder, length
+        self.folder, self.length, self.is_lazy = folder, length, is_lazy
 
     def _beside(self, name: str, instead: str) -> Path:
         if self.folder is not None:
@@ -90,19 +85,10 @@ class RegionReader(toml.FaultReader):
 
     def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
         """A part of checked numbers; `WRONG` and a fault where it refuses them."""
-        wrong = {name for name, value in values.items() if value is toml.WRONG}
-        # Of directions nothing can be said without their places.
-        lost = wrong | (
-            {"direction", "cone"} if wrong & {"region", "places", "direction"} else set()
-        )
-        right = {name: value for name, value in values.items() if name not in lost}
-        if wrong and kind not in self.instead:
+        if any(value is toml.WRONG for value in values.values()):
             return toml.WRONG
-        if wrong & {"region", "places"}:
-            right = {**self.instead[kind], **right}
         try:
-            made = kind(**right)
-            return toml.WRONG if wrong else made
+            return kind(**values)
         except InvalidInput as error:
             field = re.split(r"[ .\[]", error.name)[0]
             key = next((key for key in raw if key.startswith(field)), "")
@@ -136,7 +122,7 @@ class RegionReader(toml.FaultReader):
                 values[name] = self._refuse(start + name, None, allowed)
             elif keys:
                 value, symbol = raw[keys[0]], known[name][keys[0]]
-                fits = name not in _LISTS or isinstance(value, list | str)
+                fits = name not in self.lists or isinstance(value, list | str)
                 try:
                     own = value if fits else None
                     values[name] = self._read(own, unit, symbol, plain or not unit)

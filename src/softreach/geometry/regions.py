@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.kernels.room import shapes
+from softreach.kernels import room
 from softreach.support import arrays
 from softreach.support.arguments import POSITIVE, as_integer, as_number
 from softreach.support.arrays import Array
@@ -44,7 +44,7 @@ class Region(ABC):
     def bounds(self) -> Array:
         """Lower and upper corner of the box around it [m], shape (2, 3)."""
 
-    kind: ClassVar[int] = shapes.MESH
+    kind: ClassVar[int] = room.MESH
     """Kind of solid that kernels know."""
 
     @property
@@ -54,8 +54,10 @@ class Region(ABC):
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
         """Signed distances of points (n, 3) [m], and their gradients [-], (n,) and (n, 3)."""
+        from softreach.kernels.room.shapes import signed_distances  # designs are read without Numba
+
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        shapes.signed_distances(self.kind, _padded(self.numbers), points, distance, gradient)
+        signed_distances(self.kind, _padded(self.numbers), points, distance, gradient)
         return distance, gradient
 
     @abstractmethod
@@ -128,7 +130,7 @@ class Box(Region):
                 allowed = f"below high = {end:g} m, so that the box is not empty"
                 raise InvalidInput(f"low along {axis}", start, allowed)
 
-    kind: ClassVar[int] = shapes.BOX
+    kind: ClassVar[int] = room.BOX
 
     @property
     def numbers(self) -> Array:
@@ -176,7 +178,7 @@ class Sphere(Region):
         object.__setattr__(self, "center", as_triple("center", self.center))
         object.__setattr__(self, "radius", as_number("radius", self.radius, _LENGTH))
 
-    kind: ClassVar[int] = shapes.SPHERE
+    kind: ClassVar[int] = room.SPHERE
 
     @property
     def numbers(self) -> Array:
@@ -224,7 +226,7 @@ class HalfSpace(Region):
         (normal,) = arrays.as_directions("normal", self.normal, 1).tolist()
         object.__setattr__(self, "normal", tuple(normal))
 
-    kind: ClassVar[int] = shapes.HALF_SPACE
+    kind: ClassVar[int] = room.HALF_SPACE
 
     @property
     def numbers(self) -> Array:
@@ -251,11 +253,8 @@ class HalfSpace(Region):
         middle, half = around.mean(axis=0), 0.5 * float(np.ptp(around, axis=0).max())
         normal = np.array(self.normal)
         foot = middle - self.distance(middle[None]) * normal
-        first = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
-        first /= np.linalg.norm(first)
-        second = np.cross(normal, first)
         corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1)], float)
-        return [foot + half * corners @ np.stack([first, second])]
+        return [foot + half * corners @ _across(normal)]
 
 
 @dataclass(frozen=True)
@@ -271,9 +270,9 @@ class Cylinder(Region):
     end: Triple
     """Middle of the other [m]."""
     radius: float
-    """Radius of the sphere [m]."""
+    """Radius of the bar [m]."""
 
-    kind: ClassVar[int] = shapes.CYLINDER
+    kind: ClassVar[int] = room.CYLINDER
 
     def __post_init__(self) -> None:
         for name in ("start", "end"):
@@ -314,10 +313,8 @@ class Cylinder(Region):
 
     def _rings(self, radius: float) -> list[Array]:
         """Both ends as circles, and four lines between them."""
-        first = np.cross(self.axis, np.eye(3)[int(np.abs(self.axis).argmin())])
-        first /= np.linalg.norm(first)
         turns = np.stack([np.cos(_CIRCLE), np.sin(_CIRCLE)], axis=1)
-        ring: Any = radius * turns @ np.stack([first, np.cross(self.axis, first)])
+        ring: Any = radius * turns @ _across(self.axis)
         ends = ring + self.start, ring + self.end
         return [*ends, *(np.stack([end[k] for end in ends]) for k in range(0, 48, 12))]
 
@@ -333,7 +330,7 @@ class Tube(Cylinder):
     inner_radius: float
     """Radius of its bore [m]."""
 
-    kind: ClassVar[int] = shapes.TUBE
+    kind: ClassVar[int] = room.TUBE
     convex: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -355,8 +352,15 @@ class Tube(Cylinder):
         return self._rings(self.radius) + self._rings(self.inner_radius)
 
 
+def _across(axis: Array) -> Array:
+    """Two unit vectors across an axis and across each other, shape (2, 3)."""
+    first: Any = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+    first = first / np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first)])
+
+
 def _padded(numbers: Array) -> Array:
-    return np.pad(numbers, (0, shapes.NUMBERS - len(numbers)))
+    return np.pad(numbers, (0, room.NUMBERS - len(numbers)))
 
 
 def as_triple(name: str, value: object) -> Triple:

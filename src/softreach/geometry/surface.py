@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.kernels.points.triangles import distances_to_faces
 from softreach.picture.zbuffer import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Points
 from softreach.support.errors import InvalidInput, check_installed
@@ -60,6 +59,8 @@ class Surface:
         """Distance of points to the nearest triangle around their 16 nearest vertices [m], (n,)."""
         if not len(self.faces):
             return np.full(len(points), np.inf)
+        from softreach.kernels.points.triangles import distances_to_faces
+
         count = min(_NEIGHBORS, len(self.vertices))
         near = self._tree.query(points, count, workers=-1)[1].reshape(len(points), count)
         out = np.empty(len(points))

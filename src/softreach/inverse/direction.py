@@ -64,7 +64,7 @@ def direction_errors(tip_map: TipMap, request: Request, target: Index, gamma: Ar
         return np.empty(0)
     if request.orientation is not None:
         return _angles_of_frames(tip_map.tip_frames(gamma), request.orientation[target])[0]
-    return _angles(tip_map.tip_directions(gamma), request.direction[target])[0]
+    return angles_from(tip_map.tip_directions(gamma), request.direction[target])[0]
 
 
 def goal_rows(
@@ -81,7 +81,7 @@ def goal_rows(
     if request.orientation is not None:
         angle, axis = _angles_of_frames(tip_map.tip_frames(gamma), request.orientation[which])
     else:
-        angle, axis = _angles(motions.directions, wanted)
+        angle, axis = angles_from(motions.directions, wanted)
         along = np.einsum("ni,nij->nj", motions.directions, turn)
         turn = turn - motions.directions[:, :, None] * along[:, None]
     excess = (angle - request.cone).clip(0.0)
@@ -105,7 +105,7 @@ def _beyond(away: Array, moves: Array, room: float) -> tuple[Array, Array]:
     return (1.0 - share) * away, moved * (share < 1.0)[:, None]
 
 
-def _angles(directions: Array, wanted: Array) -> tuple[Array, Array]:
+def angles_from(directions: Array, wanted: Array) -> tuple[Array, Array]:
     """Angles [rad], and the unit vectors around which directions are turned from those wanted."""
     cross = np.cross(wanted, directions)
     sine = np.linalg.norm(cross, axis=1)

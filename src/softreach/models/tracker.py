@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
+from softreach.inverse.direction import angles_from
 from softreach.kernels.box.bounded_descent import box_steps
 from softreach.kernels.box.box_projection import project
 from softreach.rod.loaded.postures import PosturesBeside
@@ -124,8 +125,8 @@ class Tracker:
         if not inside or (ends[:, 0] > ends[:, 1]).any():
             raise InvalidInput("bounds", ends.tolist(), allowed)
         self._ends, (low, high) = ends.T, ends.T / self._scale
-        inside = np.minimum(_AT_END, 0.5 * (high - low))  # where tendons are taut
-        self._low, self._high = low + inside, high - inside
+        margin = np.minimum(_AT_END, 0.5 * (high - low))  # where tendons are taut
+        self._low, self._high = low + margin, high - margin
         self._most, self._least = np.full(len(own), _SHARE), np.clip(0.0, self._low, self._high)
         rates = as_floats("rate", 1.0 if rate is None else rate)
         if rates.shape not in ((), self._most.shape) or not ((rates > 0) & (rates < np.inf)).all():
@@ -182,7 +183,7 @@ class Tracker:
         x, here, rod, tip_map = self._x, self._here, self._map.rod, self._map
         distance, angle = float(np.linalg.norm(place - here.tips)), 0.0
         if wanted is not None and here.directions is not None:
-            angle = _angle(here.directions[0], wanted)
+            angle = float(angles_from(here.directions, wanted[None])[0][0])
         bound = (np.minimum(x - self._low, self._high - x) <= _AT_END) & (self._low < self._high)
         if self._beside is not None and isinstance(rod, LoadedRod):  # it will have moved on
             beside = replace(self._beside, frame=self._beside.frame.copy())
@@ -273,10 +274,5 @@ class Tracker:
         if wanted is None or motion.twists is None or motion.directions is None:
             return error, slope
         d, turn = motion.directions[0], motion.twists[0, 3:]
-        across = np.cross(d, wanted)
-        missing = _angle(d, wanted) * across / max(float(np.linalg.norm(across)), 1e-300)
-        return np.append(error, missing), np.append(slope, turn - np.outer(d, d @ turn), 0)
-
-
-def _angle(d: Array, wanted: Array) -> float:
-    return math.atan2(float(np.linalg.norm(np.cross(d, wanted))), float(d @ wanted))
+        (angle,), (axis,) = angles_from(motion.directions, wanted[None])
+        return np.append(error, -angle * axis), np.append(slope, turn - np.outer(d, d @ turn), 0)

@@ -259,7 +259,20 @@ def _contradictions(needs: Requirements) -> Iterator[Fault]:
 
 
 class _Reader(RegionReader):
-    instead = _INSTEAD
+    lists = RegionReader.lists | {"payloads", "places", "direction"}
+
+    def _made(self, kind: Any, raw: dict[str, Any], path: str, values: dict[str, Any]) -> Any:
+        """As for any part; of a faulty target or region what is left is judged too."""
+        wrong = {name for name, value in values.items() if value is toml.WRONG}
+        if not wrong or kind not in _INSTEAD:
+            return super()._made(kind, raw, path, values)
+        if wrong & {"region", "places", "direction"}:  # nothing can be said of directions then
+            wrong |= {"direction", "cone"}
+        right = {name: value for name, value in values.items() if name not in wrong}
+        if wrong & {"region", "places"}:
+            right = _INSTEAD[kind] | right
+        super()._made(kind, raw, path, right)
+        return toml.WRONG
 
     def parts(self, document: dict[str, Any]) -> dict[str, Any]:
         """Fields of the requirements; of no use where there are faults."""

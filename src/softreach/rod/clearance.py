@@ -20,8 +20,8 @@ from softreach.arm.stations import Marker
 from softreach.arm.tables import tables
 from softreach.geometry.meshes import STACK, DistanceField, Mesh, MeshFile, field_around
 from softreach.kernels.rod.frames import centerlines
+from softreach.kernels.room import HALF_SPACE, MESH, NUMBERS
 from softreach.kernels.room.nearest import FIELD_ERROR, ITSELF, MOST_PARTS, NONE, nearest, swollen
-from softreach.kernels.room.shapes import HALF_SPACE, MESH, NUMBERS
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import ArmMap, as_tip_map, coarsened, with_unstable
 from softreach.rod.steps import pilot_activations
@@ -183,7 +183,7 @@ class ClearanceMap:
     def _at(self, gamma: Array) -> _Edges:
         """Arms at the edges."""
         tip_map, z = self.tip_map, self.stations
-        inner, lost = tip_map._known(tip_map.inputs.activations(gamma))
+        inner, lost = tip_map.known_activations(tip_map.inputs.activations(gamma))
         shape, power = (len(gamma), len(z)), self._poisson
         radius, rates = self.arm.widest(z), self._rates
         if isinstance(tip_map.rod, FreeRod):

@@ -143,7 +143,7 @@ class ArmMap(TipMap):
             room = out._replace(**along)
         if out.status is None and not is_whole:
             room = room._replace(status=np.empty(len(gamma), np.int8))
-        inner, lost = self._known(inner)
+        inner, lost = self.known_activations(inner)
         self.rod.fill(inner, room)
         self._place(room)
         for name, values in moved.items():
@@ -151,8 +151,8 @@ class ArmMap(TipMap):
                 self.inputs.along_x(along_rod, of_drives, values)
         self._drop(lost, room.status, out.tips, out.slopes, out.twists, out.directions)
 
-    def _known(self, inner: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Activations with the lower bounds where no tensions were found, and their rows."""
+    def known_activations(self, inner: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Activations (n, bundles) with lower bounds where no tensions were found, and their rows."""
         lost = np.flatnonzero(np.isnan(inner).any(axis=1))
         if len(lost):
             inner[lost] = self.rod.box.low
@@ -185,7 +185,7 @@ class ArmMap(TipMap):
                     v[:, i] += position[j] * w[:, k] - position[k] * w[:, j]
 
     def shapes(self, activations: ArrayLike, framed: ArrayLike, strained: ArrayLike) -> Shapes:
-        inner, lost = self._known(self.inputs.activations(self.box.check(activations)))
+        inner, lost = self.known_activations(self.inputs.activations(self.box.check(activations)))
         shapes = self.rod.shapes(inner, framed, strained)
         shapes = shapes._replace(**self.placed(Frames(*shapes[:2]))._asdict())
         self._drop(lost, shapes.status, *shapes[:4])

@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.room.shapes import HALF_SPACE, MESH, signed_distance
+from softreach.kernels.room import HALF_SPACE, MESH
+from softreach.kernels.room.shapes import signed_distance
 from softreach.kernels.room.triangles import in_field, nearest_in
 from softreach.kernels.vector import dot, minus, plus, row, spot, times
 

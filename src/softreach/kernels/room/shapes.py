@@ -10,11 +10,8 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.room import BOX, HALF_SPACE, SPHERE, TUBE
 from softreach.kernels.vector import dot, minus, times
-
-HALF_SPACE, BOX, SPHERE, CYLINDER, TUBE, MESH = range(6)
-NUMBERS = 9
-"""Of a solid; those that a kind does not need are 0."""
 
 
 @inline
