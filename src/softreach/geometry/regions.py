@@ -354,9 +354,10 @@ class Tube(Cylinder):
 
 def _across(axis: Array) -> Array:
     """Two unit vectors across an axis and across each other, shape (2, 3)."""
-    first: Any = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
-    first = first / np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first)])
+    first = np.cross(axis, np.eye(3)[int(np.abs(axis).argmin())])
+    first /= np.linalg.norm(first)
+    across: Any = np.stack([first, np.cross(axis, first)])
+    return across
 
 
 def _padded(numbers: Array) -> Array:

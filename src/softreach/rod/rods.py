@@ -152,7 +152,7 @@ class ArmMap(TipMap):
         self._drop(lost, room.status, out.tips, out.slopes, out.twists, out.directions)
 
     def known_activations(self, inner: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Activations (n, bundles) with lower bounds where no tensions were found, and their rows."""
+        """Activations (n, bundles), lower bounds where no tensions were found, and their rows."""
         lost = np.flatnonzero(np.isnan(inner).any(axis=1))
         if len(lost):
             inner[lost] = self.rod.box.low
