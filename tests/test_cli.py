@@ -133,11 +133,6 @@ class TestDesign:
         assert err.count("tips are off by up to about") == said
         assert ("L) within the bounds" in err) == said
 
-    def test_the_schema_is_printed_for_editors(self, printed):
-        from softreach.arm.design_reader import json_schema
-
-        assert printed("design", "--schema") == json_schema()
-
     def test_a_saved_design_is_the_varied_one(self, folder, printed):
         assert run(["design", "redundant_trunk", "--revolution-deg", "60", "--out", "a.toml"]) == 0
         assert sr.Manipulator.load("a.toml") == changed(

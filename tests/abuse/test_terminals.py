@@ -70,7 +70,7 @@ class Gone(io.RawIOBase):
         return len(data)
 
 
-@pytest.mark.parametrize("arguments", [["design", "--schema"], ["design", "minimal_trunk"]])
+@pytest.mark.parametrize("arguments", [["list", "designs"], ["design", "minimal_trunk"]])
 def test_a_reader_that_has_gone_ends_a_command_without_a_word(arguments, streams):
     out, err = streams("utf-8", pipe := Gone())
     assert run(arguments) == 141
@@ -80,7 +80,7 @@ def test_a_reader_that_has_gone_ends_a_command_without_a_word(arguments, streams
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full on this system")
-@pytest.mark.parametrize("arguments", [["--help"], ["design", "--schema"], ["--version"]])
+@pytest.mark.parametrize("arguments", [["--help"], ["list", "designs"], ["--version"]])
 def test_results_that_cannot_be_written_are_an_error(arguments, streams):
     out, err = streams("utf-8", io.FileIO("/dev/full", "w"))
     assert run(arguments) == 2

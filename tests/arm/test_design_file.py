@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
-import tomllib
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,13 +24,10 @@ from softreach.arm import (
     Section,
     Tendon,
 )
-from softreach.arm.design_reader import json_schema
 from softreach.arm.section import named_material
 from tests.cable import Cable
 from tests.kinds import any_arms
 from tests.laws import bases
-
-FILES = Path(__file__).parents[2] / "designs"
 
 BODY = """
 version = 2
@@ -431,101 +424,3 @@ def test_a_file_that_is_no_text_or_too_long_is_refused(content, message, tmp_pat
     path.write_bytes(content)
     with pytest.raises((sr.InvalidDesign, sr.InvalidInput), match=message):
         sr.Manipulator.load(path)
-
-
-# The JSON schema of design files accepts what the reader accepts, and names wrong keys
-
-
-SCHEMA = json_schema()
-
-TYPES = {"object": dict, "array": list, "string": str, "number": (int, float), "integer": int}
-SAYS_NOTHING = {"$schema", "$defs", "title", "description", "default", "examples"}
-
-
-def accepts(schema: Any, value: Any) -> bool:
-    """A JSON schema validator for the words that the schema uses; others are a KeyError."""
-    return all(WORDS[word](schema, value) for word in schema if word not in SAYS_NOTHING)
-
-
-def _has_type(schema: Any, value: Any) -> bool:
-    names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
-    return not isinstance(value, bool) and any(isinstance(value, TYPES[name]) for name in names)
-
-
-def _additional(schema: Any, value: Any) -> bool:
-    rule, known = schema["additionalProperties"], schema.get("properties", {})
-    others = [one for key, one in value.items() if key not in known]
-    return (rule or not others) if isinstance(rule, bool) else all(accepts(rule, x) for x in others)
-
-
-def _target(schema: Any) -> Any:
-    return SCHEMA["$defs"][schema["$ref"].removeprefix("#/$defs/")]
-
-
-def _of(kind: Any, word: str, holds: Any) -> Any:
-    """What a word says of values of a kind alone."""
-    return lambda schema, value: not isinstance(value, kind) or holds(value, schema[word])
-
-
-WORDS = {
-    "type": _has_type,
-    "properties": _of(
-        dict,
-        "properties",
-        lambda value, known: all(accepts(known[key], value[key]) for key in known.keys() & value),
-    ),
-    "additionalProperties": lambda s, value: not isinstance(value, dict) or _additional(s, value),
-    "required": _of(dict, "required", lambda value, keys: {*keys} <= value.keys()),
-    "items": _of(list, "items", lambda value, each: all(accepts(each, one) for one in value)),
-    "minItems": _of(list, "minItems", lambda value, least: len(value) >= least),
-    "maxItems": _of(list, "maxItems", lambda value, most: len(value) <= most),
-    "minimum": _of(int | float, "minimum", operator.ge),
-    "maximum": _of(int | float, "maximum", operator.le),
-    "exclusiveMinimum": _of(int | float, "exclusiveMinimum", operator.gt),
-    "exclusiveMaximum": _of(int | float, "exclusiveMaximum", operator.lt),
-    "anyOf": lambda schema, value: any(accepts(one, value) for one in schema["anyOf"]),
-    "oneOf": lambda schema, value: sum(accepts(one, value) for one in schema["oneOf"]) == 1,
-    "allOf": lambda schema, value: all(accepts(one, value) for one in schema["allOf"]),
-    "not": lambda schema, value: not accepts(schema["not"], value),
-    "const": lambda schema, value: value == schema["const"],
-    "enum": lambda schema, value: value in schema["enum"],
-    "$ref": lambda schema, value: accepts(_target(schema), value),
-}
-
-
-@given(arm=named_arms())
-def test_the_schema_accepts_every_saved_design(arm):
-    assert accepts(SCHEMA, tomllib.loads(arm.to_toml()))
-
-
-@pytest.mark.parametrize("path", sorted(FILES.glob("*.toml")), ids=lambda path: path.stem)
-def test_the_schema_accepts_the_designs_of_the_repository(path: Path):
-    assert accepts(SCHEMA, tomllib.loads(path.read_text(encoding="utf-8")))
-
-
-@pytest.mark.parametrize(
-    ("good", "bad"),
-    [
-        ("extent_deg", "extent"),
-        ("20.0", "400.0"),
-        ("length_m = 1.0", "length_m = 0.0"),
-        ("inner_ratio = 0.5", "inner_ratio = 1.0"),
-        ("version = 2", "version = 3"),
-        ('"fiber"', '"tendon"'),
-        ("10.0", "{ stations_over_length = [0, 1], values = [1, 92] }"),
-    ],
-)
-def test_the_schema_refuses_what_the_reader_refuses(good, bad):
-    assert accepts(SCHEMA, tomllib.loads(BODY + FIBER))
-    assert not accepts(SCHEMA, tomllib.loads((BODY + FIBER).replace(good, bad, 1)))
-
-
-def test_every_key_that_has_a_unit_says_what_it_is():
-    tables = SCHEMA["$defs"].values()
-    keys = {
-        (key, one.get("description"))
-        for table in tables
-        for key, one in table["properties"].items()
-    }
-    units = ("_m", "_deg", "_pa", "_n", "_kg_m3")
-    assert [key for key, meaning in keys if key.endswith(units) and not meaning] == []

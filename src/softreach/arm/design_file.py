@@ -83,27 +83,26 @@ class Block(NamedTuple):
 
     shape: type  # One table, a list of tables, text or a number
     kind: Any  # Kind of part that a table describes; None for none
-    about: str = ""  # Description; that of a table alone is its kind's
     required: bool = False
 
 
 LAYOUT: Mapping[str, Block] = {
-    "version": Block(int, None, "Version of the format", required=True),
-    "profile": Block(dict, Profile, "Length and outer radius along the arm", required=True),
-    "materials": Block(dict, Material, "Materials by name; others are looked up in the library"),
+    "version": Block(int, None, required=True),
+    "profile": Block(dict, Profile, required=True),
+    "materials": Block(dict, Material),
     "section": Block(dict, Section),
-    "rings": Block(list, Ring, "Layers that actuators live in", required=True),
-    "stations": Block(dict, Stations, "Places along the arm by name, Z [m]"),
-    "actuators": Block(list, Actuator, "In the order of activations; [] for none", required=True),
-    "rigid_pieces": Block(list, RigidPiece, "Where the arm is not deformed"),
-    "drives": Block(list, Drive, "Inputs that activate bundles; others are inputs themselves"),
-    "markers": Block(list, Marker, "Points that go with sections of the arm"),
-    "surroundings": Block(list, Obstacle, "Solids that the arm must not touch"),
+    "rings": Block(list, Ring, required=True),
+    "stations": Block(dict, Stations),
+    "actuators": Block(list, Actuator, required=True),
+    "rigid_pieces": Block(list, RigidPiece),
+    "drives": Block(list, Drive),
+    "markers": Block(list, Marker),
+    "surroundings": Block(list, Obstacle),
     "loads": Block(dict, Loads),
     "base": Block(dict, Base),
     "rest": Block(dict, RestShape),
-    "point": Block(str, None, "Name of the marker that counts as the tip"),
-    "display": Block(dict, None, "How the design is shown; it changes nothing about the arm"),
+    "point": Block(str, None),
+    "display": Block(dict, None),
 }
 """Keys at the top of a file."""
 

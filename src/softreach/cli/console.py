@@ -51,9 +51,9 @@ class Console:
         """A result in words."""
         sys.stdout.write(f"{_printable(text)}\n")
 
-    def json(self, value: Any, indent: int | None = None) -> None:
+    def json(self, value: Any) -> None:
         """A result for machines; null where there is no number."""
-        self.line(json.dumps(plain(value), indent=indent, allow_nan=False))
+        self.line(json.dumps(plain(value), allow_nan=False))
 
     def rows(
         self,

@@ -17,10 +17,9 @@ _OTHER = "for ActiveFilaments.jl, whose lengths are in m"
 
 
 def design(
-    design: options.Design | None = None,
+    design: options.Design,
     /,
     *,
-    schema: bool = False,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
     output: options.Output = options.DEFAULT,
@@ -33,20 +32,10 @@ def design(
     Example: softreach design minimal_trunk --taper-deg 3
 
     Args:
-        schema: Print the JSON schema of design files for editors, nothing else.
         out: Write the design to this TOML file.
     """
     from softreach.arm.design_file import DESIGN_FILE
 
-    if schema:
-        given = {"out": out, "overwrite": output.overwrite, "unit": output.unit}
-        options.refuse("with --schema", **given, **changes.given)
-        from softreach.arm.design_reader import json_schema
-
-        console.json(json_schema(), indent=2)
-        return
-    if design is None:
-        raise NotPossible("give a design file or a built-in design, or use --schema")
     with no_warnings():  # the report has them all
         arm = design_from(design, changes, output.unit)
     options.check_output(out, DESIGN_FILE, output.overwrite)
