@@ -15,7 +15,7 @@ from softreach.cli.app import run
 from softreach.paper import reproduce, reproduce_paper
 from softreach.paper.notebook import QUICK, Notebook, Verdict
 from softreach.paper.reproduce import CLAIMS
-from softreach.paper.sections import redundancy, sweep
+from softreach.paper.sections import model, redundancy
 from softreach.paper.sections.model import printed_deltas
 from softreach.paper.sections.sweep import shapes
 from softreach.support.errors import InvalidInput
@@ -162,11 +162,11 @@ def test_what_only_the_full_sizes_test_is_marked_so_in_a_quick_run(folder):
 
 def test_a_part_computed_by_itself_is_that_of_a_whole_run_to_the_last_bit(folder, tmp_path):
     """As when a run is killed and resumed; all but the seconds that it took."""
-    whole = notebook(folder, "volume")
-    Notebook(tmp_path, "volume", whole["key"]).fill(sweep.volume, TINY)
-    again = json.loads((tmp_path / "volume.json").read_text())
+    whole = notebook(folder, "model")
+    Notebook(tmp_path, "model", whole["key"]).fill(model.model, TINY)
+    again = json.loads((tmp_path / "model.json").read_text())
     assert again | {"seconds": 0.0} == whole | {"seconds": 0.0}
-    figure = "alpha_dependence.pdf"
+    figure = "figure_1c_architectures.pdf"
     before = (folder / "quick" / "figures" / figure).read_bytes()
     assert (tmp_path / figure).read_bytes() == before
 

@@ -300,16 +300,6 @@ def test_isolated_points_are_gray_and_never_hide_others(drawn):
     assert (190, 190, 190) not in image_colors(plot.plot_distance(pair, values, key=False))
 
 
-def test_histograms_share_their_scale_and_count_every_point(drawn):
-    _, distance = drawn
-    figure = plot.plot_distance_histograms({"some": distance[:500], "all": distance})
-    some, every = figure.axes
-    assert (some.get_title(), every.get_title()) == ("some", "all")
-    assert some.get_xlim() == every.get_xlim()
-    drawn_share = sum(bar.get_height() for bar in every.patches)
-    assert drawn_share == pytest.approx(100 * float(distance.notnull().mean()))
-
-
 def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
     cloud, distance = drawn
     small = cloud.assign(tip=cloud.tip.copy(data=0.5 * cloud.tip.values))
@@ -335,15 +325,11 @@ def test_what_cannot_be_drawn_is_refused(drawn, trunk):
         plot.plot_cloud(cloud.isel(sample=slice(0)))
     with pytest.raises(InvalidInput, match=r"z = 1.5: must be within \[0, 1\] m"):
         plot.plot_cross_section(trunk, 1.5)
-    with pytest.raises(InvalidInput, match=r"a = \(3,\): must be volumes of \(2,\) radii"):
-        plot.plot_volume_curve({"a": [1, 2, 3]}, [0.1, 0.2])
     with pytest.raises(InvalidInput, match="two dimensions"):
         plot.plot_cloud(cloud, ax=plt.figure().add_subplot(projection="3d"))
     with pytest.raises(InvalidInput, match="view = oblique"):
         plot.plot_slab(cloud, view="oblique")
     with pytest.raises(InvalidInput, match=r"thickness = -1\.0: must be a finite number > 0 m"):
         plot.plot_slab(cloud, thickness=-1.0)
-    with pytest.raises(InvalidInput, match="distances = none"):
-        plot.plot_distance_histograms({})
     with pytest.raises(InvalidInput, match=r"distances = \['b'\]: must be of the clouds"):
         plot.plot_redundancy({"a": cloud}, {"b": distance})

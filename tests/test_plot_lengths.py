@@ -120,11 +120,6 @@ def plot_distance(of):
     yield from plane(plot.plot_distance(of.cloud, of.distance, view="left"), tips)
 
 
-def plot_distance_histograms(of):
-    (ax,) = plot.plot_distance_histograms({"one": of.distance}).axes
-    yield "", ax.get_xlim(), of.distance
-
-
 def plot_redundancy(of):
     figure = plot.plot_redundancy({"one": of.cloud}, {"one": of.distance}, thickness=0.05)
     for ax in image_axes(figure):
@@ -158,15 +153,6 @@ def plot_slices(of):
 def plot_hull(of):
     yield from plane(plot.plot_hull(of.hull, length=of.length), of.hull.vertices)
     yield from space(plot.plot_hull(of.hull, length=of.length, view=OBLIQUE), of.hull.vertices)
-
-
-def plot_volume_curve(of):
-    alphas, convex = np.geomspace(0.03, 0.3, 5), of.hull.volume
-    volumes = sr.volume.volume_curve(of.cloud.tip, alphas)
-    ax = plot.plot_volume_curve({"one": volumes}, alphas, length=of.length, convex=convex)
-    yield ax.get_xlabel(), ends(ax.lines[0].get_xdata()), alphas
-    yield ax.get_ylabel(), ends(ax.lines[0].get_ydata()), volumes
-    yield ax.get_ylabel(), (0, ax.lines[1].get_ydata()[0]), (0, convex)
 
 
 def plot_curvature(of):

@@ -8,7 +8,6 @@ from softreach.arm import designs
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.redundancy import (
     activation_distance,
-    distance_map,
     redundancy_summary,
     tip_density,
 )
@@ -150,39 +149,11 @@ def test_where_all_points_are_isolated_there_is_nothing_to_summarize():
     assert np.isnan([found.median, found.redundant_points, found.redundant_volume]).all()
 
 
-def test_a_map_keeps_the_mean(strewn):
-    distance = activation_distance(strewn, 0.02, queries=1000)
-    grid = distance_map(strewn, distance, cell=0.03)
-    weighted = (grid.activation_distance * grid.evaluated).sum() / grid.evaluated.sum()
-    assert float(weighted) == pytest.approx(float(distance.mean()))
-    assert int(grid.evaluated.sum()) == int(distance.count())
-    np.testing.assert_array_equal(grid.activation_distance.isnull(), grid.evaluated == 0)
-
-
-def test_the_error_of_a_cell_is_the_standard_error_of_its_mean(strewn):
-    distance = activation_distance(strewn, 0.02)
-    grid = distance_map(strewn, distance, cell=0.1)
-    inside = distance.values[(strewn.tip.values < 0.1).all(axis=1)]
-    inside = inside[np.isfinite(inside)]
-    stated = float(grid.activation_distance_error.sel(x=0.05, y=0.05, z=0.05))
-    assert stated == pytest.approx(inside.std(ddof=1) / np.sqrt(len(inside)))
-
-
-def test_a_map_puts_every_value_where_its_tip_is():
-    tip = np.array([[-0.26, 0.0, 0.51], [0.31, 0.2, 0.49], [0.31, 0.2, 0.49]])
-    cloud = made_up(tip, [[0, 0, 0], [1, 0, 0], [3, 0, 0]])
-    grid = distance_map(cloud, activation_distance(cloud, 0.0), cell=0.1)
-    there = grid.activation_distance.sel(x=0.35, y=0.25, z=0.45, method="nearest")
-    assert float(there) == pytest.approx(2.0)
-    assert float(grid.activation_distance.count()) == 1.0
-    assert grid.x.attrs["units"] == "m"
-
-
 def test_distances_of_another_cloud_are_refused(strewn):
     distance = activation_distance(strewn, 0.02)
     small = strewn.isel(sample=slice(10))
     with pytest.raises(InvalidInput, match=r"distance.sample = indices from 0 to 3,999"):
-        distance_map(small, distance)
+        redundancy_summary(small, distance)
     with pytest.raises(InvalidInput, match="made by activation_distance"):
         redundancy_summary(strewn, distance.drop_vars("sample"))
 
@@ -214,5 +185,5 @@ def test_a_dense_half_is_heterogeneous():
 def test_answers_about_a_cloud_say_which_cloud_it_was(trunk):
     cloud = compute_cloud(trunk, n=300, seed=4)
     distance = activation_distance(cloud, 0.1)
-    for answer in (distance, distance_map(cloud, distance), tip_density(cloud)):
+    for answer in (distance, tip_density(cloud)):
         assert cloud.attrs.items() <= answer.attrs.items()

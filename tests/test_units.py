@@ -162,9 +162,6 @@ def test_curvatures_are_per_unit_and_volumes_in_milliliters(lce, cloud):
     top = {unit: ax.get_ylim()[1] for unit, ax in tops.items()}
     assert top["m"] == pytest.approx(1e3 * top["mm"])
     assert top["L"] == pytest.approx(lce.length * top["m"])
-    ax = plot.plot_volume_curve({"cloud": [1e-4, 2e-4]}, [0.01, 0.02], unit="mm")
-    assert ax.get_ylabel() == "V [mL]"
-    np.testing.assert_allclose(ax.lines[0].get_xydata(), [[10.0, 100.0], [20.0, 200.0]])
 
 
 def test_pictures_in_different_units_do_not_share_axes(cloud, lce, shape):

@@ -83,8 +83,8 @@ def test_a_mesh_is_never_unpacked(tmp_path):
 def test_names_are_drawn_as_they_are(tmp_path):
     pytest.importorskip("matplotlib")
     cloud = sr.compute_cloud(sr.designs.redundant_trunk(), 500)
-    distances = {r"$\input$ 50 % _x^": sr.redundancy.activation_distance(cloud, 0.2)}
-    figure = sr.plot.plot_distance_histograms(distances)
+    title, distance = r"$\input$ 50 % _x^", sr.redundancy.activation_distance(cloud, 0.2)
+    figure = sr.plot.plot_redundancy({title: cloud}, {title: distance})
     sr.plot.save_figure(figure, tmp_path / "a.svg")
     assert r"$\input$ 50 % _x^" in (tmp_path / "a.svg").read_text()
 

@@ -94,11 +94,11 @@ def test_files_are_those_of_the_command_line_in_the_unit_of_the_page(fine, tmp_p
     pulled = StudioState(design=fine.arm, activation=(-1.0, -0.2, -0.5)).showing(unit=unit)
     pulled.design.save(tmp_path / "design.toml")
     export_cloud(fine.cloud, tmp_path / "cloud.ply", unit=unit or "m")
-    export_mesh(fine.exact.surface(), tmp_path / "surface.3mf", unit=unit or "m")
-    for suffix in (".stl", ".3mf", ".glb"):
+    export_mesh(fine.exact.surface(), tmp_path / "surface.glb", unit=unit or "m")
+    for suffix in (".stl", ".glb"):
         out = [str(tmp_path / f"arm{suffix}"), "--activation=-1,-0.2,-0.5"]
         assert run(["export", str(tmp_path / "design.toml"), *out]) == 0
-    for name in ("design.toml", "cloud.ply", "surface.3mf", "arm.stl", "arm.3mf", "arm.glb"):
+    for name in ("design.toml", "cloud.ply", "surface.glb", "arm.stl", "arm.glb"):
         label = next(k for k, (file, _) in FILES["data"].items() if file == name)
         assert written(fine, pulled, "data", label) == (tmp_path / name).read_bytes()
     assert written(fine, pulled, "picture", "four views (.png)").startswith(b"\x89PNG")

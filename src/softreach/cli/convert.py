@@ -84,9 +84,9 @@ def export(
 ) -> None:
     """Convert a cloud or an arm for other programs.
 
-    A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu).
+    A cloud becomes a table or points (.ply .csv .parquet .npz .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
-    .glb .3mf .vtu), the source of a filament of ActiveFilaments.jl (.jl), a
+    .glb .vtu), the source of a filament of ActiveFilaments.jl (.jl), a
     model for MuJoCo (.xml), or kinematics in C (.h .c).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5

@@ -41,7 +41,7 @@ def reach(
 
     Args:
         accuracy: Relative error allowed in the volume.
-        out: Write the boundary (.ply .stl .obj .glb .3mf .vtu), draw slices (.png .pdf .svg), or
+        out: Write the boundary (.ply .stl .obj .glb .vtu), draw slices (.png .pdf .svg), or
             the set as a web page that turns (.html). May be repeated.
         at: Point x,y,z that the slices meet at: the middle of the set if left out.
     """
@@ -278,7 +278,7 @@ def volume(
     Args:
         alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical. 0.05L if left out; critical, the
             smallest that keeps the points together, for points without a design.
-        out: Write the α-shape here: .ply .stl .obj .glb .3mf .vtu
+        out: Write the α-shape here: .ply .stl .obj .glb .vtu
     """
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.schema import is_stable

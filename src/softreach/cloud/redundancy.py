@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 __all__ = [
     "RedundancySummary",
     "activation_distance",
-    "distance_map",
     "redundancy_summary",
     "tip_density",
 ]
@@ -90,42 +89,6 @@ def activation_distance(
         units=cloud["activation"].attrs.get("units", "1"),
         radius=radius,
     )
-
-
-def distance_map(
-    cloud: xr.Dataset, distance: xr.DataArray, *, cell: float | None = None
-) -> xr.Dataset:
-    """Mean D̄ of the evaluated points in each cell of a grid.
-
-    Args:
-        cloud: The cloud that D̄ was computed from.
-        distance: D̄ from `activation_distance`.
-        cell: Edge of the cells [m]; None for L/20.
-
-    Returns:
-        Dataset over the centers x, y, z [m] of cells: `activation_distance` in the unit of D̄, NaN
-        where no point with neighbors was evaluated; `activation_distance_error`, the standard error
-        of that mean, NaN for fewer than two points; and `evaluated`, the number of points.
-
-    Raises:
-        InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
-    """
-    grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
-    count = grid.count(evaluated[np.isfinite(distance.values)])
-    unit = distance.attrs.get("units", "1")
-    name = {"long_name": "mean activation-space distance D̄ in the cell", "units": unit}
-    number = {"long_name": "evaluated points with neighbors", "units": "1"}
-    error = {"long_name": "standard error of activation_distance", "units": unit}
-    mean = grid.mean(distance.values, evaluated)
-    squares = grid.mean(distance.values**2, evaluated)
-    several = np.where(count > 1, count - 1.0, np.nan)
-    scatter = np.sqrt((squares - mean**2).clip(0.0) / several)
-    return cell_dataset(
-        grid,
-        activation_distance=(mean, name),
-        activation_distance_error=(scatter, error),
-        evaluated=(count, number),
-    ).assign_attrs(cloud.attrs)
 
 
 def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:

@@ -16,7 +16,6 @@ from softreach.export.formats import write_by_suffix, write_ply, write_vtu
 from softreach.schema import a_cloud, activation_units
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import StrPath
 from softreach.support.files.formats import FileFormat
 from softreach.support.lazy import DataFrame, Dataset
@@ -24,7 +23,6 @@ from softreach.support.palette import activation_colors
 from softreach.support.units import METER, LengthUnit, as_unit
 
 _BLOCK = 1 << 18
-_MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 
 
 class CloudTable(NamedTuple):
@@ -112,10 +110,10 @@ def column_names(bundles: Sequence[str]) -> list[str]:
 def export_cloud(
     cloud: Dataset, path: StrPath, *, unit: str | LengthUnit = "m", overwrite: bool = False
 ) -> None:
-    """Write a cloud as .ply, .csv, .parquet, .npz, .mat or .vtu, chosen by the suffix.
+    """Write a cloud as .ply, .csv, .parquet, .npz or .vtu, chosen by the suffix.
 
     Tables have the columns x, y, z and one activation per bundle, such as ``gamma_left``; in CSV,
-    where nothing else would say the unit, x_mm, y_mm, z_mm if it is not the meter. NPZ and MAT hold
+    where nothing else would say the unit, x_mm, y_mm, z_mm if it is not the meter. NPZ holds
     the arrays tip, activation and bundle. Clouds of arms under loads have the column or array
     status too: 0 stable, 1 unstable; 2 no equilibrium, 3 undecided and 4 snaps, whose tips are NaN.
     Design, seed, tolerance, version and units go along, except in CSV and VTU, which have no place
@@ -191,24 +189,11 @@ def _write_batches(writer_of: Callable[..., Any], table: CloudTable, suffix: str
 
 
 def _write_npz(table: CloudTable, file: BufferedWriter) -> None:
-    content = table.metadata | _arrays(table) | {"bundle": table.bundles}
+    content = table.metadata | {"tip": table.tip, "activation": table.activation}
+    content |= {} if table.status is None else {"status": table.status}
+    content |= {"bundle": table.bundles}
     arrays: dict[str, Any] = {name: np.array(values) for name, values in content.items()}
     np.savez(file, **arrays)
-
-
-def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
-    from scipy.io import savemat
-
-    size = max(table.tip.nbytes, table.activation.nbytes)
-    if size >= _MAT_LIMIT:
-        raise InvalidInput("cloud", f"{size} bytes", "below 2 GiB for MAT", "use .parquet or .npz")
-    bundle = np.array(table.bundles, dtype=object)
-    savemat(file, {**_arrays(table), "bundle": bundle, "metadata": table.metadata}, oned_as="row")
-
-
-def _arrays(table: CloudTable) -> dict[str, NDArray[Any]]:
-    status = {} if table.status is None else {"status": table.status}
-    return {"tip": table.tip, "activation": table.activation, **status}
 
 
 def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
@@ -223,6 +208,5 @@ CLOUD_FILES = {
     ".csv": FileFormat(write=_write_csv),
     ".parquet": FileFormat(("pyarrow",), _write_parquet),
     ".npz": FileFormat(write=_write_npz),
-    ".mat": FileFormat(write=_write_mat),
     ".vtu": FileFormat(("meshio",), _write_vtu),
 }

@@ -1,12 +1,10 @@
 """Surfaces and arms for other programs: parts with a name and a color."""
 
-import zipfile
 from collections.abc import Sequence
 from importlib import import_module
 from io import BufferedWriter
 from os import PathLike
 from typing import Any, NamedTuple
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,20 +23,6 @@ from softreach.support.palette import BODY, Color, bundle_color
 from softreach.support.units import LengthUnit, as_unit
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
-_CORE_3MF = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
-_UNITS_3MF = {"m": "meter", "cm": "centimeter", "mm": "millimeter", "in": "inch"}
-_PACKAGE_3MF = {
-    "[Content_Types].xml": """<?xml version="1.0" encoding="UTF-8"?>
-<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types">
-<Default Extension="rels" ContentType="application/vnd.openxmlformats-package.relationships+xml"/>
-<Default Extension="model" ContentType="application/vnd.ms-package.3dmanufacturing-3dmodel+xml"/>
-</Types>""",
-    "_rels/.rels": """<?xml version="1.0" encoding="UTF-8"?>
-<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">
-<Relationship Target="/3D/3dmodel.model" Id="model"
- Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>
-</Relationships>""",
-}
 _CLEAR = 0.45  # opacity of a body that has something inside
 
 
@@ -66,12 +50,12 @@ def export_mesh(
     unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
-    """Write a triangle mesh as .ply, .stl, .obj, .glb, .3mf or .vtu, chosen by the suffix.
+    """Write a triangle mesh as .ply, .stl, .obj, .glb or .vtu, chosen by the suffix.
 
     A closed surface that touches itself along edges is parted there, by a thousandth of their
     length, so that it can be printed. STL and GLB keep single precision. glTF has y up: a GLB
     holds our coordinates under one node that turns z up into y up. All but VTU say the unit;
-    `Mesh.load` reads it, but other readers of GLB take all for meters. A 3MF takes no L.
+    `Mesh.load` reads it, but other readers of GLB take all for meters.
 
     Args:
         mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
@@ -116,13 +100,13 @@ def export_arm(
     unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
-    """Write a deformed arm as .ply, .stl, .obj, .glb, .3mf or .vtu, chosen by the suffix.
+    """Write a deformed arm as .ply, .stl, .obj, .glb or .vtu, chosen by the suffix.
 
     The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
     that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
     ring; a tendon is a thin tube, a chamber a tube of its radius, and disks at guides, closed too,
     belong to the body. Parts are called ``body`` and by the names of the bundles in OBJ (objects),
-    GLB (nodes) and 3MF, and numbered in VTU; their colors are in all but STL and VTU.
+    GLB (nodes), and numbered in VTU; their colors are in all but STL and VTU.
 
     Args:
         arm: The design.
@@ -193,33 +177,6 @@ def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     file.write(meshes.export(file_type="glb"))
 
 
-def _write_3mf(scene: Scene, file: BufferedWriter) -> None:
-    if scene.unit.relative:
-        raise InvalidInput("unit", "L", f"{', '.join(_UNITS_3MF)} for a .3mf file")
-    colors = ["#" + bytes(_colors(part)[0]).hex().upper() for part in scene.parts]
-    names = [quoteattr(part.name) for part in scene.parts]
-    bases = (f'<base name={n} displaycolor="{c}"/>' for n, c in zip(names, colors, strict=True))
-    resources = [f'<basematerials id="1">{"".join(bases)}</basematerials>']
-    items = []
-    for index, part in enumerate(scene.parts):
-        corners = (f'<vertex x="{x:.9g}" y="{y:.9g}" z="{z:.9g}"/>' for x, y, z in part.vertices)
-        faces = (f'<triangle v1="{i}" v2="{j}" v3="{k}"/>' for i, j, k in part.faces)
-        resources.append(
-            f'<object id="{index + 2}" type="model" name={names[index]} pid="1" pindex="{index}">'
-            f"<mesh><vertices>{''.join(corners)}</vertices>"
-            f"<triangles>{''.join(faces)}</triangles></mesh></object>"
-        )
-        items.append(f'<item objectid="{index + 2}"/>')
-    model = (
-        f'<?xml version="1.0" encoding="UTF-8"?>\n<model unit="{_UNITS_3MF[scene.unit.name]}" '
-        f'xml:lang="en" xmlns="{_CORE_3MF}"><resources>{"".join(resources)}</resources>'
-        f"<build>{''.join(items)}</build></model>"
-    )
-    with zipfile.ZipFile(file, "w") as package:
-        for name, text in {**_PACKAGE_3MF, "3D/3dmodel.model": model}.items():
-            package.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
-
-
 def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
     surface = joined(scene.parts)
     number = np.repeat(np.arange(len(scene.parts)), [len(part.faces) for part in scene.parts])
@@ -243,4 +200,4 @@ def _colors(part: Part) -> NDArray[np.uint8]:
 _BY_TRIMESH = {".stl": _write_stl, ".obj": _write_obj, ".glb": _write_glb}
 SURFACE_FILES = {".ply": FileFormat(write=_write_ply)}
 SURFACE_FILES |= {x: FileFormat(("trimesh",), write) for x, write in _BY_TRIMESH.items()}
-SURFACE_FILES |= {".3mf": FileFormat(write=_write_3mf), ".vtu": FileFormat(("meshio",), _write_vtu)}
+SURFACE_FILES |= {".vtu": FileFormat(("meshio",), _write_vtu)}

@@ -9,9 +9,7 @@ from .figure_3d import Figure3D as Figure3D, plot_3d as plot_3d
 from .reach import plot_cloud as plot_cloud, plot_hull as plot_hull, plot_slab as plot_slab
 from .reach import plot_opposite_sides as plot_opposite_sides, plot_slice as plot_slice
 from .reach import plot_slices as plot_slices, plot_views as plot_views
-from .reach import plot_volume_curve as plot_volume_curve
 from .results import plot_calibration as plot_calibration, plot_search as plot_search
 from .statistics import plot_curvature as plot_curvature, plot_distance as plot_distance
-from .statistics import plot_distance_histograms as plot_distance_histograms
 from .statistics import plot_redundancy as plot_redundancy
 from .style import save_figure as save_figure

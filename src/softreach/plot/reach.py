@@ -22,7 +22,7 @@ from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_mapping, as_number
 from softreach.support.arrays import Array, as_floats
-from softreach.support.errors import InvalidInput, Range
+from softreach.support.errors import InvalidInput
 from softreach.support.lazy import Axes, Dataset, Figure
 from softreach.support.palette import STEEL
 from softreach.support.units import LengthUnit
@@ -34,7 +34,6 @@ _BESIDE = {True: (0.55, 0.12), False: (0.60, 0.22)}  # left and right of four vi
 _ROOM, _GAP = 0.42, 0.60  # below them and for their key at least, and between them [inch]
 _LETTERS = 90  # of titles side by side
 _LOWER = 0.126  # of the oblique view, whose numbers stand outside of its box [inch]
-_VOLUMES = Range(0.0, unit="m³")
 _ROW = (9.6, 3.6)  # inches
 _COLORS = ("white", "#cfe3f2", "#f2a65a", "#c8553d", "#6b2737")
 _LABELS = ("out of reach", "one activation", "two", "three", "four or more")
@@ -307,56 +306,6 @@ def plot_hull(
         draw_mesh(buffer, vertices, hull.faces, STEEL, view)
         panel.show(buffer)
     return panel.ax
-
-
-def plot_volume_curve(
-    curves: Mapping[str, ArrayLike],
-    alphas: ArrayLike,
-    *,
-    ax: Axes | None = None,
-    length: float | None = None,
-    exact: float | None = None,
-    convex: float | None = None,
-    unit: Unit = None,
-) -> Axes:
-    """Draw V(α) of clouds.
-
-    Args:
-        curves: Label -> volumes [m³] from `volume_curve`, shape (n,).
-        alphas: Their radii [m], shape (n,).
-        ax: Axes to draw in; None for a new figure.
-        length: L [m], by which radii, and volumes by its cube, are divided; None leaves them in m.
-        exact: Volume of the reachable set [m³], drawn as a line.
-        convex: Volume of its convex hull [m³], likewise.
-        unit: As in `plot_hull`; volumes in liters beside cm, in mL beside mm.
-
-    Raises:
-        InvalidInput: Radii and volumes of different shapes.
-        MissingExtra: matplotlib is not installed.
-    """
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    curves, radii = as_mapping("curves", curves, as_floats), as_floats("alphas", alphas)
-    length = None if length is None else as_number("length", length, style.LENGTH)
-    exact = None if exact is None else as_number("exact", exact, _VOLUMES)
-    convex = None if convex is None else as_number("convex", convex, _VOLUMES)
-    counted = style.unit_for(length, unit)
-    with style.styled_axes(ax, 3.4, 2.6) as ax:
-        for label, volumes in curves.items():
-            if np.shape(volumes) != radii.shape:
-                raise InvalidInput(label, np.shape(volumes), f"volumes of {radii.shape} radii")
-            ax.plot(counted.of(radii), counted.of(volumes, 3), linewidth=1.2, label=label)
-        for value, name, look in ((exact, "exact", "-"), (convex, "convex hull", ":")):
-            if value is not None:
-                ax.axhline(float(counted.of(value, 3)), color="0.3", lw=0.8, ls=look, label=name)
-        ax.set(xscale="log", xlabel=counted.label("radius α"), ylim=(0, None))
-        few = float(np.max(radii)) < 100 * float(np.min(radii))
-        ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
-        ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.set_ylabel(counted.label("V", 3))
-        ax.legend(loc="lower right")
-    return ax
 
 
 def plot_slice(

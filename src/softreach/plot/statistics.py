@@ -19,7 +19,6 @@ from softreach.support.lazy import Axes, DataArray, Dataset, Figure
 
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
-_BINS = 60
 _AROUND, _GAPS = (0.1, 0.4, 0.55), (0.12, 0.95)  # right, below, above and between panels [inch]
 _LEFT, _LINE, _LETTERS = 0.75, 0.14, 24  # inches left of them, for each more line of titles
 _a_distance = partial(as_dataset, kind="DataArray")
@@ -71,41 +70,6 @@ def plot_distance(
         panel.show(buffer)
         coloring.draw_key(panel.ax, coloring.ScalarKey(_LABEL, 0.0, high) if key else None)
     return panel.ax
-
-
-def plot_distance_histograms(distances: Mapping[str, DataArray]) -> Figure:
-    """Draw the distribution of D̄ of several clouds side by side, at one scale.
-
-    Args:
-        distances: D̄ [-] from `activation_distance` by title.
-
-    Returns:
-        The figure, with axes in the order of the titles.
-
-    Raises:
-        InvalidInput: No distances.
-        MissingExtra: matplotlib is not installed.
-    """
-    distances = as_mapping("distances", distances, _a_distance)
-    if not distances:
-        raise InvalidInput("distances", "none", "at least one")
-    with style.figure_style():
-        figure = style.new_figure(figsize=(style.PAGE, 0.37 * style.PAGE), layout="constrained")
-        grid = figure.subplots(1, len(distances), sharex=True, squeeze=False)
-        edges = np.linspace(0.0, largest_distance(distances.values()), _BINS + 1)
-        colors = coloring.scale_colors(edges[:-1], 0.0, edges[-1]) / 255
-        for ax, (title, distance) in zip(grid[0], distances.items(), strict=True):
-            finite = distance.values[np.isfinite(distance.values)]
-            share = 100.0 * np.histogram(finite, edges)[0] / max(distance.size, 1)
-            ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
-            ax.set(title=title, xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
-            ax.spines[["top", "right"]].set_visible(False)
-            if len(finite):
-                median, isolated = float(np.median(finite)), 1 - len(finite) / distance.size
-                ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
-                style.write_note(ax, f"median {median:.3f}\nisolated {isolated:.2%}", 0.98, 0.98)
-        grid[0, 0].set_ylabel("share of points per bin / %")
-    return figure
 
 
 def largest_distance(distances: Iterable[DataArray]) -> float:

@@ -41,8 +41,6 @@ def redundancy(settings: Settings, notes: Notebook) -> dict[str, Any]:
     words = "Clouds by |γ| of the last bundle (b), slabs through the base (c), and the mean "
     words += "activation-space distance (d); isolated points are light gray."
     notes.draw("4b-d", "figure_4bcd_redundancy", words, plot.plot_redundancy(clouds, distances))
-    words = "Distribution of the mean activation-space distance in both clouds."
-    notes.draw("", "distances", words, plot.plot_distance_histograms(distances))
     outline = arms["redundant"].outline(0.0)
     offsets, extent = (np.degrees(x).round(9) for x in (outline.center[0][2:], outline.extent[2]))
     numbers |= {"samples": settings.redundant_samples}

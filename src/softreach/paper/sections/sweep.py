@@ -10,7 +10,7 @@ from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import volume_curve
 from softreach.geometry.surface import volume_beyond
 from softreach.paper.notebook import Finding, Notebook, Numbers, Settings, judged
-from softreach.plot import atlas_figures, plot_volume_curve
+from softreach.plot import atlas_figures
 from softreach.support.arrays import Array
 from softreach.workspace import ReachableSet, reachable_set
 
@@ -30,7 +30,6 @@ _CAPTIONS = {
     "curvature": ("3c", "Curvature at six stations of the distal half, without and with taper."),
 }
 _RADII = np.array([0.02, 0.03, 0.04, 0.05, 0.07, 0.1])
-_CURVE = np.geomspace(0.008, 1.0, 120)
 
 
 def sweep(settings: Settings, notes: Notebook) -> dict[str, Any]:
@@ -235,24 +234,16 @@ def _beyond(reached: ReachableSet) -> Array:
     return np.array([aside, volume_beyond(surface, 1, 0.0)])
 
 
-def volume(settings: Settings, notes: Notebook) -> dict[str, Any]:
-    """V(α) of the paper's design for two sizes of clouds, and the exact volume."""
+def volume(settings: Settings, _: Notebook) -> dict[str, Any]:
+    """V(α) of the paper's design, and the exact volume."""
     arm = minimal_trunk()
     reached = reachable_set(arm, accuracy=settings.accuracy)
-    sizes = (settings.samples // 16, settings.samples)
-    clouds = {n: compute_cloud(arm, n, seed=settings.seed).tip for n in sizes}
-    curves = {f"{n:,} tips": volume_curve(tips, _CURVE) for n, tips in clouds.items()}
-    known: dict[str, Any] = {"exact": reached.volume, "convex": reached.convex_volume}
-    words = "Volume of the α-shape of the paper's design against its radius, which the paper does "
-    words += "not state, beside the exact volume of the reachable set and of its convex hull."
-    ax = plot_volume_curve(curves, _CURVE, length=arm.length, **known)
-    notes.draw("", "alpha_dependence", words, ax)
-    known |= {"exact_error": reached.volume_error, "radii": _RADII}
-    return known | {"volumes": {n: volume_curve(tip, _RADII) for n, tip in clouds.items()}}
+    tips = compute_cloud(arm, settings.samples, seed=settings.seed).tip
+    known = {"exact": reached.volume, "exact_error": reached.volume_error, "radii": _RADII}
+    return known | {"samples": settings.samples, "volumes": volume_curve(tips, _RADII)}
 
 
 def dependence(n: Numbers) -> Finding:
-    size, volumes = list(n.volumes.items())[-1]
-    values = ", ".join(f"{v:.3f} at {r:g} L" for r, v in zip(n.radii, volumes, strict=True))
+    values = ", ".join(f"{v:.3f} at {r:g} L" for r, v in zip(n.radii, n.volumes, strict=True))
     exact = f"the exact volume is {n.exact:.4f} ± {n.exact_error:.0e} L³"
-    return Finding(f"{int(size):,} points give {values}; {exact}")
+    return Finding(f"{n.samples:,} points give {values}; {exact}")
