@@ -210,7 +210,7 @@ def study(designs_in_all: int = 10_000, share: int = 240) -> None:
 
 
 def on_dask(processes: int, count: int) -> dict[str, float]:
-    """Seconds of a study spread by a Latin hypercube, the workers' with them, and its store."""
+    """Seconds of a study spread evenly, the workers' with them, and its store."""
     from distributed import Client, LocalCluster
 
     family = DesignSpace.sampled(
@@ -218,7 +218,6 @@ def on_dask(processes: int, count: int) -> dict[str, float]:
         count,
         revolution=np.radians([0.0, 108.0]),
         taper=np.radians([0.0, 3.0]),
-        method="latin",
     )
     with (
         tempfile.TemporaryDirectory() as folder,

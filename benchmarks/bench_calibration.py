@@ -117,8 +117,8 @@ def hose() -> Manipulator:
                     activation_bounds=(0.0, 40.0),
                 )
             )
-        pair = f"m{k}+", f"m{k}-"
-        drives.append(Drive.antagonists(f"u{k}", *pair, bounds=(-1, 1), gain=5.0, offset=15.0))
+        gains, offsets = {f"m{k}+": 5.0, f"m{k}-": -5.0}, {f"m{k}+": 15.0, f"m{k}-": 15.0}
+        drives.append(Drive(name=f"u{k}", bounds=(-1, 1), gains=gains, offsets=offsets))
     measured = Measured(
         axial_stiffness=2000.0, bending_stiffness=0.05, torsion_stiffness=0.05, mass_per_length=0.3
     )

@@ -4,6 +4,7 @@ import numpy as np
 
 from softreach.arm import (
     Chamber,
+    Drive,
     FiberArchitecture,
     LinearTaper,
     Manipulator,
@@ -17,7 +18,7 @@ from softreach.arm import (
     Tendon,
 )
 
-__all__ = ["MADE_ARMS", "mixed_arm", "one_ring_arm"]
+__all__ = ["MADE_ARMS", "antagonists", "mixed_arm", "one_ring_arm"]
 
 SOFT = Material(young_modulus=7e4, name="soft")
 STIFF = Material(young_modulus=6e5, poisson_ratio=0.45, name="stiff")
@@ -32,6 +33,12 @@ def one_ring_arm(*actuators, length=0.3, radius=0.02, **section):
         section=Section(rings=rings, **section),
         actuators=actuators,
     )
+
+
+def antagonists(name, pulls, releases, *, gain=1.0, offset=0.0, **others):
+    """A drive that pulls one bundle and releases another."""
+    offsets = {pulls: offset, releases: offset} if offset else {}
+    return Drive(name=name, gains={pulls: gain, releases: -gain}, offsets=offsets, **others)
 
 
 def mixed_arm():

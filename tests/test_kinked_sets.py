@@ -7,7 +7,6 @@ import pytest
 
 from softreach.arm import (
     Chamber,
-    Drive,
     FiberArchitecture,
     Loads,
     Manipulator,
@@ -20,7 +19,7 @@ from softreach.arm.loads import PointLoad
 from softreach.rod.rods import as_tip_map, effective, free_bundles, measured_bundles
 from softreach.workspace import reachable_set, volume_gradient
 from softreach.workspace.sheets import _zero
-from tests.made_arms import one_ring_arm
+from tests.made_arms import antagonists, one_ring_arm
 
 RUBBER = Material(young_modulus=1e6, poisson_ratio=0.5, density=1000.0)
 RINGS = (Ring(inner_ratio=0.5, material=RUBBER),)
@@ -39,7 +38,7 @@ def driven(bounds, dead_zone=0.0, offset=0.0, pairs=2, chamber=True) -> Manipula
     ends = np.broadcast_to(bounds, (2, 2))
     acts = {"gain": 2.0, "dead_zone": dead_zone, "offset": offset}
     drives = tuple(
-        Drive.antagonists(name, f"t{k}", f"t{k + 2}", bounds=tuple(ends[k]), **acts)
+        antagonists(name, f"t{k}", f"t{k + 2}", bounds=tuple(ends[k]), **acts)
         for k, name in enumerate("xy"[:pairs])
     )
     return arm_of(*used, *([CHAMBER] if chamber else []), drives=drives)

@@ -1,6 +1,5 @@
 """Stores damaged in any file, any way: noticed, named in one line, mended by the same command."""
 
-import os
 import subprocess
 import sys
 import textwrap
@@ -231,22 +230,6 @@ def test_a_store_that_is_replaced_while_it_is_read_is_not_mixed(cloud, tmp_path,
     error = raised_by(lambda: sr.open_cloud(place))
     assert str(error) == f"{place} was replaced while it was read: open it again"
     assert sr.open_cloud(place).attrs["seed"] == 1
-
-
-def test_a_durable_file_is_synced_before_it_counts(atlas_files, tmp_path, monkeypatch):
-    """Every chunk of a design is on the disk before its status is written."""
-    synced: list[str] = []
-
-    def fsync(handle: int) -> None:
-        synced.append(os.readlink(f"/proc/self/fd/{handle}"))
-
-    monkeypatch.setattr(os, "fsync", fsync)
-    built(tmp_path / "a.zarr", durable=True)
-    names = ("metrics/c/0/0/0", "curvature/c/0/0/0/0/0", TIP, "status/c/0/0")
-    places = [synced.index(str(tmp_path / "a.zarr" / name)) for name in names]
-    assert places[-1] == max(places)
-    assert {str(tmp_path / "a.zarr"), str(tmp_path / "a.zarr/zarr.json")} <= {*synced}
-    assert only_files(tmp_path / "a.zarr") == atlas_files
 
 
 # What softreach did not write

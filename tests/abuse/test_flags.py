@@ -67,7 +67,6 @@ REFUSED = {
     f"solve {TRUNK} --target 0,0,1 --family 2": "--family has no effect with up to three",
     "export a.zarr a.csv --activation=0,0,0": "--activation has no effect on a cloud",
     f"studio {TRUNK} --vary taper_deg=0:3:4": "--vary has no effect without --static",
-    "atlas build a.zarr --space a.toml --design lce_arm": "--design has no effect with --space",
     f"calibrate {TRUNK} a.csv": "error: calibrate needs --free",
     f"solve {TRUNK} --target 0,0,1 --within -1mm": "if it begins with a dash: --within=VALUE",
     f"design {TRUNK} b": "error: design takes no b",

@@ -2,46 +2,41 @@
 
 import pytest
 
-import softreach as sr
 from softreach.atlas import DesignSpace, Metric, Need
-from softreach.atlas.space import parse_space
+from softreach.cli.atlas import grid_of
 from tests.abuse.refusals import raised_by
 
-NUMBERS = "must be numbers; for several write a list or start:stop:count"
-ENDS = "two numbers, the lower one first"
-COUNT = "must be a whole number, from 1 to 1,000,000"
-
-
-def sampled(line: str) -> str:
-    return f'layout = "latin"\n{line}\n'
-
+NUMBERS = "must be numbers; several as 1,2,3 or start:stop:count"
 
 SPACES = {
-    "[parameters]\ntaper_deg = [true]": NUMBERS,
-    "[parameters]\ntaper_deg = [[0, 1], [2]]": NUMBERS,
-    "[parameters]\ntaper_deg = [nan]": "finite value",
-    '[parameters]\ntaper_deg = "0:1:2:3"': NUMBERS,
-    '[parameters]\ntaper_deg = "0:3"': f"taper_deg = 0:3: {NUMBERS}",
-    "[parameters]\ntaper = [1]": "with its unit (deg, °, rad)",
-    "[parameters]\n'left.lower' = [-1]\nleft.lower = [-2]": "given once",
-    "lay_out = 1": "key = 'lay_out': must be one of design",
-    "=": "must be valid TOML",
-    'layout = "circle"\n[parameters]\ntaper_deg = [0]': "layout = 'circle': must be one of grid",
-    "parameters = 5": "a table of parameters",
-    "[parameters]": "at least one of",
-    "layout = 5": "one of grid, list, sobol, latin",
-    sampled("[parameters]\ntaper_deg = [0]"): "must be two ends",
-    sampled("designs = 1e9\n[parameters]\ntaper_deg = [0, 3]"): COUNT,
-    sampled("seed = -1\n[parameters]\ntaper_deg = [0, 3]"): "seed = -1: must be a whole number",
-    sampled("[parameters]\ntaper_deg = [3, 0]"): ENDS,
+    "taper_deg=true": NUMBERS,
+    "taper_deg=nan": NUMBERS,
+    "taper_deg=0:1:2:3": NUMBERS,
+    "taper_deg=0:3": f"taper_deg = 0:3: {NUMBERS}",
+    "taper_deg=0:3:0": NUMBERS,
+    "taper=1": "with its unit (deg, °, rad)",
+    "taper_deg=0,0": "values that differ",
+    "tapper_deg=1": 'did you mean "taper_deg"',
+}
+SAMPLED = {
+    "count": {"count": 1e9, "taper": (0.0, 0.04)},
+    "seed": {"count": 4, "seed": -1, "taper": (0.0, 0.04)},
+    "two numbers, the lower one first": {"count": 4, "taper": (0.04, 0.0)},
+    "at least one of": {"count": 4},
 }
 
 
 @pytest.mark.parametrize(("text", "expected"), SPACES.items())
-def test_a_space_that_is_none_is_refused_in_one_line(text, expected):
-    error = raised_by(lambda: parse_space(text, lambda name: getattr(sr.designs, name)()))
+def test_a_grid_that_is_none_is_refused_in_one_line(text, expected, trunk):
+    error = raised_by(lambda: grid_of(trunk, [text]))
     assert expected in str(error)
     assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(("expected", "arguments"), SAMPLED.items())
+def test_a_sample_that_is_none_is_refused_in_one_line(expected, arguments, trunk):
+    error = raised_by(lambda: DesignSpace.sampled(trunk, **arguments))
+    assert expected in str(error)
 
 
 @pytest.mark.parametrize("number", [-1, 4, 1.5, "a", None, True])

@@ -31,7 +31,7 @@ from softreach.rod.summary import design_warnings
 from softreach.support.errors import InvalidDesign
 from tests.cable import Cable
 from tests.laws import arm_of, in_box, integrated_tip
-from tests.made_arms import one_ring_arm
+from tests.made_arms import antagonists, one_ring_arm
 
 PLACE = (0.03, 0.04)
 
@@ -208,8 +208,8 @@ def pairs(arm, **fields):
     defaults = {"bounds": (-1.0, 1.0), "gain": 0.8, "offset": 0.3, "unit": "turns"} | fields
     return arm.replace(
         drives=(
-            Drive.antagonists("x", "t 1", "t 3", **defaults),
-            Drive.antagonists("y", "t 2", "t 4", **defaults),
+            antagonists("x", "t 1", "t 3", **defaults),
+            antagonists("y", "t 2", "t 4", **defaults),
         )
     )
 

@@ -6,13 +6,9 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.atlas import DesignSpace
-from softreach.atlas.space import parse_space
+from softreach.cli.atlas import grid_of
 from softreach.support.errors import InvalidInput
 from tests.atlas.families import small_space
-
-
-def builtin(name: str) -> sr.Manipulator:
-    return getattr(sr.designs, name)()
 
 
 def test_a_grid_has_every_combination_in_c_order():
@@ -29,10 +25,9 @@ def test_a_list_takes_values_together():
     assert space.design(1).fibers[0].offset == 2
 
 
-@pytest.mark.parametrize("method", ["sobol", "latin"])
-def test_sampled_designs_fill_each_stratum_once(method):
+def test_sampled_designs_fill_each_stratum_once():
     ends = {"taper": (0.0, 0.04), "extent": (0.5, 1.0)}
-    space = DesignSpace.sampled(sr.designs.minimal_trunk(), 16, method=method, **ends)
+    space = DesignSpace.sampled(sr.designs.minimal_trunk(), 16, **ends)
     for name, values in space.parameters:
         low, high = ends[name]
         strata = np.floor((np.array(values) - low) / (high - low) * 16)
@@ -73,41 +68,21 @@ def test_a_space_survives_being_written():
     assert DesignSpace.from_dict(space.to_dict()) == space
 
 
-def test_written_spaces_speak_in_degrees_and_ranges():
-    text = """
-        design = "minimal_trunk"
-        [parameters]
-        revolution_deg = "0:108:4"
-        taper_deg = [0, 1.5]
-        outer_radius_m = 0.0625
-    """
-    space = parse_space(text, builtin)
+def test_written_grids_speak_in_degrees_and_ranges(trunk):
+    written = ["revolution_deg=0:108:4", "taper_deg=0,1.5", "outer_radius_m=0.0625"]
+    space = grid_of(trunk, written)
     assert space.shape == (4, 2, 1)
     np.testing.assert_allclose(np.degrees(space.values(3)["revolution"]), 36)
     np.testing.assert_allclose(np.degrees(space.values(3)["taper"]), 1.5)
-    units = """
-        [parameters]
-        revolution = "0deg:108deg:4"
-        taper = [0, "1.5°"]
-        outer_radius = "62.5mm"
-    """
-    same = parse_space(units, builtin)
+    units = ["revolution=0deg:108deg:4", "taper=0,1.5°", "outer_radius=62.5mm"]
+    same = grid_of(trunk, units)
     for number in range(space.size):
         assert same.values(number) == pytest.approx(space.values(number), rel=1e-15)
-    latin = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
-    assert parse_space(latin, builtin).shape == (5,)
 
 
-@pytest.mark.parametrize(
-    "table",
-    [
-        "[parameters]\nleft.offset_deg = [60]\n'longitudinal 1'.bundles = 2",
-        "[parameters]\n'left.offset_deg' = [60]\n'longitudinal 1.bundles' = 2",
-        "[parameters.left]\noffset_deg = [60]\n[parameters.'longitudinal 1']\nbundles = 2",
-    ],
-)
-def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
-    space = parse_space(f"design = 'redundant_trunk'\n{table}", builtin)
+def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot():
+    arm = sr.designs.redundant_trunk()
+    space = grid_of(arm, ["left.offset_deg=60", "longitudinal 1.bundles=2"])
     wanted = {"left.offset": np.radians(60), "longitudinal 1.bundles": 2}
     assert space.values(0) == pytest.approx(wanted)
 

@@ -59,20 +59,13 @@ def text_of(path: str | PathLike[str]) -> str:
     return read_text("design", path, LONGEST)
 
 
-def document_of(
-    text: str, source: str, number: Callable[[str], Any] = WrittenFloat
-) -> dict[str, Any]:
-    """The tables of TOML text as `toml.document_of`, by default with numbers as written."""
-    return toml.document_of(text, LONGEST, source, number)
-
-
 def read(text: str, source: str, make: Callable[..., Arm]) -> Arm:
     """The arm that `make` makes of the fields in a TOML text, which errors call `source`.
 
     Raises:
         InvalidDesign: Every fault of the tables, and of the arm that the sound ones make.
     """
-    document = document_of(text, source)
+    document = toml.document_of(text, LONGEST, source, WrittenFloat)
     version = document.get("version", 2)
     if isinstance(version, bool) or version != 2:
         beside = "" if "profile" in document else ", and a design has a table [profile]"

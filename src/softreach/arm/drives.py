@@ -11,9 +11,9 @@ import numpy as np
 
 from softreach.arm.number import MOST, NamedFloats, Number, as_numbers, is_path_name, number
 from softreach.arm.part import Part
-from softreach.support.arguments import as_given, plain
+from softreach.support.arguments import plain
 from softreach.support.arrays import Array
-from softreach.support.errors import Fault, InvalidInput, Range
+from softreach.support.errors import Fault, Range
 
 if TYPE_CHECKING:
     from softreach.arm.profile import Profile
@@ -54,35 +54,6 @@ class Drive(Part):
         object.__setattr__(self, "bounds", tuple(as_numbers(self.bounds).tolist()))
         for field in ("gains", "offsets"):
             object.__setattr__(self, field, NamedFloats(getattr(self, field)))
-
-    @classmethod
-    def antagonists(
-        cls,
-        name: str,
-        pulls: str,
-        releases: str,
-        *,
-        gain: float = 1.0,
-        offset: float = 0.0,
-        **others: Any,
-    ) -> Self:
-        """One input for two bundles: a positive one pulls the first and releases the second.
-
-        Args:
-            name: Of the input.
-            pulls: Name of the bundle with the gain.
-            releases: Name of the bundle with the opposite gain.
-            gain: Activation per u.
-            offset: Activation of both at u = 0, such as a pretension.
-            others: Other fields of the drive: `bounds`, `unit`, `dead_zone`.
-
-        Raises:
-            InvalidInput: Both bundles are the same.
-        """
-        if pulls == releases:
-            raise InvalidInput("releases", as_given(releases), "another bundle than it pulls")
-        offsets = {pulls: offset, releases: offset} if offset else {}
-        return cls(name=name, gains={pulls: gain, releases: -gain}, offsets=offsets, **others)
 
     def effective(self, u: Array) -> tuple[Array, Array]:
         """dz(u) [unit], and its derivative [-], both of the shape of u."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm import design_file, design_reader
-from softreach.arm.actuators import Actuator, LengthTendon, SectorActuator, Tendon
+from softreach.arm.actuators import Actuator, LengthTendon, Tendon
 from softreach.arm.actuators.actuator import bounds_faults
 from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.body import Body, actuator_faults, behind, mass
@@ -21,7 +21,7 @@ from softreach.arm.part import gathered, kind_faults
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Material, Ring, Section, name_faults
 from softreach.arm.stations import Marker
-from softreach.support.arguments import as_flag, as_given, as_integer, as_path, as_text, plain
+from softreach.support.arguments import as_given, as_path, as_text, plain
 from softreach.support.arrays import Array, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.text import write_text
@@ -196,51 +196,6 @@ class Manipulator(Body):
         shares = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
         actuators = (actuator.replace(activation_bounds=share) for actuator, share in shares)
         return self.replace(actuators=tuple(actuators))
-
-    def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
-        """Replace an architecture of one bundle by `count` independent ones beside each other.
-
-        They are spread evenly about the center of the original, one extent apart, and wind as it
-        does. Splitting the longitudinal fiber of `designs.minimal_trunk` in two gives
-        `designs.redundant_trunk`. Overlap is not checked: fibers of different architectures
-        may cross anyway.
-
-        Args:
-            fiber: Name or index of the architecture.
-            count: Number of those that take its place; 1 leaves the design as it is.
-            keep_extent: True gives each the extent σ of the original, False its share σ / count, so
-                that together they fill the sector of the original.
-
-        Returns:
-            The new design; the parts are named "NAME 1", "NAME 2", ..., and each has the activation
-            bounds of the original.
-
-        Raises:
-            InvalidInput: No such architecture, one of several bundles, or a count below 1.
-        """
-        count = as_integer("count", count, 1, 1000)
-        keep_extent = as_flag("keep_extent", keep_extent)
-        key, each = plain(fiber), enumerate(self.actuators)
-        sectors = {k: part for k, part in each if isinstance(part, SectorActuator)}
-        meant = [k for k in sectors if type(key) in (int, str) and key in (k, sectors[k].name)]
-        if not meant:
-            listed = ", ".join(f"{k} ({part.name})" for k, part in sectors.items())
-            allowed = f"the name or index of one architecture: {listed}"
-            raise InvalidInput("fiber", as_given(fiber), allowed)
-        index, original = meant[0], sectors[meant[0]]
-        if original.bundles != 1:
-            hint = "its bundles are independent already"
-            raise InvalidInput(f"{original.name}.bundles", original.bundles, "1 to be split", hint)
-        if count == 1:
-            return self
-        extent = original.extent if keep_extent else original.extent / count
-        places = original.start_angles[0] + (np.arange(count) - (count - 1) / 2) * extent
-        parts = (
-            original.replace(name=f"{original.name} {k}", offset=place, extent=extent)
-            for k, place in enumerate(places.tolist(), start=1)
-        )
-        others = self.actuators[:index], self.actuators[index + 1 :]
-        return self.replace(actuators=(*others[0], *parts, *others[1]))
 
     @classmethod
     def from_toml(cls, text: str, source: str = "design") -> Self:

@@ -78,7 +78,7 @@ def run_designs(
 
 def _run_pool(pool: Executor, store: AtlasStore, indices: Sequence[int], report: OnOutcome) -> None:
     key = token, origin = secrets.token_hex(8), os.getpid()
-    remote = _Remote(store.command, store.location, store.opened.durable, token, origin)
+    remote = _Remote(store.command, store.location, token, origin)
     _opened[key] = store  # for workers that are threads of this process
     waiting = iter(indices)
     pending: dict[Future[Outcome], int] = {}
@@ -116,7 +116,6 @@ class _Remote(NamedTuple):
 
     command: Command
     location: Any
-    durable: bool
     token: str
     origin: int  # Process that began the store
 
@@ -132,7 +131,7 @@ def _run_remotely(remote: _Remote, index: int) -> Outcome:
                     where = "in the memory of another process"
                     raise errors.NotPossible(f"the store is {where}; use a path or a URL")
             _opened.clear()
-            store = AtlasStore.open(remote.location, durable=remote.durable)
+            store = AtlasStore.open(remote.location)
             _opened[key] = replace(store, command=remote.command)  # which has all functions
         return begin_design(_opened[key], index)()
     except errors.SoftreachError as error:
@@ -203,7 +202,6 @@ def build_atlas(
     keep_clouds: bool = True,
     executor: ExecutorLike = None,
     shard: tuple[int, int] = (0, 1),
-    durable: bool = False,
     device: Device = "cpu",
     progress: Progress | None = None,
 ) -> Dataset:
@@ -238,8 +236,6 @@ def build_atlas(
             ``SOFTREACH_NUM_THREADS`` says otherwise.
         shard: (i, k) computes every k-th design from the i-th on, i from 0, so that k processes
             share a store.
-        durable: Whether a design counts as done only when not even a power cut can lose it; else
-            it can damage designs of the last seconds, which the next call notices.
         device: What computes tips: "cpu", or "cuda" for a GPU, of arms without loads.
         progress: Called with the number of designs done since its last call; None for a bar.
 
@@ -263,7 +259,6 @@ def build_atlas(
     """
     as_instance("space", space, DesignSpace, "a DesignSpace")
     store, (first, count) = a_store("store", store), _shard_of("shard", shard)
-    durable = as_flag("durable", durable)
     check_device(device)
     as_instance("executor", executor, (type(None), Executor, DaskClient), _EXECUTORS)
     progress = None if progress is None else as_progress(progress)
@@ -283,7 +278,7 @@ def build_atlas(
         stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
         lost = f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}"
         errors.warn(f"{lost}, first {space.values(index)}: {reason}")
-    atlas = AtlasStore.begin(store, command, durable=durable)
+    atlas = AtlasStore.begin(store, command)
     numbers = range(first, space.size, count)
     content = contents(atlas, tips_of=numbers)
     content.warn_of_damage("; damaged designs are computed again")

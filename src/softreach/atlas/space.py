@@ -15,7 +15,6 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.design_reader import document_of
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import (
     Parameter,
@@ -32,7 +31,7 @@ from softreach.atlas.metrics import Metric, known_metric
 from softreach.cloud.curvature import QUANTILES
 from softreach.rod.tip_map import Device
 from softreach.sampling import check_sampler, sample_cube
-from softreach.support.arguments import as_instance, as_integer, as_one_of
+from softreach.support.arguments import as_integer
 from softreach.support.arrays import as_floats, check_finite
 from softreach.support.errors import InvalidDesign, InvalidInput, counted
 from softreach.support.progress import bar
@@ -52,9 +51,6 @@ _LONGEST = 1e3  # ratio of the lengths of designs whose tips share one fixed-poi
 _MOST = 1_000_000  # designs, each of which is looked at and has files of its own
 _MOST_VALUES = 100_000  # of one parameter
 _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
-_KEYS = ("design", "layout", "designs", "seed", "parameters")
-_SAMPLERS = ("sobol", "latin")
-_LAYOUTS = ("grid", "list", *_SAMPLERS)
 
 
 def column(name: str, values: ArrayLike) -> tuple[float, ...]:
@@ -130,7 +126,6 @@ class DesignSpace:
         base: Manipulator,
         count: int,
         *,
-        method: Literal["sobol", "latin"] = "sobol",
         seed: int = 0,
         **ranges: tuple[float, float],
     ) -> Self:
@@ -138,22 +133,15 @@ class DesignSpace:
 
         Args:
             base: The design to vary.
-            count: Number of designs; a power of two for "sobol".
-            method: Scrambled Sobol sequence, or Latin hypercube.
-            seed: Of the sampler.
+            count: Number of designs, a power of two.
+            seed: Of the sampler, a scrambled Sobol sequence.
             **ranges: Parameter -> lower and upper end [SI units].
         """
-        from scipy.stats import qmc
-
         a_manipulator("base", base)
-        as_one_of("method", method, _SAMPLERS)
         count, seed = as_integer("count", count, 1, _MOST), as_integer("seed", seed)
         if not ranges:
             return cls(base=base, parameters=())
-        if method == "sobol":
-            cube = sample_cube("sobol", count, len(ranges), seed)
-        else:
-            cube = qmc.LatinHypercube(len(ranges), rng=np.random.default_rng(seed)).random(count)
+        cube = sample_cube("sobol", count, len(ranges), seed)
         ends = np.array([_ends(name, ends) for name, ends in ranges.items()])
         points = ends[:, 0] + cube * np.diff(ends, axis=1)[:, 0]
         if counts := [k for k, name in enumerate(ranges) if find_parameter(base, name).whole]:
@@ -401,77 +389,36 @@ def _shown(value: Any, other: Any) -> str:
     return repr(value)
 
 
-def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignSpace:
-    """A design space from the text of a file, whose keys docs/atlas.md explains.
-
-    With `sobol` and `latin` each parameter has two ends, and the keys `designs` (their number) and
-    `seed` apply too; `design_from` makes a design of its name or path.
-    """
-    try:
-        document = document_of(text, "space", float)
-    except InvalidDesign as error:
-        raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
-    for key in document:
-        as_one_of("key", key, _KEYS)
-    base = design_from(str(document.get("design", "minimal_trunk")))
-    table, layout = document.get("parameters", {}), document.get("layout", "grid")
-    as_instance("parameters", table, dict, "a table of parameters and their values")
-    as_one_of("layout", layout, _LAYOUTS)
-    values: dict[str, list[float]] = {}
-    for key, value in flat_keys(table):
-        name, numbers = parse_parameter(base, key, value)
-        if name in values:
-            raise InvalidInput(key, value, "given once")
-        if layout in _SAMPLERS and len(numbers) != 2:
-            raise InvalidInput(name, numbers, f"two ends, [lower, upper], for {layout}")
-        values[name] = numbers
-    if layout not in _SAMPLERS:
-        return (DesignSpace.grid if layout == "grid" else DesignSpace.listed)(base, **values)
-    ranges = {name: (low, high) for name, (low, high) in values.items()}
-    count, seed = document.get("designs", 64), document.get("seed", 0)
-    return DesignSpace.sampled(base, count, method=layout, seed=seed, **ranges)
-
-
-def flat_keys(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Keys and values; TOML reads the dots of unquoted keys as tables within tables."""
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from flat_keys(value, f"{prefix}{key}.")
-        else:
-            yield prefix + key, value
-
-
-def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[float]]:
+def parse_parameter(base: Manipulator, key: str, text: str) -> tuple[str, list[float]]:
     """Name and values [SI units] of a parameter as written.
 
-    `taper_deg` with `0:3:16` or a list, or `taper` with `0deg:3deg:16` or a list of such texts.
+    `taper_deg` with `0:3:16` or `0,1,2`, or `taper` with `0deg:3deg:16` or `0deg,1deg`.
     """
     names = Written.of(base)
     if key not in names.by_key:
         raise unknown_parameter(key, names.written)
-    parameter = names.by_key[key]
+    parameter, has_unit = names.by_key[key], key in names.written
     try:
-        if key in names.written:
-            numbers = _read(value, _number) if isinstance(value, str) else column(key, value)
-            return parameter.name, [from_written(x, parameter.unit) for x in numbers]
-        return parameter.name, _read(value, partial(names.number, key))
-    except (InvalidInput, ValueError):
-        kind = "numbers" if key in names.written else names.allowed(key)
+        numbers = _read(text, _number if has_unit else partial(names.number, key))
+    except ValueError:
+        kind = "numbers" if has_unit else names.allowed(key)
         ends = f"start:stop:count (both ends count, up to {_MOST_VALUES} values)"
-        allowed = f"{kind}; for several write a list or {ends}"
-        raise InvalidInput(key, value, allowed) from None
+        allowed = f"{kind}; several as 1,2,3 or {ends}"
+        raise InvalidInput(key, text, allowed) from None
+    if has_unit:
+        numbers = [from_written(x, parameter.unit) for x in numbers]
+    return parameter.name, numbers
 
 
-def _read(value: Any, read: Callable[[Any], float]) -> list[float]:
-    if isinstance(value, str) and ":" in value:
-        start, stop, count = value.split(":")
-        number = read_whole_number(count)
-        if not 0 < number <= _MOST_VALUES:
-            raise ValueError(value)
-        values = np.linspace(read(start), read(stop), number)
-        return [float(f"{value:.15g}") for value in values]  # 1.8 and not 1.8000000000000003
-    each = value.split(",") if isinstance(value, str) else value
-    return [read(one) for one in (each if isinstance(each, list) else [each])]
+def _read(text: str, read: Callable[[str], float]) -> list[float]:
+    if ":" not in text:
+        return [read(one) for one in text.split(",")]
+    start, stop, count = text.split(":")
+    number = read_whole_number(count)
+    if not 0 < number <= _MOST_VALUES:
+        raise ValueError(text)
+    values = np.linspace(read(start), read(stop), number)
+    return [float(f"{value:.15g}") for value in values]  # 1.8 and not 1.8000000000000003
 
 
 def _number(text: str) -> float:

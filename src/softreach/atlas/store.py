@@ -18,7 +18,7 @@ import zarr  # noqa: TID253  (imported where stores are)
 from numpy.typing import ArrayLike, NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec  # noqa: TID253
 from zarr.errors import ContainsArrayError  # noqa: TID253
-from zarr.storage import LocalStore, MemoryStore, StoreLike, WrapperStore  # noqa: TID253
+from zarr.storage import MemoryStore, StoreLike, WrapperStore  # noqa: TID253
 
 from softreach.atlas.metrics import Metric
 from softreach.atlas.space import Command
@@ -27,7 +27,6 @@ from softreach.schema import AXES
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, warn
 from softreach.support.files import stores
-from softreach.support.files.atomic import sync
 
 CUBE = "unit_activation"  # The array of activations that all designs share
 PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")  # Arrays whose chunks are designs
@@ -137,18 +136,15 @@ class AtlasStore:
     _arrays: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def begin(cls, location: StoreLike, command: Command, *, durable: bool = False) -> Self:
-        """Create the store, or open one that the same command began, and mend what is damaged.
-
-        Where it is durable, a power cut loses nothing that was written.
-        """
+    def begin(cls, location: StoreLike, command: Command) -> Self:
+        """Create the store, or open one that the same command began, and mend what is damaged."""
         location = stores.absolute(location)
-        opened, open_it = None, partial(stores.opened_store, location, "atlas", durable=durable)
+        opened, open_it = None, partial(stores.opened_store, location, "atlas")
         with stores.writing(location):
             with suppress(stores.DamagedStore):
                 opened = open_it("r+")
             if opened is None:
-                _write_root(location, command, durable)
+                _write_root(location, command)
                 opened = open_it("r+")
         allowed = "a new folder, or an atlas; this one holds other files"
         opened, stored = _with_command(opened, location, allowed)
@@ -164,10 +160,10 @@ class AtlasStore:
         return store
 
     @classmethod
-    def open(cls, location: StoreLike, mode: stores.Mode = "r+", *, durable: bool = False) -> Self:
+    def open(cls, location: StoreLike, mode: stores.Mode = "r+") -> Self:
         """Open an atlas, in mode "r" at a place that cannot be written to."""
         location = stores.absolute(location)
-        opened = stores.opened_store(location, "atlas", mode, durable=durable)
+        opened = stores.opened_store(location, "atlas", mode)
         lacks = f"it does not exist, or has no {stores.ROOT}"
         allowed = f"an atlas written by build_atlas; {'this is no atlas' if opened else lacks}"
         opened, command = _with_command(opened, location, allowed)
@@ -252,7 +248,7 @@ def _with_command(
     return opened, Command.from_json(text)
 
 
-def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
+def _write_root(location: StoreLike, command: Command) -> None:
     place = stores.place_of(location, "r+")
     lost = False  # of a store that this command began, whose root is damaged or gone
     for name, _, _ in array_plans(command):
@@ -279,8 +275,6 @@ def _write_root(location: StoreLike, command: Command, durable: bool) -> None:
 
     attributes = _attributes(command)
     zarr.create_group(Root(place.store), path=place.path, zarr_format=3, attributes=attributes)
-    if durable and isinstance(place.store, LocalStore):
-        sync(place.store.root / place.path / stores.ROOT)
 
 
 def _attributes(command: Command) -> dict[str, Any]:

@@ -13,8 +13,7 @@ from softreach.cli import options
 from softreach.cli.console import console, rows_of
 from softreach.cli.options import UNCHANGED, Changes, Whole, design_from, pairs_in, read_as
 from softreach.support.arguments import POSITIVE, as_integer
-from softreach.support.errors import InvalidInput, NotPossible, check_installed, counted
-from softreach.support.files.text import read_text
+from softreach.support.errors import InvalidInput, NotPossible, counted
 from softreach.support.quantity import read_number
 
 atlas = App(
@@ -35,18 +34,14 @@ def build(
     store: Store,
     /,
     *,
-    vary: list[str] | None = None,
-    design: str | None = None,
-    space: Path | None = None,
+    vary: list[str],
+    design: str = "minimal_trunk",
     sampling: options.Sampling = options.SAMPLING,
     alpha: str | None = None,
     metrics: str | None = None,
     keep_clouds: Annotated[bool, Parameter(negative="--no-keep-clouds")] = True,
-    scheduler: str | None = None,
-    scheduler_file: Path | None = None,
     shard: Shard = "0/1",
     changes: Changes = UNCHANGED,
-    durable: options.Durable = False,
     device: options.Device = "cpu",
     json: options.AsJson = False,
 ) -> None:
@@ -61,13 +56,10 @@ def build(
         vary: A parameter of the grid: taper_deg=0:3:16, left.bundles=1,2, or
             rings[0].material.young_modulus_pa=1e5,1e6. May be repeated.
         design: Design that --vary changes: minimal_trunk if left out.
-        space: File of a design space (.toml), instead of --vary.
         alpha: Radius of the α-shapes over the length of each design: 0.05L if left out.
         metrics: Groups of metrics, comma-separated, if not all: extent, convex, concave, exact,
             curvature, stability; or names of metrics of your own.
         keep_clouds: Store the tips.
-        scheduler: Dask scheduler: tcp://host:port
-        scheduler_file: Dask scheduler file.
         device: What computes the tips: cpu, or cuda (a GPU), which takes arms without loads.
     """
     first, _, count = shard.partition("/")
@@ -79,7 +71,6 @@ def build(
     how: Any = {
         "metrics": groups,
         "keep_clouds": keep_clouds,
-        "durable": durable,
         "shard": (int(first), int(count)),
         "device": device,
     }
@@ -87,9 +78,8 @@ def build(
     bare = alpha[:-1] if alpha.endswith("L") else ""
     allowed = "a radius > 0 over the length of each design, like 0.05L"
     radius = read_as("alpha", alpha, lambda _: read_number(bare), allowed, POSITIVE)
-    designs, how = _space_of(space, design, vary, changes), how | sampling.arguments
-    how["executor"] = _executor(scheduler, scheduler_file)
-    sr.build_atlas(designs, store, alpha_over_length=radius, **how)
+    base, how = design_from(design, changes), how | sampling.arguments
+    sr.build_atlas(grid_of(base, vary), store, alpha_over_length=radius, **how)
     status(store, json=json)
 
 
@@ -193,34 +183,9 @@ def figures(
         pyplot().close(figure.get_figure(root=True))
 
 
-def _space_of(
-    path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
-) -> sr.DesignSpace:
-    from softreach.arm.design_reader import LONGEST
-    from softreach.atlas.space import parse_space
-
-    if (path is None) == (vary is None):
-        raise NotPossible("give either --vary or --space")
-    if path is not None:
-        options.refuse("with --space, whose file names the design", design=design, **changes.given)
-        return parse_space(read_text("space", path, LONGEST), design_from)
-    return grid_of(design_from(design or "minimal_trunk", changes), vary or [])
-
-
 def grid_of(base: sr.Manipulator, vary: list[str]) -> sr.DesignSpace:
     """The grid that `--vary` asks for."""
     from softreach.atlas.space import parse_parameter
 
     pairs = pairs_in("vary", vary, "NAME=VALUES, such as taper_deg=0:3:8")
     return sr.DesignSpace.grid(base, **dict(parse_parameter(base, *pair) for pair in pairs.items()))
-
-
-def _executor(scheduler: str | None, scheduler_file: Path | None) -> Any:
-    if scheduler is not None:
-        options.refuse("with --scheduler", scheduler_file=scheduler_file)
-    elif scheduler_file is None:
-        return None
-    check_installed("distributed")
-    from distributed import Client
-
-    return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))

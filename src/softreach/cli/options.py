@@ -89,7 +89,6 @@ AsJson = Annotated[bool, _output("Print JSON; null where there is no number.", "
 _UNIT = "Unit of lengths: m, cm, mm, in or L. If left out: that of the design file, else m or mm."
 Unit = Annotated[str | None, _output(_UNIT)]
 Device = Literal["cpu", "cuda"]
-Durable = Annotated[bool, _output("Flush to disk before exiting.")]
 Overwrite = Annotated[bool, _output("Overwrite existing output.")]
 Out = Annotated[Path | None, OUT]
 Place = Annotated[Path, OUT]

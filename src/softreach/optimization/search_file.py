@@ -7,7 +7,6 @@ from typing import Any
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Written, unknown_parameter
-from softreach.atlas.space import flat_keys
 from softreach.optimization.free_parameters import NAMED_CHOICES, free_parameters, known_parameters
 from softreach.optimization.problem import goals, known_objective
 from softreach.optimization.study import SAMPLERS
@@ -152,7 +151,7 @@ class _Reader(FaultReader):
         """Path in errors, key and value of a table; what was given goes before the file."""
         given, known = self._given.get(table, {}), names.by_key if names else {}
         said = {known[key].name if key in known else key for key in given}
-        for key, value in flat_keys(self._raw[table]):
+        for key, value in _flat_keys(self._raw[table]):
             if (known[key].name if key in known else key) not in said:
                 yield f"search.{table}.{key}", key, value
         for key, value in given.items():
@@ -192,3 +191,12 @@ class _Reader(FaultReader):
         make = partial(free_parameters, self._bases, of_free, choices)
         if self._tried(path, given, make) is not WRONG:
             table[name] = value
+
+
+def _flat_keys(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys and values; TOML reads the dots of unquoted keys as tables within tables."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat_keys(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value

@@ -4,7 +4,6 @@ The root lists the sha256 of the `zarr.json` of each array, and ends with its ow
 bit and a missing chunk are noticed; a whole chunk of another place, or an older store, is not.
 """
 
-import asyncio
 import copy
 import hashlib
 import json
@@ -23,7 +22,6 @@ from zarr.abc.store import ByteRequest, Store  # noqa: TID253
 from zarr.storage import FsspecStore, LocalStore, MemoryStore, StoreLike, StorePath, WrapperStore  # noqa: TID253
 
 from softreach.support.errors import InvalidInput, SoftreachError
-from softreach.support.files.atomic import sync
 
 Kind = Literal["cloud", "atlas"]
 Mode = Literal["r", "r+"]
@@ -85,7 +83,6 @@ class Opened:
 
     location: object
     kind: Kind
-    durable: bool  # A file that counts as written is on the disk, not only on its way there
     required: Callable[[Chunk], bool] = lambda _: False  # Others that are missing hold fill values
     digests: dict[str, str] = field(default_factory=dict)  # Of each array's document, as listed
     place: StorePath = field(init=False)  # For xarray
@@ -127,16 +124,14 @@ class Opened:
             raise StoreFailed(f"{self.location} was replaced while it was read: open it again")
 
 
-def opened_store(
-    location: StoreLike, kind: Kind, mode: Mode = "r", *, durable: bool = False
-) -> Opened | None:
+def opened_store(location: StoreLike, kind: Kind, mode: Mode = "r") -> Opened | None:
     """A store of softreach, if there is any; `StoreFailed` where it cannot be reached."""
     if isinstance(location, str) and "://" not in location:
         if Path(location).is_file():
             raise InvalidInput("store", location, _ALLOWED[kind], "it is a file")
         if not Path(location).is_dir():
             return None
-    opened = Opened(location, kind, durable)
+    opened = Opened(location, kind)
     with storage_errors(f"{location} cannot be opened"):
         try:
             place = place_of(location, mode)
@@ -204,10 +199,6 @@ class CheckedStore(WrapperStore[Any]):
         if listed and listed != sha256(value.to_bytes()):
             raise StoreFailed(f"{key} of {opened.location} was written by another Zarr release")
         await super().set(key, value)
-        if opened.durable and isinstance(self._store, LocalStore):
-            root, path = self._store.root, self._store.root / key  # with its name and its folders'
-            places = (path, *path.parents[: len(path.relative_to(root).parts)])
-            await asyncio.to_thread(lambda: [sync(place) for place in places])
 
     async def list_dir(self, prefix: str) -> AsyncIterator[str]:
         """The arrays of the root, without what killed writers or others left beside them."""
