@@ -41,7 +41,6 @@ class TestEveryKind:
         shape = sr.configuration(arm, some_activation(arm), stations=21)
         ax = plot_arm(arm, shape, view="oblique")
         assert len(ax.images) == 2
-        assert "data:image/png" in arm._repr_html_()
         figure = plot_designs([DesignPanel("one", arm)], stations_over_length=(0.0, 0.5))
         assert len(figure.axes) == 3
 

@@ -1,20 +1,15 @@
 """Laws of the rasterizer: what is nearest shows, where the projection says, whatever the order."""
 
-import base64
 import io
-import re
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.geometry.hull import convex_hull
-from softreach.picture import Dots, Skin, html_card, thumbnail
 from softreach.picture.axes_box import axes_box, seen_from
 from softreach.picture.gltf import ColoredSkin, glb
 from softreach.picture.projection import VIEWS, is_mirrored, project, sight_axis, view_axes
-from softreach.picture.thumbnail import png_bytes
 from softreach.picture.zbuffer import Extent, ZBuffer, shade
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
@@ -187,52 +182,6 @@ def test_light_falls_alike_on_both_sides(rng):
     np.testing.assert_allclose(lit, shade(-normals, (0.5, 0.5, 0.5)))
     assert lit.min() > 0
     assert lit.max() <= 255
-
-
-def pixels_of(png: bytes) -> np.ndarray:
-    plt = pytest.importorskip("matplotlib.pyplot")
-    return np.rint(255 * plt.imread(io.BytesIO(png)))
-
-
-class TestThumbnails:
-    @given(seed=st.integers(0, 100))
-    def test_a_png_holds_its_image(self, seed):
-        rng = np.random.default_rng(seed)
-        drawn = rng.integers(0, 256, (*rng.integers(1, 9, 2), 4), np.uint8)
-        np.testing.assert_array_equal(pixels_of(png_bytes(drawn)), drawn)
-
-    @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-    def test_a_ball_is_a_disc_in_the_middle_at_any_scale(self, rng, scale):
-        points = rng.normal(size=(3000, 3))
-        hull = convex_hull(scale * points / np.linalg.norm(points, axis=1, keepdims=True))
-        opacity = pixels_of(thumbnail(Skin(hull.vertices, hull.faces), width=100))[..., 3] / 255
-        radius = 50 / 1.06
-        assert opacity.sum() == pytest.approx(np.pi * radius**2, rel=0.02)
-        row, column = np.average(np.indices((100, 100)), axis=(1, 2), weights=opacity)
-        assert (row, column) == pytest.approx((49.5, 49.5), abs=0.5)
-
-    def test_points_show_in_their_colors_and_many_are_thinned(self):
-        points = np.zeros((300_000, 3))
-        points[:, 0] = np.linspace(-1, 1, len(points))
-        colors = np.where(points[:, :1] < 0, RED, BLUE)
-        drawn = pixels_of(thumbnail(Dots(points, colors), view="front", width=40))
-        solid = drawn[drawn[..., 3] == 255]
-        assert {RED, BLUE} <= {tuple(c) for c in solid[:, :3].tolist()}
-
-    @pytest.mark.parametrize(
-        "parts", [(), (Dots(np.full((4, 3), np.nan)),), (Skin(np.empty((0, 3)), np.empty((0, 3))),)]
-    )
-    def test_nothing_to_show_leaves_the_text(self, parts):
-        assert html_card("a < b", *parts) == "<pre>a &lt; b</pre>"
-
-    def test_a_hull_shows_its_picture_and_what_it_says(self, rng):
-        hull = convex_hull(rng.uniform(-1, 1, (500, 3)))
-        shown = hull._repr_html_()
-        data = re.search(r"data:image/png;base64,([^\"]+)", shown)
-        assert pixels_of(base64.b64decode(data[1]))[..., 3].any()
-        assert f"volume {hull.volume:.5g} m³" in shown
-        flat = convex_hull(np.eye(3))
-        assert "<img" not in flat._repr_html_()
 
 
 def test_twelve_bundles_have_colors_that_are_told_apart_and_four_a_lightness_of_their_own():

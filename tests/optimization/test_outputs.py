@@ -76,9 +76,6 @@ def test_its_dataset_holds_all_designs_and_which_is_which(one):
     best = table.isel(design=table.front.values)
     assert best.objective_value.item() == one.best.objectives[0].value
     assert dict(zip(table.parameter.values, best.value.values[0], strict=True)) == one.best.values
-    rows = np.flatnonzero(table.coarse_design.values >= 0)
-    first = table.value.values[table.coarse_design.values[rows]]
-    np.testing.assert_array_equal(first, table.value.values[rows])
     assert (np.diff(table.looked_at.values) >= 0).all()
 
 

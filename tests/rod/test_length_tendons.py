@@ -311,7 +311,6 @@ def test_files_and_bounds_hold_it(arm, tmp_path):
     assert arm.with_bounds((0, 1)) == arm
     assert "passive" in repr(arm)
     assert sr.describe(arm).bundle_extension.shape == (0, 2)
-    assert arm._repr_html_()
 
 
 def test_a_file_without_the_key_has_forgotten_its_actuators():

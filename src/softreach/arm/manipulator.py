@@ -312,11 +312,6 @@ class Manipulator(Body):
             f"  bundles: {names}{more}{pose}"
         )
 
-    def _repr_html_(self) -> str:
-        from softreach.arm.skin import arm_card
-
-        return arm_card(self, self.base)
-
 
 def a_manipulator(name: str, value: object) -> Manipulator:
     """An argument that is a design."""

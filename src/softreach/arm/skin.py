@@ -14,10 +14,8 @@ from softreach.arm.base import Base
 from softreach.arm.body import Body
 from softreach.arm.stations import Marker
 from softreach.geometry.surface import Surface, grid_faces, joined, ribbon_surface, tube_surface
-from softreach.picture import Skin, html_card
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.palette import BODY, bundle_color
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +26,6 @@ _DISK = 1 / 150  # thickness of disks, in L
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
 _THICKNESS = 0.04  # of closed bands, in R2
 _SAME = 1e-9  # of the length, or of R2
-_CARD_STATIONS, _CARD_STEP = 41, np.pi / 27
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -207,16 +204,6 @@ def inside(arm: Body) -> tuple[bool, ...]:
     place = np.where(sector, outline.outer_ratio, outline.middle_ratio)
     hidden = (place < 1.0 - _SAME) & outline.acts
     return tuple(bool(hidden[:, k].any()) for k in range(arm.bundles))
-
-
-def arm_card(arm: Body, base: Base) -> str:
-    """HTML with a small picture of the unactivated arm above its numbers, for notebooks."""
-    line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS), base)
-    body = arm_surface(arm, line)
-    bundles = enumerate(bundle_skins(arm, line, lift=0.01, step=_CARD_STEP))
-    skins = (Skin(each.vertices, each.faces, bundle_color(k)) for k, each in bundles)
-    body_skin = Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
-    return html_card(repr(arm), body_skin, *skins)
 
 
 def _drawn_line(arm: Body, shape: Shape) -> Centerline:

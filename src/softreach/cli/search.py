@@ -116,7 +116,7 @@ def search(
         accuracy: Relative error of volumes: 3e-3 if the file says nothing.
         sampler: auto, cma, tpe, nsga2, nsga3, sobol or random.
         polish: Improve designs by their derivatives.
-        storage: Journal or SQLite file (.db) of all designs, to resume a search or to share it
+        storage: Journal of all designs, to resume a search or to share it
             with other seeds. FOLDER/search.journal if left out.
         out: Folder for the designs, tables and report.
     """

@@ -52,11 +52,6 @@ class Hull:
         """Estimated error of the volume [m³], below zero if it is too small."""
         return None if self.volume_corrected is None else self.volume - self.volume_corrected
 
-    def _repr_html_(self) -> str:
-        from softreach.picture import Skin, html_card
-
-        return html_card(repr(self), Skin(self.vertices, self.faces))
-
     def to_dataset(self) -> xr.Dataset:
         """`vertices` (vertex, axis) [m], `faces` (face, corner) and the numbers as variables."""
         import xarray as xr

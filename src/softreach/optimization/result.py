@@ -154,7 +154,7 @@ class Search(Reported):
         """All designs over `design`: those on the way in their order, then those at full accuracy.
 
         Values over `parameter`, where a choice counts from 0, and over `objective`; `front` says
-        which make up the front, and `coarse_design` which earlier design one at full accuracy is.
+        which make up the front.
         """
         import xarray as xr
 
@@ -167,8 +167,6 @@ class Search(Reported):
             **self.provenance,
             "finalists": len(self.finalists),
         }
-        places = {frozenset(each.values.items()): k for k, each in enumerate(self.candidates)}
-        coarse = [places.get(frozenset(each.values.items()), -1) for each in self.finalists]
         looked_at = np.cumsum([each.designs for each in self.candidates], dtype=int)
         looked_at = [*looked_at, *[self.designs] * len(self.finalists)]
         rows = np.array([[p.number(each.values[p.name]) for p in free] for each in every])
@@ -180,8 +178,7 @@ class Search(Reported):
         values |= over("design", front=[self._is_in_front(each) for each in every])
         values |= over("design", fidelity=np.array([each.fidelity for each in every], dtype=str))
         values |= over("design", fault=np.array([each.fault for each in every], dtype=str))
-        coarse = [-1] * len(self.candidates) + coarse
-        values |= over("design", looked_at=looked_at, coarse_design=coarse)
+        values |= over("design", looked_at=looked_at)
         low, high = ([p.number(p.ends[k]) for p in free] for k in range(2))
         choices = [", ".join(map(str, p.choices)) for p in free]
         names = {"parameter": [p.name for p in free]}
@@ -317,15 +314,6 @@ class Search(Reported):
         lacks = [Estimate(math.nan)] * len(self.goals)
         pairs = [each.objectives or lacks for each in designs]
         return np.array(pairs, float).reshape(len(designs), len(self.goals), 2)
-
-    def _repr_html_(self) -> str:
-        from softreach.arm.skin import arm_card
-
-        try:
-            card = arm_card(self.arm, self.arm.base)
-        except SoftreachError:  # no arm can exist
-            card = ""
-        return card + super()._repr_html_()
 
 
 def check_folder(folder: Path, *, overwrite: bool) -> None:

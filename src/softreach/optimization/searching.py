@@ -79,9 +79,9 @@ def search(
         polish: Whether designs are polished, where objectives have derivatives.
         sampler: Of Optuna: "cma", "tpe", "nsga2", "nsga3", "sobol", "random"; "auto" chooses.
         seed: Of the first designs and of the sampler; the number of threads changes no result.
-        storage: File in which every design is kept, a journal or by its suffix `.db` SQLite: the
-            same call goes on where it was interrupted, and ends as if it had not been. Searches of
-            other seeds may share it, and each ends with the best of all.
+        storage: Journal in which every design is kept: the same call goes on where it was
+            interrupted, and ends as if it had not been. Searches of other seeds may share it, and
+            each ends with the best of all.
         follow: Called with each `Candidate` that was judged in this call.
         progress: Called with the number of designs since its last call.
 

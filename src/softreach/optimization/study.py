@@ -4,7 +4,7 @@ import json
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -205,11 +205,8 @@ def _storage(place: str) -> Any:
     if not path.parent.is_dir() or (path.exists() and not path.is_file()):
         raise InvalidInput("storage", place, "a file in a folder that exists")
     is_new = not path.exists() or not path.stat().st_size
-    is_database = path.suffix in (".db", ".sqlite", ".sqlite3")
-    if not is_new and not _is_of_a_search(path, is_database=is_database):
+    if not is_new and not _is_of_a_search(path):
         raise InvalidInput("storage", place, "a new file, or that of a search: choose another name")
-    if is_database:
-        return f"sqlite:///{path}"
     from optuna.storages import JournalStorage
     from optuna.storages.journal import JournalFileBackend, JournalFileSymlinkLock
 
@@ -224,17 +221,9 @@ def _storage(place: str) -> Any:
     return JournalStorage(JournalFileBackend(str(path)))
 
 
-def _is_of_a_search(path: Path, *, is_database: bool) -> bool:
-    import sqlite3
-
-    with suppress(sqlite3.Error, ValueError, KeyError, TypeError):
-        if is_database:
-            place = f"{path.absolute().as_uri()}?mode=ro"
-            with closing(sqlite3.connect(place, uri=True)) as database:
-                names = database.execute("SELECT study_name FROM studies").fetchall()
-            return set(names) <= {(_NAME,)}
-        with path.open("rb") as file:
-            first = json.loads(file.readline(4096))
+def _is_of_a_search(path: Path) -> bool:
+    with suppress(ValueError, KeyError, TypeError), path.open("rb") as file:
+        first = json.loads(file.readline(4096))
         return first["op_code"] == 0 and first["study_name"] == _NAME
     return False
 

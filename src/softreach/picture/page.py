@@ -15,13 +15,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.picture.projection import VIEWS, View, view_angles
-from softreach.picture.thumbnail import Dots, Skin
 from softreach.support.arrays import Array
+from softreach.support.palette import Color
 from softreach.support.units import LengthUnit
 
 _STEPS = 65535
 _HEIGHT = 560  # pixels, in notebooks
 _BUTTONS = "front", "side", "top", "oblique"
+
+
+class Skin(NamedTuple):
+    """A lit surface."""
+
+    vertices: ArrayLike  # Shape (v, 3)
+    faces: ArrayLike  # Shape (f, 3)
+    color: Color
+
+
+class Dots(NamedTuple):
+    """Points."""
+
+    points: ArrayLike  # Shape (n, 3)
+    colors: ArrayLike = (64, 100, 150)  # RGB from 0 to 255, shape (n, 3) or (3,)
 
 
 class PagePart(NamedTuple):

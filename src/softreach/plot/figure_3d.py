@@ -12,9 +12,17 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import arm_surface, bundle_skins, inside, marker_points
 from softreach.cloud.clouds import design_of
 from softreach.geometry.surface import compact_surface, simplified, tube_surface
-from softreach.picture.page import ColorScale, Figure3D, PagePart, Swatches, css_color, web_page
+from softreach.picture.page import (
+    ColorScale,
+    Dots,
+    Figure3D,
+    PagePart,
+    Skin,
+    Swatches,
+    css_color,
+    web_page,
+)
 from softreach.picture.projection import View, view_angles
-from softreach.picture.thumbnail import Dots, Skin
 from softreach.plot.arm import shapes_of
 from softreach.plot.axes import bounding_box
 from softreach.plot.coloring import BundleKey, ScalarKey, color_map, color_samples, key_entries

@@ -162,9 +162,9 @@ def _draw_input(ax: Axes, shown: _Errors, k: int) -> None:
 def plot_search(search: Any, *, unit: Unit = None) -> Figure:
     """Draw what a search came to: designs that were judged, and the best in their ranges.
 
-    Of one objective, its value against the designs that were looked at, with the best so far, and
-    values on coarse sets against those of full accuracy. Of two, designs and the front; of more,
-    the front as lines over all of them. Designs that miss requirements are crosses.
+    Of one objective, its value against the designs that were looked at, with the best so far. Of
+    two, designs and the front; of more, the front as lines over all of them. Beside it, how far
+    designs miss requirements, if some do: they are crosses.
 
     Args:
         search: What `search` returned.
@@ -182,12 +182,11 @@ def plot_search(search: Any, *, unit: Unit = None) -> Figure:
     with style.figure_style():
         figure = style.new_figure(figsize=(_WIDTH, _ABOVE + below), layout="constrained")
         grid = figure.add_gridspec(2, 2, height_ratios=[_ABOVE, below], width_ratios=[1.6, 1.0])
-        beside = goals == 1 or bool(goals and shown.missed.any())
+        beside = bool(goals and shown.missed.any())
         draw = (_draw_missed, _draw_progress, _draw_front, _draw_objectives)[min(goals, 3)]
         draw(figure.add_subplot(grid[0, 0] if beside else grid[0, :]), shown)
         if beside:
-            other = _draw_fidelities if goals == 1 else _draw_missed
-            other(figure.add_subplot(grid[0, 1]), shown)
+            _draw_missed(figure.add_subplot(grid[0, 1]), shown)
         _draw_ranges(figure.add_subplot(grid[1, :]), shown)
     return figure
 
@@ -233,25 +232,6 @@ def _draw_progress(ax: Axes, shown: _Designs) -> None:
     shown.mark(ax, shown.missed, 0.0 * at, label="requirements missed", **edge, **_OUT)
     ax.set(xlabel="designs looked at", ylabel=shown.labels[0])
     style.legend_above(ax, 4, handletextpad=0.3)
-
-
-def _draw_fidelities(ax: Axes, shown: _Designs) -> None:
-    rows = np.flatnonzero(shown.final & shown.feasible)
-    before = shown.data["coarse_design"].values[rows]
-    rows, before = rows[before >= 0], before[before >= 0]
-    known = np.isfinite(shown.values[before, 0])
-    if not known.any():
-        ax.set_axis_off()
-        return
-    rows, before = rows[known], before[known]
-    coarse, full = shown.values[before, 0], shown.values[rows, 0]
-    bars = {**_BARS, "ecolor": "0.5", "elinewidth": 0.7, "capsize": 2, "zorder": 2}
-    ax.errorbar(coarse, full, shown.errors[rows, 0], shown.errors[before, 0], **bars)
-    ax.scatter(coarse, full, **_FINAL)
-    ax.axline((full[0], full[0]), slope=1.0, color="0.7", lw=0.7, zorder=1)
-    ax.set(xlabel=fill(f"{shown.labels[0]}, coarse", 2 * _LETTERS // 3), ylabel="full accuracy")
-    style.remark(ax, "the best, judged again")
-    ax.locator_params(nbins=4)
 
 
 def _draw_front(ax: Axes, shown: _Designs) -> None:

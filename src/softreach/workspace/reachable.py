@@ -14,7 +14,7 @@ from softreach.geometry.surface import Surface, without_flakes
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arrays import Array, Mask, as_points
-from softreach.support.errors import MissingExtra, NotPossible, counted
+from softreach.support.errors import NotPossible, counted
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.workspace.cells import Covering, ReachedCells, cells_of
@@ -399,17 +399,6 @@ class ReachableSet:
         if unit == "1":
             return quantity(100 * value, "%", 100 * error)
         return quantity(value, unit.translate(_POWERS), error)
-
-    def _repr_html_(self) -> str:
-        from softreach.picture import Dots, Skin, html_card
-
-        if self.mesh is not None and self.dimension < 2:
-            return html_card(repr(self), Dots(self.mesh.vertices))
-        try:
-            return html_card(repr(self), Skin(self.surface().vertices, self.surface().faces))
-        except MissingExtra:  # cells instead of a surface
-            cells = np.argwhere(self.image.counts[0] > 0)
-            return html_card(repr(self), Dots(self.image.lattice.places(cells)))
 
     @property
     def _several(self) -> float:
