@@ -87,7 +87,7 @@ def test_importing_and_helping_load_no_heavy_library(code):
 
 class TestDesign:
     def test_what_is_printed_follows_from_the_design(self, printed):
-        facts = printed("design", "minimal_trunk", "--taper-deg", "3")
+        facts = printed("design", "minimal_trunk", "--set", "taper=3deg")
         arm = sr.designs.minimal_trunk(taper=np.radians(3))
         known = describe(arm)
         assert facts["bundles"] == 3
@@ -134,7 +134,9 @@ class TestDesign:
         assert ("L) within the bounds" in err) == said
 
     def test_a_saved_design_is_the_varied_one(self, folder, printed):
-        assert run(["design", "redundant_trunk", "--revolution-deg", "60", "--out", "a.toml"]) == 0
+        assert (
+            run(["design", "redundant_trunk", "--set", "revolution_deg=60", "--out", "a.toml"]) == 0
+        )
         assert sr.Manipulator.load("a.toml") == changed(
             sr.designs.redundant_trunk(), {"revolution": np.radians(60)}
         )
@@ -145,7 +147,7 @@ class TestDesign:
 class TestCloud:
     def test_the_cloud_on_disk_is_that_of_the_library(self, folder, printed):
         options = ["--n", "512", "--seed", "3", "--sampler", "sobol", "--out", "a.zarr"]
-        facts = printed("cloud", "minimal_trunk", *options, "--taper-deg", "1")
+        facts = printed("cloud", "minimal_trunk", *options, "--set", "taper_deg=1")
         arm = changed(sr.designs.minimal_trunk(), {"taper": np.radians(1)})
         cloud = sr.open_cloud("a.zarr")
         assert cloud.identical(sr.compute_cloud(arm, 512, seed=3, sampler="sobol"))
@@ -358,7 +360,7 @@ def test_options_change_the_loads_that_a_design_has(folder):
             {"length": 0.8, "left.offset": math.radians(30)},
         ),
         (
-            ["--set", "left.lower=-2", "--taper-deg", "1"],
+            ["--set", "left.lower=-2", "--set", "taper_deg=1"],
             {"left.lower": -2, "taper": math.radians(1)},
         ),
     ],

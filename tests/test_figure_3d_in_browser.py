@@ -33,14 +33,12 @@ def test_a_page_is_drawn_and_turns_and_zooms_without_a_network(trunk, browser, t
 
     page.goto((tmp_path / "trunk.html").as_uri())
     first = drawn("0")
-    bar = page.locator("#bar").inner_text()
     page.mouse.move(320, 200)
     page.mouse.down()
     page.mouse.move(420, 170, steps=2)
     page.mouse.up()
     turned = drawn("0")
     page.mouse.wheel(0, -600)
-    page.wait_for_function(f"document.getElementById('bar').innerText !== {bar!r}")
     nearer = drawn("0")
     page.get_by_label("cloud").uncheck()
     alone = drawn("0")
@@ -50,6 +48,5 @@ def test_a_page_is_drawn_and_turns_and_zooms_without_a_network(trunk, browser, t
     assert np.abs(turned - first).max(axis=-1).mean() > 0.02
     assert colored(nearer) > 1.3 * colored(turned)
     assert 100 < colored(alone) < 0.5 * colored(nearer)
-    assert bar.endswith("mm")
     assert len(requests) == 1
     assert [text for text in trouble if "GL Driver Message" not in text] == []  # of the machine

@@ -23,7 +23,7 @@ from softreach.arm import (
     Samples,
     Section,
 )
-from softreach.arm.lines import limit_shortening, line_lengths, line_strains
+from softreach.arm.lines import line_lengths, line_strains
 from softreach.arm.parameters import changed, parameters
 from softreach.arm.part import AlongArm
 from softreach.support.errors import InvalidDesign
@@ -158,19 +158,6 @@ def test_a_longitudinal_fiber_shortens_by_less_than_its_activation(trunk):
     assert (strain[:, 0] > trunk.bounds[:, 0]).all()
     assert (strain[:, 0] < 0).all()
     assert strain[:, 1] == pytest.approx(0.0, abs=1e-12)
-
-
-def test_no_bundle_shortens_by_more_than_the_limit_and_one_that_does_not_reach_it_is_as_it_was(
-    trunk,
-):
-    arm = trunk.with_bounds([(-1.6, 0.2), (-0.2, 0.1), (-1.0, 0.0)])
-    limited = limit_shortening(arm, 0.15)
-    assert line_strains(limited)[[0, 2], 0] == pytest.approx(-0.15, abs=1e-9)
-    np.testing.assert_array_equal(limited.bounds[1], arm.bounds[1])
-    np.testing.assert_array_equal(limited.bounds[:, 1], arm.bounds[:, 1])
-    assert limit_shortening(limited, 0.15) == limited
-    with pytest.raises(sr.InvalidInput, match="most = 2"):
-        limit_shortening(arm, 2)
 
 
 @pytest.mark.parametrize("loads", [None, sr.Loads(payload=0.1, tip_force=(0.2, 0, 0))])

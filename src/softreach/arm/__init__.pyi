@@ -13,7 +13,6 @@ from .actuators.fiber import RingIntegrals as RingIntegrals
 from .base import Base as Base
 from .body import RestShape as RestShape
 from .drives import Drive as Drive
-from .lines import limit_shortening as limit_shortening
 from .lines import line_lengths as line_lengths
 from .loads import Loads as Loads
 from .loads import PointLoad as PointLoad

@@ -35,8 +35,7 @@ from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledT
 from softreach.arm.section import Material, Measured, Ring, Section
 from softreach.arm.stations import Marker, RigidPiece, Stations
 from softreach.geometry.region_tables import region_line
-from softreach.support import plugins
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
+from softreach.support.errors import Fault, InvalidDesign, Range
 from softreach.support.files.formats import FileFormat, Formats
 from softreach.support.files.toml import inline_table, key_text, value_text
 
@@ -73,7 +72,6 @@ TABLES: Mapping[str, type] = {
 }
 """Other parts that tables describe."""
 
-_GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
 
@@ -156,29 +154,6 @@ def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
         if kind.__module__.partition(".")[0] != "softreach"
         and not getattr(kind, "__abstractmethods__", ())
     }
-
-
-def own_kind(of: type[Kind], name: str) -> type[Kind] | None:
-    """The kind of this name that is not softreach's, from an installed package if need be."""
-    entries = plugins.declared(_GROUPS[of])
-    if name not in own_kinds(of) and name in entries:
-        plugins.loaded(entries[name])
-    return own_kinds(of).get(name)
-
-
-def every_kind(of: type[Kind]) -> dict[str, type[Kind]]:
-    """All kinds, those of installed packages imported; warns of what they do not have."""
-    for name in plugins.declared(_GROUPS[of]):
-        try:
-            own_kind(of, name)
-        except InvalidInput as error:  # the others can be used
-            warn(str(error))
-    return {**KINDS[of], **own_kinds(of)}
-
-
-def known_kinds(of: type[Kind]) -> list[str]:
-    """Names of the kinds that are not softreach's, of installed packages without an import."""
-    return [*dict.fromkeys([*own_kinds(of), *plugins.declared(_GROUPS[of])])]
 
 
 @cache

@@ -22,9 +22,8 @@ from softreach.arm.design_file import (
     field_keys,
     in_file_terms,
     keys_of,
-    known_kinds,
     one_a_path,
-    own_kind,
+    own_kinds,
     radians,
 )
 from softreach.arm.loads import Loads, PointLoad
@@ -140,7 +139,7 @@ class _Reader(FaultReader):
         named = raw.get("kind", "linear" if kind is Profile else None)
         if isinstance(named, str) and named in KINDS[kind]:
             return self._part(KINDS[kind][named], raw, path)
-        own = own_kind(kind, named) if isinstance(named, str) else None
+        own = own_kinds(kind).get(named) if isinstance(named, str) else None
         if own is None:
             return self._refuse(f"{path}.kind", named, _kinds_text(kind, named))
         # A class outside softreach: fields as they are in Python, in SI units.
@@ -328,7 +327,7 @@ def _kinds_text(of: type[Kind], kind: Any) -> str:
     names = {part.__name__: name for name, part in known.items()}
     if isinstance(kind, str) and kind in names:
         return f'must be the kind of a file; did you mean "{names[kind]}"?'
-    own = known_kinds(of)
+    own = own_kinds(of)
     others = "or a class of your own that is imported, on the command line by --import"
     hint = did_you_mean(kind, [*known, *own]) if isinstance(kind, str) else ""
     return f"must be one of {', '.join([*known, *own])}, {others}{f'; {hint}' if hint else ''}"

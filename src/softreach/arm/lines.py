@@ -15,13 +15,9 @@ from softreach.arm.guides import Guides, has_guides
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.section import turned
 from softreach.arm.tables import quadrature, tables
-from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, as_rows
-from softreach.support.errors import Range
 
 _STEP = 1e-5  # of a piece, for derivatives along the arm
-_HALVINGS = 52
-
 _SECTIONS = 64
 _REPETITIONS = 40  # of a fixed point, whose first step is off by about a tenth of its change
 _SETTLED = 1e-5  # of an angle over L, in a step
@@ -83,37 +79,11 @@ def _tangents(
 
 def line_strains(arm: Manipulator) -> Array:
     """Least and largest strain of each bundle's line [-] by its own activation, (bundle, 2)."""
-    return np.sort(_strains_at(arm, arm.bounds), axis=1)
-
-
-def limit_shortening(arm: Manipulator, most: float) -> Manipulator:
-    """The arm with bounds under which no bundle shortens its line by more than a share of it.
-
-    That holds for each bundle alone, while the others are not activated. Each bound that shortens
-    too far moves toward zero.
-
-    Args:
-        arm: The design, whose bounds hold zero.
-        most: Largest shortening [-], such as 0.3.
-
-    Raises:
-        InvalidInput: Not between 0 and 1.
-    """
-    most = as_number("most", most, Range(0.0, 1.0))
-    bounds = a_manipulator("arm", arm).bounds
-    kept, refused = np.zeros_like(bounds), bounds
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (kept + refused)
-        fits = _strains_at(arm, middle) >= -most
-        kept, refused = np.where(fits, middle, kept), np.where(fits, refused, middle)
-    return arm.with_bounds(np.where(_strains_at(arm, bounds) >= -most, bounds, kept))
-
-
-def _strains_at(arm: Manipulator, ends: Array) -> Array:
-    arm, count = arm.replace(drives=()), arm.bundles
-    alone = np.concatenate([np.zeros((1, count)), np.diag(ends[:, 0]), np.diag(ends[:, 1])])
-    lengths = line_lengths(arm, alone)
-    return (lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0).T
+    ends, count, alone = arm.bounds, arm.bundles, arm.replace(drives=())
+    gamma = np.concatenate([np.zeros((1, count)), np.diag(ends[:, 0]), np.diag(ends[:, 1])])
+    lengths = line_lengths(alone, gamma)
+    each = lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0
+    return np.sort(each.T, axis=1)
 
 
 def _places(arm: Manipulator, z: Array) -> Array:

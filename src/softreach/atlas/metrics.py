@@ -25,7 +25,7 @@ from softreach.sampling import sample_cube
 from softreach.support import plugins
 from softreach.support.arguments import as_function, as_given, as_instance, as_text
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput, SoftreachError, warn
+from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.workspace import reachable_set
 
 PROFILE = ("station", "quantile")
@@ -172,36 +172,17 @@ def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
     if isinstance(choice, str):
         if choice in METRIC_GROUPS:
             return METRIC_GROUPS[choice]
-        if choice in (known := _imported_metrics()):
+        if choice in (known := own_metrics()):
             return (known[choice],)
-        if choice in plugins.declared(plugins.METRICS):
-            return (_declared_metric(choice),)
     hint = "the command line imports those by --import"
     raise InvalidInput("metrics", as_given(choice), _ALLOWED, hint)
 
 
 def own_metrics() -> dict[str, Metric]:
-    """Metrics that are not softreach's: of modules that the user named, or declared for it."""
-    own = _imported_metrics()
-    for name in plugins.declared(plugins.METRICS).keys() - own.keys():
-        try:
-            own[name] = _declared_metric(name)
-        except InvalidInput as error:  # the others can be used
-            warn(str(error))
-    return own
-
-
-def _imported_metrics() -> dict[str, Metric]:
+    """Metrics of modules that the user named on the command line."""
     known = (value for module in plugins.imported() for value in vars(module).values())
     metrics = (value for value in known if isinstance(value, Metric))
     return {m.name: m for m in metrics if _KNOWN.get(m.name) != m}
-
-
-def _declared_metric(name: str) -> Metric:
-    entry = plugins.declared(plugins.METRICS)[name]
-    if isinstance(metric := plugins.loaded(entry), Metric):
-        return metric
-    raise InvalidInput(f"entry point {name}", entry.value, "a Metric")
 
 
 def _extreme(find: Callable[[Array], float], axis: int, tips: Array) -> float:

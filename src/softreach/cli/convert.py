@@ -29,7 +29,7 @@ def design(
     --verbose adds where the linear law of each kind of actuator ends. With --out,
     --unit is written into the design file.
 
-    Example: softreach design minimal_trunk --taper-deg 3
+    Example: softreach design minimal_trunk --set taper=3deg
 
     Args:
         out: Write the design to this TOML file.

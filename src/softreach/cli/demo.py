@@ -139,9 +139,9 @@ def listing(
 
     The parameters of a design have the names that --set and --vary take. A dash means
     that a parameter has no single value: it is left out, or varies along the arm or
-    between parts. It can be set all the same. Actuators and metrics of your
-    own are listed with --import, or if a package declares them. Metrics of an
-    atlas that are single numbers can be objectives of a search too.
+    between parts. It can be set all the same. Actuators and metrics of your own
+    are listed with --import. Metrics of an atlas that are single numbers can be
+    objectives of a search too.
 
     Example: softreach list parameters minimal_trunk
 
@@ -189,10 +189,11 @@ def _materials() -> Table:
 
 
 def _actuators() -> Table:
-    from softreach.arm.design_file import every_kind
+    from softreach.arm.design_file import KINDS, own_kinds
 
     yield "kind", "activation", "unit", "module", "description"
-    for name, kind in every_kind(sr.arm.Actuator).items():
+    kinds = {**KINDS[sr.arm.Actuator], **own_kinds(sr.arm.Actuator)}
+    for name, kind in kinds.items():
         yield name, kind.activation, kind.unit, kind.__module__, _summary(kind)
 
 

@@ -5,7 +5,7 @@ The design that a command works on is among them, and the options that change it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -143,8 +143,6 @@ class Changes:
 
     Attributes:
         base: The way the arm points: up (upright), down (hanging), x, -x, y or -y.
-        revolution_deg: Revolution of every helical fiber; each keeps its handedness.
-        taper_deg: Taper angle.
         payload: Mass at the tip with its unit: 200g.
         gravity: down, up, sideways, none, or x,y,z [m/s²]; default down if there are loads.
         tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5
@@ -153,8 +151,6 @@ class Changes:
     """
 
     base: Signed = None
-    revolution_deg: Number | None = None
-    taper_deg: Number | None = None
     payload: Signed = None
     gravity: Signed = None
     tip_force: Signed = None
@@ -177,13 +173,12 @@ class Changes:
             words = _POSTURES | {points: points for points in POINTS}
             points = words[as_one_of("base", self.base, words)]
             arm = arm.replace(base=arm.base.replace(points=points))
-        texts, given = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg"), self.given
+        texts = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg")
         of_loads = {name: texts.pop(name) for name in [*texts] if name.startswith("loads.")}
-        angles = [(name, given[name]) for name in ("revolution_deg", "taper_deg") if name in given]
-        arm = changed(arm, _values(arm, [*angles, *texts.items()]))
-        if of_loads or {"payload", "gravity", "tip_force"} & given.keys():
+        arm = changed(arm, _values(arm, texts))
+        if of_loads or {"payload", "gravity", "tip_force"} & self.given.keys():
             arm = self._loaded(arm, keep=bool(of_loads))
-            arm = changed(arm, _values(arm, [*of_loads.items()]))
+            arm = changed(arm, _values(arm, of_loads))
         return arm.at_point(self.point)
 
     def _loaded(self, arm: sr.Manipulator, *, keep: bool) -> sr.Manipulator:
@@ -285,12 +280,12 @@ def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, .
     return read_as(name, text.rstrip(), read, allowed)
 
 
-def _values(arm: sr.Manipulator, written: Sequence[tuple[str, object]]) -> dict[str, float]:
+def _values(arm: sr.Manipulator, written: Mapping[str, str]) -> dict[str, float]:
     from softreach.arm.parameters import Written, find_parameter
 
     values: dict[str, float] = {}
     names = Written.of(arm) if written else Written({})
-    for key, value in written:
+    for key, value in written.items():
         name = key if key in names.by_key else find_parameter(arm, key).name
         own = names.by_key[name].name
         if own in values:

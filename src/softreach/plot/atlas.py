@@ -1,6 +1,5 @@
 """Figures of an atlas: maps of its metrics, and sheets with a picture of each design."""
 
-import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -303,7 +302,10 @@ def plot_metric_map(atlas: Dataset, metric: str, *, ax: Axes | None = None) -> A
             filled = ax.pcolormesh(_edges(across), _edges(up), shown, cmap=coloring.COLORMAP)
         else:
             filled = ax.contourf(across.values, up.values, shown, 14, cmap=coloring.COLORMAP)
-            _contour(ax, across, up, shown, np.asarray(filled.levels))
+            levels = np.asarray(filled.levels)[::2]
+            ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(len(levels))]
+            lines = ax.contour(across.values, up.values, shown, levels, colors=ink, linewidths=0.5)
+            ax.clabel(lines, fontsize=6, fmt="%g")
         if np.isfinite(values).any():
             _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         relative = _RELATIVE.get(atlas[metric].attrs.get("units", "1"), "")
@@ -331,23 +333,6 @@ def _edges(axis: SheetAxis) -> Array:
         return values + [-0.5, 0.5]
     middle = (values[1:] + values[:-1]) / 2
     return np.array([2 * values[0] - middle[0], *middle, 2 * values[-1] - middle[-1]])
-
-
-def _contour(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array) -> None:
-    ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(0, len(levels), 2)]
-    lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
-    low = np.array([across.values[0], up.values[0]])
-    span = np.array([across.values[-1], up.values[-1]]) - low
-    places = []
-    for line in lines.get_paths():
-        path = (np.asarray(line.vertices, float) - low) / span
-        inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]  # far from every edge
-        if len(inside):
-            distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
-            places.append(low + span * inside[distance.argmin()])
-    if places:
-        decimals = max(0, math.ceil(-math.log10(levels[1] - levels[0])))
-        ax.clabel(lines, manual=places, fontsize=6, fmt=f"%.{decimals}f")
 
 
 def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smallest: bool) -> None:

@@ -1,8 +1,7 @@
 """Picture of a cross-section: its layers by material, its bundles in their colors, their key."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ _EDGE, _HATCH = "0.4", "0.55"
 _STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
 _LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
 _LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
-_OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
 
 
 def plot_cross_section(
@@ -39,11 +37,11 @@ def plot_cross_section(
 ) -> Axes:
     """Draw the cross-section at Z, seen from the tip (figure 1c): layers, and the bundles that act.
 
-    Fibers and muscles fill a sector of their ring; strokes show radial and oblique ones. Where
-    sectors overlap, the lower shows in stripes. Tendons are dots, dotted circles the disks that
-    hold those outside of the arm; chambers are round. What does not act at Z is left out. A body
-    with two measured bending stiffnesses, K1 and K2, that holds tendons at most is an ellipse whose
-    widths are as √K2 to √K1, as those of a flat strip are; the wider one is 2 R2.
+    Fibers and muscles fill a sector of their ring; strokes show radial and oblique ones. Tendons
+    are dots, dotted circles the disks that hold those outside of the arm; chambers are round. What
+    does not act at Z is left out. A body with two measured bending stiffnesses, K1 and K2, that
+    holds tendons at most is an ellipse whose widths are as √K2 to √K1, as those of a flat strip
+    are; the wider one is 2 R2.
 
     Args:
         arm: The design, at rest.
@@ -228,16 +226,6 @@ class _Placed:
         ends, width = (center - extent / 2, center + extent / 2), self.outer - self.inner
         return Wedge((0, 0), self.outer, *ends, width=width, **style)
 
-    def overlaps(self, other: "_Placed") -> Iterator["_Placed"]:
-        inner, outer = max(self.inner, other.inner), min(self.outer, other.outer)
-        apart = (other.center - self.center + np.pi) % (2 * np.pi) - np.pi
-        for turn in (apart - 2 * np.pi, apart, apart + 2 * np.pi):
-            low = max(-self.extent / 2, turn - other.extent / 2)
-            high = min(self.extent / 2, turn + other.extent / 2)
-            if outer - inner > _OVERLAP * outer and high - low > _OVERLAP:
-                middle, extent = self.center + 0.5 * (low + high), high - low
-                yield replace(self, center=middle, extent=extent, inner=inner, outer=outer)
-
     def strokes(self) -> Any:
         """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
         from matplotlib.collections import LineCollection
@@ -270,12 +258,6 @@ def _draw_bundles(ax: Axes, placed: Collection[_Placed], outer: float) -> None:
     sectors, lumens, lines = ([x for x in placed if x.shape == kind] for kind in kinds)
     for bundle in sectors:
         ax.add_patch(bundle.sector(linewidth=0, **bundle.style))
-    for below, above in combinations(sectors, 2):
-        for part in below.overlaps(above):
-            look = {"facecolor": "none", "edgecolor": bundle_color(part.index), "linewidth": 0.0}
-            stripes = part.sector(hatch="//////", **look)
-            stripes.set_hatch_linewidth(1.2)
-            ax.add_patch(stripes)
     for bundle in sectors:
         if bundle.course != "along":
             ax.add_collection(bundle.strokes())

@@ -1,4 +1,4 @@
-"""Code of the user: modules that the command line names, and what installed packages declare.
+"""Code of the user: modules that the command line names.
 
 Nothing else runs code: design files and stores name kinds and metrics, never modules.
 """
@@ -6,18 +6,13 @@ Nothing else runs code: design files and stores name kinds and metrics, never mo
 import importlib
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 import softreach
 from softreach.support.errors import InvalidInput
-
-# Groups of entry points: the name of a class, or of a metric, and where it is.
-ACTUATORS, PROFILES, METRICS = "softreach.actuators", "softreach.profiles", "softreach.metrics"
 
 _imported: list[ModuleType] = []
 
@@ -35,37 +30,15 @@ def importing(names: Iterable[str]) -> Iterator[None]:
 
 
 def _import(name: str) -> ModuleType:
+    """The module; an error of the user's code is refused with its line."""
     path = Path(name).resolve() if name.endswith(".py") else None
     if path is not None:
         if not path.is_file():
             raise InvalidInput("import", name, "the path of a .py file that exists")
         sys.path.append(str(path.parent))
     importlib.invalidate_caches()
-    module = _tried("import", name, lambda: importlib.import_module(path.stem if path else name))
-    if path is not None and Path(module.__file__ or "").resolve() != path:
-        raise InvalidInput("import", name, "a file whose name no other module has")
-    return module
-
-
-def imported() -> tuple[ModuleType, ...]:
-    """Modules that the user named, in their order."""
-    return tuple(_imported)
-
-
-def declared(group: str) -> dict[str, EntryPoint]:
-    """Entry points of installed packages in a group, by name; none is imported."""
-    return {entry.name: entry for entry in entry_points(group=group)}
-
-
-def loaded(entry: EntryPoint) -> Any:
-    """Object behind an entry point of an installed package."""
-    return _tried(f"entry point {entry.name}", entry.value, entry.load)
-
-
-def _tried(name: str, value: str, load: Callable[[], Any]) -> Any:
-    """What is loaded; an error of the user's code is refused with its line."""
     try:
-        return load()
+        module = importlib.import_module(path.stem if path else name)
     except (Exception, SystemExit) as error:
         files = (softreach.__file__, importlib.__file__)
         others = ("<", *(str(Path(file).parent) for file in files))
@@ -74,4 +47,12 @@ def _tried(name: str, value: str, load: Callable[[], Any]) -> Any:
         place = f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
         said = f"{type(error).__name__}: {' '.join(str(error).split())}".removesuffix(": ")
         allowed = "a module that can be imported"
-        raise InvalidInput(name, value or "''", allowed, said + place) from error
+        raise InvalidInput("import", name or "''", allowed, said + place) from error
+    if path is not None and Path(module.__file__ or "").resolve() != path:
+        raise InvalidInput("import", name, "a file whose name no other module has")
+    return module
+
+
+def imported() -> tuple[ModuleType, ...]:
+    """Modules that the user named, in their order."""
+    return tuple(_imported)
