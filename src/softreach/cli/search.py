@@ -8,17 +8,16 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from cyclopts import Group, Parameter
+from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import as_read, console, fields_of, for_machines
-from softreach.cli.options import UNCHANGED, Changes, Number, Whole, design_from, pairs_in, shown_in
+from softreach.cli.options import UNCHANGED, Changes, Number, Whole, design_from, shown_in
 from softreach.support import progress
 from softreach.support.files.text import read_text
 from softreach.support.units import to_degrees
 
-_ASKED = Group("Override the file", sort_key=1)
 _EXIT = {"met": 0, "missed": 1, "undecided": 3}  # verdict -> exit code; 2 is that of wrong input
 
 
@@ -79,17 +78,9 @@ def search(
     needs: Path,
     /,
     *,
-    design: Annotated[list[str] | None, Parameter(group=_ASKED)] = None,
-    point: Annotated[str | None, Parameter(group=_ASKED)] = None,
-    free: Annotated[list[str] | None, Parameter(group=_ASKED)] = None,
-    choice: Annotated[list[str] | None, Parameter(group=_ASKED)] = None,
-    maximize: Annotated[str | None, Parameter(group=_ASKED)] = None,
-    minimize: Annotated[str | None, Parameter(group=_ASKED)] = None,
-    designs: Annotated[Whole | None, Parameter(name=("--designs", "-n"), group=_ASKED)] = None,
-    seed: Annotated[Whole | None, Parameter(group=_ASKED)] = None,
-    accuracy: Annotated[Number | None, Parameter(group=_ASKED)] = None,
-    sampler: Annotated[str | None, Parameter(group=_ASKED)] = None,
-    polish: Annotated[bool | None, Parameter(negative="--no-polish", group=_ASKED)] = None,
+    point: str | None = None,
+    designs: Annotated[Whole | None, Parameter(name=("--designs", "-n"))] = None,
+    seed: Whole | None = None,
     storage: Path | None = None,
     out: options.Place = Path("best"),
     output: options.Output = options.DEFAULT,
@@ -100,22 +91,13 @@ def search(
     same command continues. The exit code is 0 if the best meets all requirements,
     1 if it misses one, and 3 if one is undecided.
 
-    Example: softreach search needs.toml --free taper_deg=0:3 --maximize exact_volume -o best
+    Example: softreach search needs.toml --seed 1 --out best
 
     Args:
         needs: Requirements (.toml), with a table [search].
-        design: Design file (.toml) or built-in design. Repeat to let the search choose.
         point: Marker that counts as the tip, such as that of a tool.
-        free: A free parameter, its range with units or a tie: taper_deg=0:3.2,
-            left.revolution=-1rad:1rad, right.revolution=-left.revolution. May be repeated.
-        choice: Values to choose from: bundles=3,4, length_m=0.3,0.4. May be repeated.
-        maximize: Objectives to make large, comma-separated; softreach list objectives has them.
-        minimize: Objectives to make small, comma-separated.
-        designs: Number of designs to look at: 200 if the file says nothing.
-        seed: Seed of the search.
-        accuracy: Relative error of volumes: 3e-3 if the file says nothing.
-        sampler: auto, cma, tpe, nsga2, nsga3, sobol or random.
-        polish: Improve designs by their derivatives.
+        designs: Number of designs to look at, instead of what the file says, or 200.
+        seed: Seed of the search, instead of what the file says.
         storage: Journal of all designs, to resume a search or to share it
             with other seeds. FOLDER/search.journal if left out.
         out: Folder for the designs, tables and report.
@@ -124,22 +106,10 @@ def search(
     from softreach.optimization.search_file import read_search
     from softreach.requirements.requirements import LONGEST
 
-    asked_for = {
-        "design": design,
-        "maximize": None if maximize is None else maximize.split(","),
-        "minimize": None if minimize is None else minimize.split(","),
-        "free": pairs_in("free", free, "NAME=LOW:HIGH, such as taper_deg=0:3.2") or None,
-        "choices": pairs_in("choice", choice, "NAME=VALUES, such as bundles=3,4") or None,
-        "polish": polish,
-        "designs": designs,
-        "seed": seed,
-        "accuracy": accuracy,
-        "sampler": sampler,
-    }
-    given = {name: value for name, value in asked_for.items() if value is not None}
-    text = read_text("requirements", needs, LONGEST)
+    text, given = read_text("requirements", needs, LONGEST), {"designs": designs, "seed": seed}
     designs_from = partial(design_from, changes=Changes(point=point))
-    asked = read_search(text, needs.parent, designs_from, source=str(needs), given=given)
+    asked = read_search(text, needs.parent, designs_from, str(needs))
+    asked |= {name: value for name, value in given.items() if value is not None}
     base = asked["base"]
     arm = shown_in(output.unit, next(iter(base.values())) if isinstance(base, Mapping) else base)
     check_folder(out, overwrite=output.overwrite)

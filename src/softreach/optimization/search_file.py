@@ -32,21 +32,18 @@ def read_search(
     text: str,
     folder: Path,
     design_from: Callable[[str], Manipulator],
-    *,
     source: str = "",
-    given: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Arguments of `search` from the text of a file: requirements and a table `[search]`.
 
-    docs/search.md explains the table. What is `given` by the same keys goes before it; paths in the
-    text start from `folder`. All faults are named at once, of the requirements too, in the words of
-    the file.
+    docs/search.md explains the table; paths in it start from `folder`. All faults are named at
+    once, of the requirements too, in the words of the file.
     """
     try:
         document = tables_of(text)
     except ValueError:
         document = {}  # for which the requirements are refused
-    reader = _Reader(document, given or {})
+    reader = _Reader(document)
     bases = reader.bases(folder, design_from)
     if bases:
         reader.parameters(bases)
@@ -59,26 +56,24 @@ def read_search(
         faults = error.faults
     options = reader.options(needs)
     if needs is None or reader.faults:
-        of_file = faults or any(fault.path.startswith("search") for fault in reader.faults)
-        raise InvalidDesign([*faults, *reader.faults], source if of_file else "")
+        raise InvalidDesign([*faults, *reader.faults], source)
     base = bases if len(bases) > 1 else next(iter(bases.values()))
     of_file = {"requirements": needs, "free": reader.free, "choices": reader.choices}
     return {"base": base, **of_file, **options}
 
 
 class _Reader(FaultReader):
-    def __init__(self, document: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+    def __init__(self, document: Mapping[str, Any]) -> None:
         super().__init__()
         self.free: dict[str, Any] = {}
         self.choices: dict[str, Any] = {}
-        self._given, self._raw = given, self._table(document, "search")
+        self._raw = self._table(document, "search")
         self._check_keys(self._raw, "search", _KEYS)
         self._raw |= {key: self._table(self._raw, key, "search.") for key in _TABLES}
 
     def bases(self, folder: Path, load: Callable[[str], Manipulator]) -> dict[str, Manipulator]:
         """Designs to vary by what they are called; none where none can be read."""
-        of_file = "design" not in self._given
-        path, value = self._value("design")
+        path, value = "search.design", self._raw.get("design")
         names = [value] if isinstance(value, str) else value
         if not isinstance(names, list | tuple) or not all(isinstance(x, str) for x in names):
             self._refuse(path, value, "must be a design file, a named design, or a list of these")
@@ -87,30 +82,26 @@ class _Reader(FaultReader):
             self._refuse(path, value, "must be different designs, one or more")
         bases = {}
         for name in names:
-            file = folder / name
-            place = str(file) if of_file and file.is_file() else name
+            place = str(folder / name) if (folder / name).is_file() else name
             bases[name] = self._tried(path, name, partial(load, place))
         return {name: arm for name, arm in bases.items() if arm is not WRONG}
 
     def parameters(self, bases: Mapping[str, Manipulator]) -> None:
         """Read choices, ranges and ties, each judged as `search` does."""
         self._bases = dict(bases)
-        for path, key, value in self._entries("choices"):
+        choices, ties = self._entries("choices"), []
+        for path, key, value in choices:
             if key in NAMED_CHOICES:
-                values = value.split(",") if isinstance(value, str) else value
-                if key == "bundles" and isinstance(value, str):
-                    values = [int(x) if x.strip().isdecimal() else x for x in values]
-                self._add(path, value, self.choices, key, values)
+                self._add(path, value, self.choices, key, value)
         names = Written(known_parameters(bases.values(), self.choices.get("bundles", ())))
-        for path, key, value in self._entries("choices", names):
+        for path, key, value in choices:
             if key not in NAMED_CHOICES:
-                self._add_numbers(path, value, self.choices, names, key, ",")
-        ties = []
-        for path, key, value in self._entries("free", names):
-            if key in names.by_key and isinstance(value, str) and ":" not in value:
+                self._add_numbers(path, value, self.choices, names, key)
+        for path, key, value in self._entries("free"):
+            if key in names.by_key and isinstance(value, str):
                 ties.append((path, value, self.free, names.by_key[key].name, value))
             else:
-                self._add_numbers(path, value, self.free, names, key, ":")
+                self._add_numbers(path, value, self.free, names, key)
         if not (self.free or self.choices or len(bases) > 1 or self.faults):
             allowed = "needs one parameter or more with a range, or choices: taper_deg = [0, 3]"
             self._refuse("search.free", None, allowed)
@@ -120,19 +111,19 @@ class _Reader(FaultReader):
     def options(self, needs: Requirements | None) -> dict[str, Any]:
         options: dict[str, Any] = {word: self._objectives(word) for word in _SENSES}
         for name, convert in _OPTIONS.items():
-            path, value = self._value(name)
-            if value is not None:
-                options[name] = self._tried(path, value, partial(convert, name, value))
+            if (value := self._raw.get(name)) is not None:
+                make = partial(convert, name, value)
+                options[name] = self._tried(f"search.{name}", value, make)
         if needs is not None and not self.faults:
             try:
                 goals(options["maximize"], options["minimize"], needs)
             except InvalidInput as error:
                 word = next((word for word in _SENSES if error.value in options[word]), "maximize")
-                self._refuse(self._value(word)[0], error.value, f"must be {error.allowed}")
+                self._refuse(f"search.{word}", error.value, f"must be {error.allowed}")
         return options
 
     def _objectives(self, word: str) -> list[str]:
-        path, value = self._value(word)
+        path, value = f"search.{word}", self._raw.get(word)
         names = [] if value is None else [value] if isinstance(value, str) else value
         if not isinstance(names, list | tuple):
             self._refuse(path, value, "must be an objective, or a list of them")
@@ -141,31 +132,19 @@ class _Reader(FaultReader):
             self._tried(path, name, partial(known_objective, word, name))
         return list(names)
 
-    def _value(self, key: str) -> tuple[str, Any]:
-        """A value and what errors call it."""
-        if key in self._given:
-            return key, self._given[key]
-        return f"search.{key}", self._raw.get(key)
-
-    def _entries(self, table: str, names: Written | None = None) -> Iterator[tuple[str, str, Any]]:
-        """Path in errors, key and value of a table; what was given goes before the file."""
-        given, known = self._given.get(table, {}), names.by_key if names else {}
-        said = {known[key].name if key in known else key for key in given}
-        for key, value in _flat_keys(self._raw[table]):
-            if (known[key].name if key in known else key) not in said:
-                yield f"search.{table}.{key}", key, value
-        for key, value in given.items():
-            yield f"{table} {key}", key, value
+    def _entries(self, table: str) -> list[tuple[str, str, Any]]:
+        """Path in errors, key and value of each row of a table."""
+        rows = _flat_keys(self._raw[table])
+        return [(f"search.{table}.{key}", key, value) for key, value in rows]
 
     def _add_numbers(
-        self, path: str, given: Any, table: dict[str, Any], names: Written, key: str, mark: str
+        self, path: str, values: Any, table: dict[str, Any], names: Written, key: str
     ) -> Any:
         if key not in names.by_key:
             hint = did_you_mean(key, names.by_key, 0.5)
             allowed = unknown_parameter(key, names.written).allowed
             text = f"is not a parameter; {hint or f'must be {allowed}'}"
             return self._refuse(path, None, text)
-        values = given.split(mark) if isinstance(given, str) else given
         if not isinstance(values, list | tuple):
             return self._refuse(path, values, "must be a list of numbers")
         parameter, numbers = names.by_key[key], []
@@ -179,7 +158,7 @@ class _Reader(FaultReader):
         if wrong := [value for value in numbers if not allowed.admits(value)]:
             shown = allowed.in_degrees() if parameter.unit == "rad" else allowed
             return self._refuse(path, values[numbers.index(wrong[0])], f"must be {shown.text}")
-        return self._add(path, given, table, parameter.name, tuple(numbers))
+        return self._add(path, values, table, parameter.name, tuple(numbers))
 
     def _add(self, path: str, given: Any, table: dict[str, Any], name: str, value: Any) -> None:
         """Take the value of a parameter, the first of its name, if a search may have it."""
