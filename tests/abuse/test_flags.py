@@ -52,7 +52,7 @@ REFUSED = {
     # changes of a design
     "design lce_arm --payload 200": "payload = 200: must be a mass >= 0 with its unit (kg, g, mg)",
     "design lce_arm --gravity 0,0,-9.81N": "three finite numbers x,y,z in m/s²",
-    "design lce_arm --base=z": "must be one of upright, hanging, up, down, x, -x, y, -y",
+    "design lce_arm --base=z": "must be one of up, down, x, -x, y, -y",
     "design lce_arm --tip-force 1,2": "tip_force = 1,2: must be three finite numbers x,y,z in N",
     "design lce_arm --set taper": "set = taper: must be PATH=VALUE",
     "design lce_arm --set taper=3": "(deg, °, rad), or a number under taper_deg",
@@ -61,7 +61,6 @@ REFUSED = {
     "design lce_arm --set taper=1deg --set taper_deg=2": "set = taper_deg: must be given once",
     # options that would be ignored
     "volume a.zarr --n 5": f"--n {STORED}",
-    f"reach {TRUNK} --at 0,0,0.1": "--at has no effect without a picture: add --out slices.png",
     f"cloud {TRUNK} --n 1000 --sampler grid --seed 1": "--seed has no effect on the sampler grid",
     f"design {TRUNK} --overwrite": NOT_WRITTEN,
     f"solve {TRUNK} --target 0,0,1 --family 2": "--family has no effect with up to three",

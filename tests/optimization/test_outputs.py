@@ -67,7 +67,6 @@ def test_it_prints_objectives_with_units_and_parameters_in_their_ranges(one):
     assert re.search(r"largest mass +[\d.]+ kg", text)
     assert re.search(r"\n +revolution +[\d.]+°.* +0 to 103\.13°", text)
     assert re.search(r"\d+ by bounds alone", text)
-    assert "<pre>Search: " in one._repr_html_()
 
 
 def test_its_dataset_holds_all_designs_and_which_is_which(one):

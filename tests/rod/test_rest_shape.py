@@ -23,7 +23,7 @@ from softreach.stiffness import cloud_compliance, tip_compliance
 from softreach.support.errors import InvalidInput
 from tests.bodies import rubber
 from tests.kinds import KINDS, any_arms
-from tests.laws import arms, bases, in_box
+from tests.laws import arms, bases, in_box, rotvec
 
 STRAIGHT_POSE = np.zeros((1, 3))
 
@@ -187,7 +187,7 @@ def test_what_turns_or_mirrors_all_actuators_does_so_to_the_tips(kind, change):
 # A base pose: whatever a posed arm does is what the upright one does, seen from the world
 
 
-POSE = sr.Base(position=(0.3, -0.2, 1.5), points=(0.3, 1.1, -0.4), turn=0.7)
+POSE = sr.Base(position=(0.3, -0.2, 1.5), points=rotvec((0.3, 1.1, -0.4)), turn=0.7)
 
 
 @pytest.fixture

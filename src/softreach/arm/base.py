@@ -32,8 +32,7 @@ POINTS: Mapping[str, Matrix] = MappingProxyType(
 where it points along x. All numbers are exact."""
 
 _ALLOWED = (
-    f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z), "
-    "or a rotation vector (three numbers [rad])"
+    f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix or a quaternion (w, x, y, z)"
 )
 _NEAR = 1e-6  # Largest error of the numbers of a rotation: what is typed with seven digits
 
@@ -116,7 +115,7 @@ def _as_rotation(points: Any) -> Array | str:
     if isinstance(points, str):
         return np.array(POINTS[points]) if points in POINTS else _ALLOWED
     numbers = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)
-    if numbers.shape not in ((3,), (4,), (3, 3)) or not np.isfinite(numbers).all():
+    if numbers.shape not in ((4,), (3, 3)) or not np.isfinite(numbers).all():
         return _ALLOWED
     if numbers.ndim == 2:
         off = float(np.abs(numbers.T @ numbers - np.eye(3)).max())
@@ -126,14 +125,9 @@ def _as_rotation(points: Any) -> Array | str:
         left_handed = np.linalg.det(numbers) < 0
         return "must be a rotation; these axes are left-handed" if left_handed else numbers
     size = float(np.linalg.norm(numbers))
-    if len(numbers) == 4:
-        if abs(size - 1.0) > _NEAR:
-            return f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}"
-        return rotation_matrices(numbers / size)
-    if abs(size - 1.0) < _NEAR:  # (0, 0, -1) is meant to be down, and would be up, turned by 1 rad
-        why = "three numbers are a rotation vector [rad], and these look like a direction"
-        return f"must be a word or a rotation; {why}: say it by a matrix"
-    return _as_rotation([np.cos(0.5 * size), *(np.sinc(0.5 * size / np.pi) * 0.5 * numbers)])
+    if abs(size - 1.0) > _NEAR:
+        return f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}"
+    return rotation_matrices(numbers / size)
 
 
 def rotation_matrices(quaternions: Array) -> Array:

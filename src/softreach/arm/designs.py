@@ -37,7 +37,6 @@ def minimal_trunk(
     taper: float = math.radians(2),
     *,
     length: float = 1.0,
-    tip_radius: float | None = None,
     radius_ratio: float = 0.75,
     material: Material | str | None = None,
 ) -> Manipulator:
@@ -50,7 +49,6 @@ def minimal_trunk(
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
         taper: φ [rad].
         length: L [m].
-        tip_radius: R2(L) [m], which takes the place of the taper.
         radius_ratio: R1/R2 [-].
         material: Material of all of the arm, also by its name in the library; None for an
             incompressible one whose Young's modulus cancels.
@@ -66,8 +64,6 @@ def minimal_trunk(
     left = _fiber("left", 66, revolution=-revolution)
     right = _fiber("right", 114, revolution=revolution)
     profile = LinearTaper(length=length, outer_radius=length / 16, taper=taper)
-    if tip_radius is not None:
-        profile = profile.replace(tip_radius=tip_radius)
     ring = Ring(inner_ratio=radius_ratio, material=Material() if matter is None else matter)
     return _arm(profile, (left, right, _fiber("longitudinal", 270, helical_angle=0.0)), ring)
 

@@ -367,8 +367,6 @@ def doctor(*, json: options.AsJson = False) -> None:
     kept = str(getattr(cache, "cache_path", "nowhere: not compiled"))
     kept = f"nowhere: {not_kept[0]}" if not_kept else kept
     names = re.findall(r"^[\w.-]+", "\n".join(requires("softreach") or []), re.MULTILINE)
-    has_screen = platform.system() in ("Windows", "Darwin")
-    has_screen = has_screen or bool({"DISPLAY", "WAYLAND_DISPLAY"} & {*os.environ})
     named = {
         "softreach": sr.__version__,
         "installed in": str(Path(sr.__file__).parent),
@@ -378,8 +376,7 @@ def doctor(*, json: options.AsJson = False) -> None:
         "threads used": parallel.thread_count(),
     }
     rows = fields_of(named) | {"free memory": (round(free_memory() / 1e9, 1), "GB")}
-    screen = "yes" if has_screen else "none: headless"
-    rows |= fields_of({"kernels are kept in": kept, "screen": screen})
+    rows |= fields_of({"kernels are kept in": kept})
     for name in names:
         if name != "softreach":
             rows[name] = "not installed", ""

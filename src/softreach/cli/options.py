@@ -24,7 +24,6 @@ from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.lazy import Dataset
 from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
-_POSTURES = {"upright": "up", "hanging": "down"}  # words for the way that a base points
 _MATTER = {"young_modulus": "1MPa", "density": "1000kg/m3"}  # what loads need to know
 
 
@@ -142,7 +141,7 @@ class Changes:
     """Changes that a command makes to the design that it takes.
 
     Attributes:
-        base: The way the arm points: up (upright), down (hanging), x, -x, y or -y.
+        base: The way the arm points: up, down, x, -x, y or -y.
         payload: Mass at the tip with its unit: 200g.
         gravity: down, up, sideways, none, or x,y,z [m/s²]; default down if there are loads.
         tip_force: Force on the tip in the world, x,y,z [N]: 0,0,-0.5
@@ -170,8 +169,7 @@ class Changes:
         from softreach.arm.parameters import changed
 
         if self.base is not None:
-            words = _POSTURES | {points: points for points in POINTS}
-            points = words[as_one_of("base", self.base, words)]
+            points = as_one_of("base", self.base, POINTS)
             arm = arm.replace(base=arm.base.replace(points=points))
         texts = pairs_in("set", self.settings, "PATH=VALUE, such as taper=2deg")
         of_loads = {name: texts.pop(name) for name in [*texts] if name.startswith("loads.")}

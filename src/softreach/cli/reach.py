@@ -6,8 +6,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
 
-from cyclopts import Parameter
-
 import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import as_read, console, fields_of, rows_of
@@ -29,7 +27,6 @@ def reach(
     accuracy: Number = 3e-3,
     changes: Changes = UNCHANGED,
     out: Annotated[list[Path] | None, options.OUT] = None,
-    at: Annotated[str | None, Parameter(group=options.OUTPUT, allow_leading_hyphen=True)] = None,
     output: options.Output = options.DEFAULT,
 ) -> None:
     """Compute the exact reachable set: volume, multiplicity, folds.
@@ -43,10 +40,8 @@ def reach(
         accuracy: Relative error allowed in the volume.
         out: Write the boundary (.ply .stl .obj .glb .vtu), draw slices (.png .pdf .svg), or
             the set as a web page that turns (.html). May be repeated.
-        at: Point x,y,z that the slices meet at: the middle of the set if left out.
     """
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.inverse.request import position_in
     from softreach.rod.summary import load_rows
 
     arm = design_from(design, changes, output.unit)
@@ -56,16 +51,13 @@ def reach(
     free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:
         _check_dimension(path, free)
-    if not any(map(_is_drawn, outs)):
-        options.refuse("without a picture: add --out slices.png", at=at)
-    point = None if at is None else position_in("at", at, arm.length)
     with progress.bar("mapping the activation box", None) as step:
         reached = sr.reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | rows_of(reached.to_dataset())
     rows = rows if output.json else _by_activations(rows)
     console.rows(f"reachable set of {design}", rows, output.json, arm)
     for path in outs:
-        _write(reached, arm, path, point, output.overwrite)
+        _write(reached, arm, path, output.overwrite)
 
 
 def _by_activations(rows: Rows) -> Rows:
@@ -90,7 +82,6 @@ def _write(
     reached: sr.workspace.ReachableSet,
     arm: sr.Manipulator,
     path: Path,
-    at: list[float] | None,
     overwrite: bool,
 ) -> None:
     _check_dimension(path, reached.dimension)
@@ -98,7 +89,7 @@ def _write(
     if options.is_page(path):
         options.save_picture(sr.plot.plot_3d([reached, arm], unit=unit), path, overwrite)
     elif _is_drawn(path):
-        options.save_picture(sr.plot.plot_slices(reached.grid, at=at, unit=unit), path, overwrite)
+        options.save_picture(sr.plot.plot_slices(reached.grid, unit=unit), path, overwrite)
     else:
         options.save_mesh(reached.surface(), options.written_unit(arm), path, overwrite)
 

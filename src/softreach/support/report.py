@@ -5,7 +5,6 @@ import io
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from html import escape
 from importlib.resources import files
 from os import PathLike
 from typing import Any
@@ -62,9 +61,6 @@ class Report:
                 lines += section.points
         return "\n  ".join(lines)
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(str(self))}</pre>"
-
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write one HTML file, to be read offline.
 
@@ -95,9 +91,6 @@ class Reported(ABC):
 
     def __repr__(self) -> str:
         return str(self.report())
-
-    def _repr_html_(self) -> str:
-        return self.report()._repr_html_()
 
 
 def _source(figure: Any) -> str:
