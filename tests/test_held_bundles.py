@@ -39,7 +39,18 @@ def test_results_name_the_bundles_that_their_tip_map_has():
     assert path.bundle.values.tolist() == names
 
 
-FIVE = designs.redundant_trunk().split("longitudinal 1", 2)
+def _with_five_bundles() -> Manipulator:
+    four = designs.redundant_trunk()
+    left, right, first, second = four.actuators
+    half = first.extent / 2
+    beside = (
+        first.replace(name=f"{first.name} {k}", offset=first.offset + side * half)
+        for k, side in ((1, -1), (2, 1))
+    )
+    return four.replace(actuators=(left, right, *beside, second))
+
+
+FIVE = _with_five_bundles()
 
 
 @pytest.mark.parametrize("bundle", range(4))

@@ -79,7 +79,6 @@ ARM = sr.designs.minimal_trunk()
 OF_OBJECTS = {
     "Manipulator.outline": ARM.outline,
     "Manipulator.save": ARM.save,
-    "Manipulator.split": ARM.split,
     "Manipulator.with_bounds": ARM.with_bounds,
     "Box.distance": sr.requirements.Box((0, 0, 0), (1, 1, 1)).distance,
     "Requirements.save": sr.Requirements().save,

@@ -145,7 +145,9 @@ def test_an_arm_prints_its_size_and_its_bundles(trunk):
     assert repr(trunk) == (
         "Manipulator: L = 1 m, R2 = 0.0625 to 0.02758 m\n  bundles: left, right, longitudinal"
     )
-    names = repr(trunk.split("longitudinal", 40)).splitlines()[1]
+    left, right, longitudinal = trunk.actuators
+    forty = longitudinal.replace(bundles=40, extent=0.1)
+    names = repr(trunk.replace(actuators=(left, right, forty))).splitlines()[1]
     assert names.startswith("  bundles: left, right, longitudinal 1, ")
     assert names.endswith(", longitudinal 4, ... (42 in all)")
 
