@@ -148,7 +148,8 @@ _EXTRAS = {
     "optuna": "search",
     "cmaes": "search",
 }
-_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")  # module -> extra with it
+_EXPORT = "pyarrow", "trimesh", "meshio", "manifold3d"
+_EXTRAS |= dict.fromkeys(_EXPORT, "export")  # module -> extra with it
 
 
 class MissingExtra(SoftreachError, ImportError):
