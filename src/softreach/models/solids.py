@@ -49,26 +49,27 @@ def solids(arm: Manipulator, *, channel_diameter: float | None = None) -> dict[s
     arm = a_manipulator("arm", arm)
     _check(arm)
     check_installed("manifold3d")
-    least, shapes, layers = 1e3 * facet_tolerance(arm), arm.outline(0.0).shape, arm.section.layers
-    diameter = 0.2 * least if channel_diameter is None else channel_diameter
-    limits = Range(0.01 * least, 2.0 * least, unit="m")
-    radius = 0.5 * as_number("channel_diameter", diameter, limits)
-    lines = [k for k, shape in enumerate(shapes) if shape != "sector"]
-    hollows = [(arm.bundle_names[k], _hollow(arm, k, radius)) for k in lines]
+    least, layers = 1e3 * facet_tolerance(arm), arm.section.layers
+    given = 0.2 * least if channel_diameter is None else channel_diameter
+    diameter = as_number("channel_diameter", given, Range(0.01 * least, least, unit="m"))
+    lines = [k for k, shape in enumerate(arm.outline(0.0).shape) if shape != "sector"]
+    hollows = [(arm.bundle_names[k], _hollow(arm, k, 0.5 * diameter)) for k in lines]
     cut, parts = _union([solid for _, solid in hollows]), list[tuple[str, Any]]()
     for material in dict.fromkeys(layer.material for layer in layers):
         rings = [_ring(arm, *layer[:2]) for layer in layers if layer.material == material]
         parts.append((material.name or "body", _union(rings) - cut))
     if arm.section.bore_ratio:
         parts.append(("bore", _ring(arm, 0.0, arm.section.bore_ratio)))
-    parts += [(name, solid ^ _ring(arm, 0.0, 1.0)) for name, solid in hollows]
+    whole = _ring(arm, 0.0, 1.0)
+    parts += [(name, solid ^ whole) for name, solid in hollows]
     surfaces: dict[str, Surface] = {}
     for name, solid in parts:
-        if not (solid := _between_ends(arm, solid)).is_empty():
+        solid = solid.trim_by_plane((0, 0, 1), 0.0).trim_by_plane((0, 0, -1), -arm.length)
+        if not solid.is_empty():
             name = f"{name} ({len(surfaces) + 1})" if name in surfaces else name
             mesh = _at_rest(arm, solid).to_mesh64()
-            vertices, faces = mesh.vert_properties[:, :3], mesh.tri_verts.astype(np.int64)
-            surfaces[name] = Surface(vertices=vertices, faces=faces)
+            faces = mesh.tri_verts.astype(np.int64)
+            surfaces[name] = Surface(vertices=mesh.vert_properties[:, :3], faces=faces)
     return surfaces
 
 
@@ -77,21 +78,15 @@ def facet_tolerance(arm: Manipulator) -> float:
     return 1e-3 * float(arm.profile.radius(_along(arm)).min())
 
 
-def stations_within(
-    arm: Manipulator, start: float, end: float, curves: Callable[[Array], Array]
-) -> Array:
-    """Z [m] from start to end, with breakpoints, at which chords of curves keep the tolerance.
-
-    Curves take stations (n,) and give places, shape (n, ..., axis).
-    """
-    z = np.array([start, *(z for z in arm.breakpoints if start < z < end), end])
+def traced(arm: Manipulator, curve: Callable[[Array], Array], *knots: float) -> Array:
+    """Places (n, ...) on a curve at knots, and between them where chords leave the tolerance."""
+    at = np.unique(knots)
     while True:
-        places, between = curves(z), curves(z[:-1] + _ASIDE * np.diff(z))
-        gaps = np.linalg.norm(places[:-1] + _ASIDE * np.diff(places, axis=0) - between, axis=-1)
-        wide = gaps.reshape(len(gaps), -1).max(axis=1) > facet_tolerance(arm)
-        if not wide.any():
-            return z
-        z = np.sort(np.append(z, 0.5 * (z[1:] + z[:-1])[wide]))
+        places, between = curve(at), curve(at[:-1] + _ASIDE * np.diff(at))
+        gaps = np.linalg.norm(places[:-1] + _ASIDE * np.diff(places, axis=0) - between, axis=1)
+        if not (wide := gaps > facet_tolerance(arm)).any():
+            return places
+        at = np.sort(np.append(at, 0.5 * (at[1:] + at[:-1])[wide]))
 
 
 def _along(arm: Manipulator) -> Array:
@@ -105,11 +100,11 @@ def _check(arm: Manipulator) -> None:
         apart = one.inner_ratio >= other.outer_ratio or other.inner_ratio >= one.outer_ratio
         if not apart and not one.material.same_matter(other.material):
             raise NotPossible("rings of different materials share a place: give them one material")
-    outline, bore = arm.outline(_along(arm)), arm.section.bore_ratio
-    is_open = (outline.outer_ratio >= 1.0) | ((outline.inner_ratio <= bore) & (bore > 0.0))
-    for k in np.flatnonzero((is_open & outline.acts).any(axis=0)):
-        if outline.shape[k] == "lumen":
-            raise NotPossible(f"{arm.bundle_names[k]} breaks through a wall: make it narrower")
+    outline = arm.outline(_along(arm))
+    for k, name in enumerate(arm.bundle_names):
+        outside = outline.acts[:, k] & (outline.outer_ratio[:, k] >= 1.0)
+        if outline.shape[k] == "lumen" and outside.any():
+            raise NotPossible(f"{name} breaks through the surface: make it narrower")
 
 
 def _union(solids: list[Any]) -> Any:
@@ -119,26 +114,30 @@ def _union(solids: list[Any]) -> Any:
 
 def _ring(arm: Manipulator, inner: float, outer: float) -> Any:
     """What lies between two ratios of R2, and beyond both ends."""
-    z = stations_within(arm, 0.0, arm.length, lambda z: np.array([arm.profile.radius(z), z]).T)
-    axis, sections = z[:, None] * np.eye(3)[2], np.tile(np.eye(3)[:2], (len(z), 1, 1))
-    radius = arm.profile.radius(z)
-    walls = [_tube(arm, axis, sections, ratio * radius) for ratio in (outer, inner) if ratio]
-    return walls[0] - walls[1] if inner else walls[0]
+
+    def wall(z: Array) -> Array:
+        return np.stack([arm.profile.radius(z), 0.0 * z, z], axis=1)
+
+    walls = traced(arm, wall, 0.0, *arm.breakpoints, arm.length)
+    axis, sections = walls * [0.0, 0.0, 1.0], np.tile(np.eye(3)[:2], (len(walls), 1, 1))
+    solid = _tube(arm, axis, sections, outer * walls[:, 0])
+    return solid - _tube(arm, axis, sections, inner * walls[:, 0]) if inner else solid
 
 
 def _hollow(arm: Manipulator, k: int, channel_radius: float) -> Any:
     """The channel or the chamber of a bundle."""
+    start, end = arm.bundle_actuators[k].span(arm.length)
 
     def line(z: Array) -> Array:
         outline, (x, y) = arm.outline(z), line_places(arm, z)[..., k]
         width = (outline.outer_ratio - outline.inner_ratio)[:, k] * arm.profile.radius(z)
         return np.stack([x, y, z, 0.5 * width], axis=1)
 
-    places = line(stations_within(arm, *arm.bundle_actuators[k].span(arm.length), line))
+    places = traced(arm, line, start, *(z for z in arm.breakpoints if start < z < end), end)
     axis, radius = places[:, :3], places[:, 3]
     if arm.outline(0.0).shape[k] == "lumen":
         return _tube(arm, axis, np.tile(np.eye(3)[:2], (len(axis), 1, 1)), radius)
-    return _tube(arm, axis, _mitered(axis, channel_radius), np.full(len(axis), channel_radius))
+    return _tube(arm, axis, _mitered(axis), np.full(len(axis), channel_radius))
 
 
 def _tube(arm: Manipulator, axis: Points, sections: Array, radius: Array) -> Any:
@@ -156,27 +155,18 @@ def _tube(arm: Manipulator, axis: Points, sections: Array, radius: Array) -> Any
     return library.Manifold(library.Mesh64(tube.vertices, tube.faces.astype(np.uint64)))
 
 
-def _mitered(line: Points, radius: float) -> Array:
-    """Sections that make cylinders of a radius about chords, shape (station, 2, 3)."""
+def _mitered(line: Points) -> Array:
+    """Sections that make cylinders about chords, (station, 2, 3), for a radius of 1."""
     steps = np.diff(line, axis=0)
-    lengths = np.linalg.norm(steps, axis=1)
-    chords = steps / lengths[:, None]
-    normals = np.concatenate([chords[:1], chords[1:] + chords[:-1], chords[-1:]])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    turns = np.linalg.norm(np.diff(normals, axis=0), axis=1)
-    if (radius * turns >= lengths).any():
-        raise NotPossible("a tendon winds too sharply for its channel: make channel_diameter less")
+    chords = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    normals = np.concatenate([chords[1:] + chords[:-1], chords[-1:]])
     first = np.cross([0.0, 1.0, 0.0], chords[0])
     first /= np.linalg.norm(first)
     sections = [np.stack([first, np.cross(chords[0], first)])]
-    for chord, normal in zip(chords, normals[1:], strict=True):  # along the chord, onto the next
+    for chord, normal in zip(chords, normals, strict=True):  # along the chord, onto the next plane
         ahead = sections[-1] @ normal / (chord @ normal)
         sections.append(sections[-1] - ahead[:, None] * chord)
     return np.array(sections)
-
-
-def _between_ends(arm: Manipulator, solid: Any) -> Any:
-    return solid.trim_by_plane((0, 0, 1), 0.0).trim_by_plane((0, 0, -1), -arm.length)
 
 
 def _at_rest(arm: Manipulator, solid: Any) -> Any:
@@ -188,7 +178,7 @@ def _at_rest(arm: Manipulator, solid: Any) -> Any:
     if (room <= 0.0).any():
         raise NotPossible("the rest shape bends the arm into itself, by more than 1/R2")
     sharpest = ((np.linalg.norm(turn, axis=1) + turn[:, 2] ** 2 * radius) / room).max()
-    length = math.sqrt(8.0 * facet_tolerance(arm) / sharpest)  # of chords of lines on the surface
+    length = math.sqrt(8.0 * facet_tolerance(arm) / sharpest)  # of chords on the surface
     without = dict.fromkeys(("actuators", "drives", "markers", "surroundings"), ())
     bare = as_tip_map(arm.replace(**without, loads=None, point=None, base=UPRIGHT))
 
