@@ -3,15 +3,14 @@
 from softreach.models.c_source import c
 from softreach.models.inverse_table import InverseTable, inverse_table
 from softreach.models.local_model import LocalModel, local_model
-from softreach.models.mjcf import mujoco, write_mujoco
-from softreach.models.pattern import Pattern, pattern
+from softreach.models.mjcf import mujoco
+from softreach.models.pattern import pattern
 from softreach.models.solids import solids
 from softreach.models.tracker import Tracker, TrackingStep
 
 __all__ = [
     "InverseTable",
     "LocalModel",
-    "Pattern",
     "Tracker",
     "TrackingStep",
     "c",
@@ -20,5 +19,4 @@ __all__ = [
     "mujoco",
     "pattern",
     "solids",
-    "write_mujoco",
 ]

@@ -1,12 +1,7 @@
-"""Patterns of rings: sheets to cut, which lie around the arm where its fibers and muscles are.
+"""Patterns of rings: sheets to cut, which lie around the arm where its fibers and muscles are."""
 
-A sheet lies in the middle of its ring, and is unrolled cone by cone without any strain.
-"""
-
-from dataclasses import dataclass
 from functools import partial
 from html import escape
-from itertools import pairwise
 
 import numpy as np
 
@@ -17,113 +12,61 @@ from softreach.support.arguments import as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import NotPossible
 
+Lines = list[tuple[str, str, Array]]  # Layer, name where it begins, and points of each
+
 _COLORS = {"cut": "#e00000", "ring": "#000000", "marks": "#0050d0"}
 _GAP, _LETTERS = 0.005, 0.002  # between sheets, and height of letters [m]
-_CORNERS = np.arange(5)  # of a sheet and its bundles, from base to tip and back
+_CORNERS = np.arange(5)  # of a sheet and of bundles, from base to tip and back
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Pattern:
-    """Unrolled rings with their outside in sight: x runs from base to tip."""
+def pattern(arm: Manipulator, actuator: str | None = None, *, format: str = "svg") -> str:
+    """Unrolled rings of fibers or muscles, 1:1 in mm, to cut bundles out of sheets.
 
-    lines: tuple[tuple[str, Array], ...]
-    """Layer and points of each line [m], (point, 2): edges of bundles ("cut"), edges of sheets
-    ("ring"), middle lines of bundles, and marks at base and tip at polar angle 0 ("marks")."""
-    labels: tuple[tuple[str, Array], ...]
-    """Name of each bundle, and the point where its middle line begins [m]."""
-
-    def svg(self) -> str:
-        """The drawing as text of an SVG file, 1:1."""
-        every = np.concatenate([points for _, points in self.lines])
-        (left, low), (width, height) = every.min(axis=0) - _GAP, np.ptp(every, axis=0) + 2.0 * _GAP
-        box = f"{_mm(left)} {_mm(-low - height)} {_mm(width)} {_mm(height)}"
-        size = f'width="{_mm(width)}mm" height="{_mm(height)}mm" viewBox="{box}"'
-        rows = [f'<svg xmlns="http://www.w3.org/2000/svg" {size}>']
-        for layer, points in self.lines:
-            corners = " ".join(f"{_mm(x)},{_mm(-y)}" for x, y in points)
-            look = f'class="{layer}" fill="none" stroke="{_COLORS[layer]}" stroke-width="0.1"'
-            rows.append(f'<polyline {look} points="{corners}"/>')
-        for text, (x, y) in self.labels:
-            look = f'font-size="{_mm(_LETTERS)}" fill="{_COLORS["marks"]}"'
-            rows.append(f'<text {look} x="{_mm(x)}" y="{_mm(-y)}">{escape(text)}</text>')
-        return "\n".join([*rows, "</svg>", ""])
-
-    def dxf(self) -> str:
-        """The drawing as text of a DXF file (R12), in mm."""
-        codes: list[tuple[int, object]] = [(0, "SECTION"), (2, "ENTITIES")]
-        for layer, points in self.lines:
-            codes += [(0, "POLYLINE"), (8, layer), (66, 1)]
-            for x, y in points:
-                codes += [(0, "VERTEX"), (8, layer), (10, _mm(x)), (20, _mm(y))]
-            codes += [(0, "SEQEND")]
-        for text, (x, y) in self.labels:
-            codes += [(0, "TEXT"), (8, "marks"), (10, _mm(x)), (20, _mm(y)), (40, _mm(_LETTERS))]
-            codes += [(1, text)]
-        codes += [(0, "ENDSEC"), (0, "EOF")]
-        return "".join(f"{code}\n{value}\n" for code, value in codes)
-
-
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.9f}"
-
-
-def pattern(arm: Manipulator, actuator: str | None = None) -> Pattern:
-    """Unrolled rings with fibers or muscles: bundles to cut out of sheets.
-
-    A sheet goes around once, along its fibers, and ends at kinks of the profile. At the base, y = 0
-    is in its middle; the next sheet is below it. Chords keep within a thousandth of the least
-    radius of the arm.
+    A sheet lies in the middle of its ring and goes around once, along its fibers. One sees its
+    outside, with x from base to tip and y = 0 in the middle of the first sheet at the base; others
+    are below it. Edges of bundles are in the layer "cut", those of sheets in "ring", middle lines
+    and names of bundles in "marks", with two short lines where the polar angle is 0. Chords keep
+    within a thousandth of the least radius of the arm.
 
     Args:
         arm: The design.
         actuator: Name of the only fiber or muscle to unroll; None for all.
+        format: "svg", or "dxf" for DXF R12.
+
+    Returns:
+        The text of the file.
 
     Raises:
-        InvalidInput: No fiber or muscle has this name.
+        InvalidInput: No fiber or muscle has this name, or another format.
         NotPossible: The arm has no such pattern; the sentence says why.
     """
+    write = {"svg": _svg, "dxf": _dxf}[as_one_of("format", format, ("svg", "dxf"))]
     arm = a_manipulator("arm", arm)
     named = {part.name: part for part in arm.actuators if isinstance(part, SectorActuator)}
     if actuator is not None:
         named = {actuator: named[as_one_of("actuator", actuator, named)]}
     if not named or not arm.rest.is_straight:
         raise NotPossible("only rings with fibers or muscles in an arm that is straight unroll")
-    lines, labels, top = list[tuple[str, Array]](), list[tuple[str, Array]](), np.inf
-    for part in named.values():
-        start, end = part.span(arm.length)
-        kinks = [z for z in arm.profile.breakpoints if start < z < end]
-        for piece in pairwise([start, *kinks, end]):
-            sheet = _sheet(arm, part, *piece)
-            highest = max(points[:, 1].max() for _, points in sheet)
-            shift = np.array([0.0, min(0.0, top - _GAP - highest)])
-            sheet = [(layer, points + shift) for layer, points in sheet]
-            middles = [points[0] for layer, points in sheet if layer == "marks"]
-            labels += zip(part.bundle_names, middles, strict=False)
-            lines += sheet
-            top = min(points[:, 1].min() for _, points in sheet)
-    return Pattern(lines=tuple(lines), labels=tuple(labels))
+    sheets = [_sheet(arm, part) for part in named.values()]
+    heights = np.concatenate([points[:, 1] for sheet in sheets for *_, points in sheet])
+    below = np.array([0.0, np.ptp(heights) + _GAP])
+    return write([(*x, points - k * below) for k, s in enumerate(sheets) for *x, points in s])
 
 
-def _sheet(
-    arm: Manipulator, part: SectorActuator, start: float, end: float
-) -> list[tuple[str, Array]]:
-    """Lines of a ring from one station to another, between which the profile is a cone.
+def _sheet(arm: Manipulator, part: SectorActuator) -> Lines:
+    """Lines of the ring of an actuator, the middle lines of its bundles first.
 
-    A place at θ from the middle of the sheet is ψ = θ sin φ about the apex from there.
+    A place at θ from the middle of the sheet is at ψ = θ sin φ about the apex of the cone.
     """
-    profile, ring, z = arm.profile, arm.section.ring(part.ring), np.linspace(start, end, 65)
-    ratio, tangent = 0.5 * (ring.inner_ratio + ring.outer_ratio), profile.slope(z[1:-1])
-    slope = ratio * tangent[0]
-    sine, turned = slope / np.hypot(1.0, slope), part.rotation(profile, ring, z)
-    if np.ptp(tangent) > 1e-9:
-        raise NotPossible(
-            "a profile that is curved along the arm does not unroll: make it of cones"
-        )
+    (start, end), profile, ring = part.span(arm.length), arm.profile, arm.section.ring(part.ring)
+    z, ratio = np.linspace(start, end, 65), 0.5 * (ring.inner_ratio + ring.outer_ratio)
+    slope, turned = ratio * profile.slope(z[1:-1]), part.rotation(profile, ring, z)
+    if np.ptp(slope) > 1e-9:
+        raise NotPossible("a ring unrolls where its profile is one cone: make that a LinearTaper")
+    sine = (slope := slope[0]) / np.hypot(1.0, slope)
     if abs(sine) * (np.ptp(turned) + 2.0 * np.pi) >= 2.0 * np.pi:
         raise NotPossible(f"{part.name} winds over itself once it is unrolled")
-    angles = np.sort(part.start_angles % (2.0 * np.pi))
-    gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
-    seam = angles[gaps.argmax()] + 0.5 * gaps.max()
+    seam = part.start_angles[0] - np.pi / part.bundles
 
     def flat(z: Array, aside: Array) -> Array:
         theta = part.rotation(profile, ring, z) - turned[0] + aside
@@ -136,12 +79,46 @@ def _sheet(
         z = np.interp(corner, _CORNERS, [start, end, end, start, start])
         return flat(z, middle + half * np.interp(corner, _CORNERS, [-1, -1, 1, 1, -1]))
 
-    middles = (part.start_angles - seam) % (2.0 * np.pi) - np.pi
-    lines = [("marks", traced(arm, partial(edge, each, 0.0), 0, 1)) for each in middles]
-    lines.append(("ring", traced(arm, partial(edge, 0.0, np.pi), *_CORNERS)))
-    for each in middles:
-        lines.append(("cut", traced(arm, partial(edge, each, 0.5 * part.extent), *_CORNERS)))
+    lines, middles = Lines(), (part.start_angles - seam) % (2.0 * np.pi) - np.pi
+    for name, middle in zip(part.bundle_names, middles, strict=True):
+        lines.append(("marks", name, traced(arm, partial(edge, middle, 0.0), 0, 1)))
+        lines.append(("cut", "", traced(arm, partial(edge, middle, 0.5 * part.extent), *_CORNERS)))
+    lines.append(("ring", "", traced(arm, partial(edge, 0.0, np.pi), *_CORNERS)))
     zeros = flat(z[[0, -1]], (-seam - turned[[0, -1]]) % (2.0 * np.pi) - np.pi)
     for zero, inward in zip(zeros, (_LETTERS, -_LETTERS), strict=True):
-        lines.append(("marks", zero + [[0.0, 0.0], [inward, 0.0]]))
+        lines.append(("marks", "", zero + [[0.0, 0.0], [inward, 0.0]]))
     return lines
+
+
+def _svg(lines: Lines) -> str:
+    every = np.concatenate([points for *_, points in lines])
+    (left, low), (width, height) = every.min(axis=0) - _GAP, np.ptp(every, axis=0) + 2.0 * _GAP
+    box = f"{_mm(left)} {_mm(-low - height)} {_mm(width)} {_mm(height)}"
+    size = f'width="{_mm(width)}mm" height="{_mm(height)}mm" viewBox="{box}"'
+    look = f'font-size="{_mm(_LETTERS)}" fill="{_COLORS["marks"]}"'
+    rows = [f'<svg xmlns="http://www.w3.org/2000/svg" {size} {look}>']
+    for layer, name, points in lines:
+        corners = " ".join(f"{_mm(x)},{_mm(-y)}" for x, y in points)
+        look = f'class="{layer}" fill="none" stroke="{_COLORS[layer]}" stroke-width="0.1"'
+        rows.append(f'<polyline {look} points="{corners}"/>')
+        if name:
+            x, y = points[0]
+            rows.append(f'<text x="{_mm(x)}" y="{_mm(-y)}">{escape(name)}</text>')
+    return "\n".join([*rows, "</svg>", ""])
+
+
+def _dxf(lines: Lines) -> str:
+    codes = [(0, "SECTION"), (2, "HEADER"), (9, "$INSUNITS"), (70, "4"), (0, "ENDSEC")]
+    codes += [(0, "SECTION"), (2, "ENTITIES")]
+    for layer, name, points in lines:
+        corners = [[(8, layer), (10, _mm(x)), (20, _mm(y))] for x, y in points]
+        codes += [(0, "POLYLINE"), (8, layer), (66, "1")]
+        codes += [code for corner in corners for code in [(0, "VERTEX"), *corner]]
+        codes += [(0, "SEQEND")]
+        if name:
+            codes += [(0, "TEXT"), *corners[0], (40, _mm(_LETTERS)), (1, name)]
+    return "".join(f"{code}\n{value}\n" for code, value in [*codes, (0, "ENDSEC"), (0, "EOF")])
+
+
+def _mm(length: float) -> str:
+    return f"{1e3 * length:.9f}"

@@ -6,8 +6,8 @@ go where the rest shape has them. Facets have the area of the circles that they 
 
 import math
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Points
 from softreach.support.errors import NotPossible, Range, check_installed
 
+Curve = Callable[[Array], Array]  # Places (n, axis) at n stations
+
 _ASIDE = 0.382  # place in a piece where its chord is checked: whole turns cannot hide there
 
 
@@ -30,8 +32,8 @@ def solids(arm: Manipulator, *, channel_diameter: float | None = None) -> dict[s
     The body comes first, a part a material and under its name. Bore, chambers and the channels of
     tendons are cut out of it and follow as solids, the last two under the names of their bundles.
     A channel is round about the line of its tendon: a groove where it reaches the surface, nothing
-    where it lies outside. What ends inside of the arm is closed there. Disks are left out. Facets
-    keep within a thousandth of the least radius of the arm.
+    where it lies outside. What ends inside of the arm is closed there. Where rings overlap, the
+    first has the place. Disks are left out. Facets keep within a thousandth of the least radius.
 
     Args:
         arm: The design.
@@ -47,17 +49,19 @@ def solids(arm: Manipulator, *, channel_diameter: float | None = None) -> dict[s
         MissingExtra: `softreach[export]` is not installed.
     """
     arm = a_manipulator("arm", arm)
-    _check(arm)
     check_installed("manifold3d")
+    if arm.section.bending_ratio != 1.0:
+        raise NotPossible("a section of two bending stiffnesses is not round, its shape unknown")
     least, layers = 1e3 * facet_tolerance(arm), arm.section.layers
     given = 0.2 * least if channel_diameter is None else channel_diameter
     diameter = as_number("channel_diameter", given, Range(0.01 * least, least, unit="m"))
     lines = [k for k, shape in enumerate(arm.outline(0.0).shape) if shape != "sector"]
     hollows = [(arm.bundle_names[k], _hollow(arm, k, 0.5 * diameter)) for k in lines]
-    cut, parts = _union([solid for _, solid in hollows]), list[tuple[str, Any]]()
+    taken, parts = _union([solid for _, solid in hollows]), list[tuple[str, Any]]()
     for material in dict.fromkeys(layer.material for layer in layers):
-        rings = [_ring(arm, *layer[:2]) for layer in layers if layer.material == material]
-        parts.append((material.name or "body", _union(rings) - cut))
+        rings = _union([_ring(arm, *layer[:2]) for layer in layers if layer.material == material])
+        parts.append((material.name or "body", rings - taken))
+        taken += rings
     if arm.section.bore_ratio:
         parts.append(("bore", _ring(arm, 0.0, arm.section.bore_ratio)))
     whole = _ring(arm, 0.0, 1.0)
@@ -67,7 +71,7 @@ def solids(arm: Manipulator, *, channel_diameter: float | None = None) -> dict[s
         solid = solid.trim_by_plane((0, 0, 1), 0.0).trim_by_plane((0, 0, -1), -arm.length)
         if not solid.is_empty():
             name = f"{name} ({len(surfaces) + 1})" if name in surfaces else name
-            mesh = _at_rest(arm, solid).to_mesh64()
+            mesh = _at_rest(arm, solid.simplify(1e-2 * facet_tolerance(arm))).to_mesh64()
             faces = mesh.tri_verts.astype(np.int64)
             surfaces[name] = Surface(vertices=mesh.vert_properties[:, :3], faces=faces)
     return surfaces
@@ -78,9 +82,9 @@ def facet_tolerance(arm: Manipulator) -> float:
     return 1e-3 * float(arm.profile.radius(_along(arm)).min())
 
 
-def traced(arm: Manipulator, curve: Callable[[Array], Array], *knots: float) -> Array:
-    """Places (n, ...) on a curve at knots, and between them where chords leave the tolerance."""
-    at = np.unique(knots)
+def traced(arm: Manipulator, curve: Curve, *knots: float) -> Array:
+    """Places (n, axis) on a curve, at knots from first to last and where its chords need more."""
+    at = np.unique(np.clip(knots, knots[0], knots[-1]))
     while True:
         places, between = curve(at), curve(at[:-1] + _ASIDE * np.diff(at))
         gaps = np.linalg.norm(places[:-1] + _ASIDE * np.diff(places, axis=0) - between, axis=1)
@@ -93,20 +97,6 @@ def _along(arm: Manipulator) -> Array:
     return np.union1d(np.linspace(0.0, arm.length, 129), arm.breakpoints)
 
 
-def _check(arm: Manipulator) -> None:
-    if arm.section.bending_ratio != 1.0:
-        raise NotPossible("a section of two bending stiffnesses is not round, its shape unknown")
-    for one, other in combinations(arm.section.layers, 2):
-        apart = one.inner_ratio >= other.outer_ratio or other.inner_ratio >= one.outer_ratio
-        if not apart and not one.material.same_matter(other.material):
-            raise NotPossible("rings of different materials share a place: give them one material")
-    outline = arm.outline(_along(arm))
-    for k, name in enumerate(arm.bundle_names):
-        outside = outline.acts[:, k] & (outline.outer_ratio[:, k] >= 1.0)
-        if outline.shape[k] == "lumen" and outside.any():
-            raise NotPossible(f"{name} breaks through the surface: make it narrower")
-
-
 def _union(solids: list[Any]) -> Any:
     library = import_module("manifold3d")
     return library.Manifold.batch_boolean(solids, library.OpType.Add)
@@ -115,37 +105,39 @@ def _union(solids: list[Any]) -> Any:
 def _ring(arm: Manipulator, inner: float, outer: float) -> Any:
     """What lies between two ratios of R2, and beyond both ends."""
 
-    def wall(z: Array) -> Array:
-        return np.stack([arm.profile.radius(z), 0.0 * z, z], axis=1)
+    def wall(ratio: float, z: Array) -> Array:
+        return np.stack([0.0 * z, 0.0 * z, z, ratio * arm.profile.radius(z)], axis=1)
 
-    walls = traced(arm, wall, 0.0, *arm.breakpoints, arm.length)
-    axis, sections = walls * [0.0, 0.0, 1.0], np.tile(np.eye(3)[:2], (len(walls), 1, 1))
-    solid = _tube(arm, axis, sections, outer * walls[:, 0])
-    return solid - _tube(arm, axis, sections, inner * walls[:, 0]) if inner else solid
+    solid, *bore = (_tube(arm, partial(wall, x), (0.0, arm.length)) for x in (outer, inner) if x)
+    return solid - bore[0] if bore else solid
 
 
 def _hollow(arm: Manipulator, k: int, channel_radius: float) -> Any:
     """The channel or the chamber of a bundle."""
-    start, end = arm.bundle_actuators[k].span(arm.length)
+    span, is_line = arm.bundle_actuators[k].span(arm.length), arm.outline(0.0).shape[k] == "line"
 
     def line(z: Array) -> Array:
-        outline, (x, y) = arm.outline(z), line_places(arm, z)[..., k]
-        width = (outline.outer_ratio - outline.inner_ratio)[:, k] * arm.profile.radius(z)
-        return np.stack([x, y, z, 0.5 * width], axis=1)
+        outline, (x, y), outer = arm.outline(z), line_places(arm, z)[..., k], arm.profile.radius(z)
+        radius = 0.5 * outer * (outline.outer_ratio - outline.inner_ratio)[:, k]
+        if not is_line and (np.hypot(x, y) + radius >= outer).any():
+            raise NotPossible(f"{arm.bundle_names[k]} breaks through the surface: make it narrower")
+        return np.stack([x, y, z, channel_radius + 0.0 * z if is_line else radius], axis=1)
 
-    places = traced(arm, line, start, *(z for z in arm.breakpoints if start < z < end), end)
-    axis, radius = places[:, :3], places[:, 3]
-    if arm.outline(0.0).shape[k] == "lumen":
-        return _tube(arm, axis, np.tile(np.eye(3)[:2], (len(axis), 1, 1)), radius)
-    return _tube(arm, axis, _mitered(axis), np.full(len(axis), channel_radius))
+    return _tube(arm, line, span, is_line=is_line)
 
 
-def _tube(arm: Manipulator, axis: Points, sections: Array, radius: Array) -> Any:
-    """A tube about an axis with sections by two vectors; it goes on where it meets an end."""
-    library, sharpness = import_module("manifold3d"), radius.max() / facet_tolerance(arm)
-    sides = max(12, math.ceil(2.0 * np.pi * math.sqrt(sharpness / 12.0)))
+def _tube(arm: Manipulator, curve: Curve, span: tuple[float, float], is_line: bool = False) -> Any:
+    """A tube by x, y, z and radius at z, which goes on where it meets an end of the arm.
+
+    Its sections are across the line, or else across the arm.
+    """
+    (start, end), library = span, import_module("manifold3d")
+    *axis, radius = traced(arm, curve, start, *arm.breakpoints, end).T
+    axis = np.stack(axis, axis=1)
+    sections = _mitered(axis) if is_line else np.tile(np.eye(3)[:2], (len(axis), 1, 1))
+    sides = max(12, math.ceil(np.pi * math.sqrt(radius.max() / (3.0 * facet_tolerance(arm)))))
     turn, aside, ends = 2.0 * np.pi / sides, 1e-9 * arm.length, [0, -1]
-    meets = axis[0, 2] <= aside, axis[-1, 2] >= arm.length - aside
+    meets = start <= aside, end >= arm.length - aside
     station = np.pad(np.arange(len(axis)), [*map(int, meets)], mode="edge")
     ahead = np.diff(axis, axis=0)[ends]
     reach = 2.0 * radius[ends] / ahead[:, 2] * meets * [-1.0, 1.0]
