@@ -12,10 +12,9 @@ from cyclopts import Parameter
 import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import console, fields_of, for_machines
-from softreach.cli.options import UNCHANGED, Changes, Number, design_from, read_as, shown_in
+from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 from softreach.support.files.formats import FileFormat
-from softreach.support.units import read_length
 
 _PAIR = "activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."
 Format = Annotated[str | None, Parameter(help=_PAIR)]
@@ -95,7 +94,7 @@ def export(
     *,
     activation: options.Activation = None,
     format: Format = None,
-    channel_diameter: str | None = None,
+    channel_mm: Number | None = None,
     changes: Changes = UNCHANGED,
     overwrite: options.Overwrite = False,
     unit: options.Unit = None,
@@ -112,7 +111,7 @@ def export(
 
     Args:
         out: The file to write; its suffix chooses the format. A folder for parts.
-        channel_diameter: Diameter of the channels of tendons in parts: 2mm
+        channel_mm: Diameter of the channels of tendons in parts.
     """
     from softreach.export.surfaces import SURFACE_FILES
     from softreach.support.files.text import write_text
@@ -120,7 +119,7 @@ def export(
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
     if options.is_stored(source) or out.suffix:
-        options.refuse("but on parts, in a folder", channel_diameter=channel_diameter)
+        options.refuse("but on parts, in a folder", channel_mm=channel_mm)
     if options.is_stored(source):
         options.refuse("on a cloud, which has many", activation=activation)
         options.refuse(options.STORED, **changes.given)
@@ -137,7 +136,7 @@ def export(
         console.line(out)
     elif not out.suffix:
         options.refuse("on parts, which are at rest", activation=activation)
-        _export_parts(design_from(source, changes, unit or "mm"), out, channel_diameter, overwrite)
+        _export_parts(design_from(source, changes, unit or "mm"), out, channel_mm, overwrite)
     else:
         arm = design_from(source, changes, unit)
         options.check_output(out, SURFACE_FILES, overwrite)
@@ -156,12 +155,10 @@ def _texts() -> dict[str, Callable[[sr.Manipulator], str]]:
     return {**texts, ".svg": models.pattern, ".dxf": dxf}
 
 
-def _export_parts(arm: sr.Manipulator, out: Path, diameter: str | None, overwrite: bool) -> None:
+def _export_parts(arm: sr.Manipulator, out: Path, mm: float | None, overwrite: bool) -> None:
     from softreach.export.surfaces import SURFACE_FILES
 
-    read = partial(read_length, length=arm.length)
-    width = diameter and read_as("channel_diameter", diameter, read, "a length such as 2mm")
-    parts = sr.models.solids(arm, channel_diameter=width)
+    parts = sr.models.solids(arm, channel_diameter=None if mm is None else 1e-3 * mm)
     paths = [out / f"{name.replace('/', '_')}.stl" for name in parts]
     options.check_output(paths, SURFACE_FILES, overwrite)
     for path, part in zip(paths, parts.values(), strict=True):

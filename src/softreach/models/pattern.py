@@ -16,10 +16,10 @@ Lines = list[tuple[str, str, Array]]  # Layer, name where it begins, and points 
 
 _COLORS = {"cut": "#e00000", "ring": "#000000", "marks": "#0050d0"}
 _GAP, _LETTERS = 0.005, 0.002  # between sheets, and height of letters [m]
-_CORNERS = np.arange(5)  # of a sheet and of bundles, from base to tip and back
+_CORNERS = range(5)  # of a sheet and of bundles, from base to tip and back
 
 
-def pattern(arm: Manipulator, actuator: str | None = None, *, format: str = "svg") -> str:
+def pattern(arm: Manipulator, *, format: str = "svg") -> str:
     """Unrolled rings of fibers or muscles, 1:1 in mm, to cut bundles out of sheets.
 
     A sheet lies in the middle of its ring and goes around once, along its fibers. One sees its
@@ -30,27 +30,25 @@ def pattern(arm: Manipulator, actuator: str | None = None, *, format: str = "svg
 
     Args:
         arm: The design.
-        actuator: Name of the only fiber or muscle to unroll; None for all.
         format: "svg", or "dxf" for DXF R12.
 
     Returns:
         The text of the file.
 
     Raises:
-        InvalidInput: No fiber or muscle has this name, or another format.
+        InvalidInput: Another format.
         NotPossible: The arm has no such pattern; the sentence says why.
     """
     write = {"svg": _svg, "dxf": _dxf}[as_one_of("format", format, ("svg", "dxf"))]
     arm = a_manipulator("arm", arm)
-    named = {part.name: part for part in arm.actuators if isinstance(part, SectorActuator)}
-    if actuator is not None:
-        named = {actuator: named[as_one_of("actuator", actuator, named)]}
-    if not named or not arm.rest.is_straight:
+    parts = [part for part in arm.actuators if isinstance(part, SectorActuator)]
+    if not parts or not arm.rest.is_straight:
         raise NotPossible("only rings with fibers or muscles in an arm that is straight unroll")
-    sheets = [_sheet(arm, part) for part in named.values()]
+    sheets = [_sheet(arm, part) for part in parts]
     heights = np.concatenate([points[:, 1] for sheet in sheets for *_, points in sheet])
     below = np.array([0.0, np.ptp(heights) + _GAP])
-    return write([(*x, points - k * below) for k, s in enumerate(sheets) for *x, points in s])
+    lines = [(x, name, p - k * below) for k, sheet in enumerate(sheets) for x, name, p in sheet]
+    return write(lines)
 
 
 def _sheet(arm: Manipulator, part: SectorActuator) -> Lines:
@@ -81,9 +79,9 @@ def _sheet(arm: Manipulator, part: SectorActuator) -> Lines:
 
     lines, middles = Lines(), (part.start_angles - seam) % (2.0 * np.pi) - np.pi
     for name, middle in zip(part.bundle_names, middles, strict=True):
-        lines.append(("marks", name, traced(arm, partial(edge, middle, 0.0), 0, 1)))
-        lines.append(("cut", "", traced(arm, partial(edge, middle, 0.5 * part.extent), *_CORNERS)))
-    lines.append(("ring", "", traced(arm, partial(edge, 0.0, np.pi), *_CORNERS)))
+        lines.append(("marks", name, traced(arm, partial(edge, middle, 0.0), [0, 1])))
+        lines.append(("cut", "", traced(arm, partial(edge, middle, 0.5 * part.extent), _CORNERS)))
+    lines.append(("ring", "", traced(arm, partial(edge, 0.0, np.pi), _CORNERS)))
     zeros = flat(z[[0, -1]], (-seam - turned[[0, -1]]) % (2.0 * np.pi) - np.pi)
     for zero, inward in zip(zeros, (_LETTERS, -_LETTERS), strict=True):
         lines.append(("marks", "", zero + [[0.0, 0.0], [inward, 0.0]]))

@@ -5,7 +5,7 @@ go where the rest shape has them. Facets have the area of the circles that they 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from softreach.arm.base import UPRIGHT
 from softreach.arm.lines import line_places
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.section import Material
 from softreach.geometry.surface import Surface, tube_surface
 from softreach.rod.rods import as_tip_map
 from softreach.support.arguments import as_number
@@ -52,20 +53,20 @@ def solids(arm: Manipulator, *, channel_diameter: float | None = None) -> dict[s
     check_installed("manifold3d")
     if arm.section.bending_ratio != 1.0:
         raise NotPossible("a section of two bending stiffnesses is not round, its shape unknown")
-    least, layers = 1e3 * facet_tolerance(arm), arm.section.layers
+    least, empty = 1e3 * facet_tolerance(arm), import_module("manifold3d").Manifold()
     given = 0.2 * least if channel_diameter is None else channel_diameter
     diameter = as_number("channel_diameter", given, Range(0.01 * least, least, unit="m"))
     lines = [k for k, shape in enumerate(arm.outline(0.0).shape) if shape != "sector"]
     hollows = [(arm.bundle_names[k], _hollow(arm, k, 0.5 * diameter)) for k in lines]
-    taken, parts = _union([solid for _, solid in hollows]), list[tuple[str, Any]]()
-    for material in dict.fromkeys(layer.material for layer in layers):
-        rings = _union([_ring(arm, *layer[:2]) for layer in layers if layer.material == material])
-        parts.append((material.name or "body", rings - taken))
-        taken += rings
+    taken, bodies = sum((solid for _, solid in hollows), empty), dict[Material, Any]()
+    for inner, outer, material in arm.section.layers:
+        ring = _ring(arm, inner, outer) - taken
+        bodies[material] = bodies.get(material, empty) + ring
+        taken += ring
+    parts = [(material.name or "body", solid) for material, solid in bodies.items()]
     if arm.section.bore_ratio:
         parts.append(("bore", _ring(arm, 0.0, arm.section.bore_ratio)))
-    whole = _ring(arm, 0.0, 1.0)
-    parts += [(name, solid ^ whole) for name, solid in hollows]
+    parts += [(name, solid ^ _ring(arm, 0.0, 1.0)) for name, solid in hollows]
     surfaces: dict[str, Surface] = {}
     for name, solid in parts:
         solid = solid.trim_by_plane((0, 0, 1), 0.0).trim_by_plane((0, 0, -1), -arm.length)
@@ -82,7 +83,7 @@ def facet_tolerance(arm: Manipulator) -> float:
     return 1e-3 * float(arm.profile.radius(_along(arm)).min())
 
 
-def traced(arm: Manipulator, curve: Curve, *knots: float) -> Array:
+def traced(arm: Manipulator, curve: Curve, knots: Sequence[float]) -> Array:
     """Places (n, axis) on a curve, at knots from first to last and where its chords need more."""
     at = np.unique(np.clip(knots, knots[0], knots[-1]))
     while True:
@@ -95,11 +96,6 @@ def traced(arm: Manipulator, curve: Curve, *knots: float) -> Array:
 
 def _along(arm: Manipulator) -> Array:
     return np.union1d(np.linspace(0.0, arm.length, 129), arm.breakpoints)
-
-
-def _union(solids: list[Any]) -> Any:
-    library = import_module("manifold3d")
-    return library.Manifold.batch_boolean(solids, library.OpType.Add)
 
 
 def _ring(arm: Manipulator, inner: float, outer: float) -> Any:
@@ -132,7 +128,7 @@ def _tube(arm: Manipulator, curve: Curve, span: tuple[float, float], is_line: bo
     Its sections are across the line, or else across the arm.
     """
     (start, end), library = span, import_module("manifold3d")
-    *axis, radius = traced(arm, curve, start, *arm.breakpoints, end).T
+    *axis, radius = traced(arm, curve, [start, *arm.breakpoints, end]).T
     axis = np.stack(axis, axis=1)
     sections = _mitered(axis) if is_line else np.tile(np.eye(3)[:2], (len(axis), 1, 1))
     sides = max(12, math.ceil(np.pi * math.sqrt(radius.max() / (3.0 * facet_tolerance(arm)))))
@@ -143,7 +139,8 @@ def _tube(arm: Manipulator, curve: Curve, span: tuple[float, float], is_line: bo
     reach = 2.0 * radius[ends] / ahead[:, 2] * meets * [-1.0, 1.0]
     axis, radius = axis[station], radius[station] * math.sqrt(turn / math.sin(turn))
     axis[ends] += reach[:, None] * ahead
-    tube = tube_surface(axis, *sections[station].swapaxes(0, 1), radius, sides)
+    first, second = sections[station].swapaxes(0, 1)
+    tube = tube_surface(axis, first, second, radius, sides)
     return library.Manifold(library.Mesh64(tube.vertices, tube.faces.astype(np.uint64)))
 
 
