@@ -73,8 +73,8 @@ def solids(arm: Manipulator, *, channel_diameter: float | None = None) -> dict[s
         if not solid.is_empty():
             name = f"{name} ({len(surfaces) + 1})" if name in surfaces else name
             mesh = _at_rest(arm, solid.simplify(1e-2 * facet_tolerance(arm))).to_mesh64()
-            faces = mesh.tri_verts.astype(np.int64)
-            surfaces[name] = Surface(vertices=mesh.vert_properties[:, :3], faces=faces)
+            vertices, faces = mesh.vert_properties[:, :3].copy(), mesh.tri_verts.astype(np.int64)
+            surfaces[name] = Surface(vertices=vertices, faces=faces)
     return surfaces
 
 
