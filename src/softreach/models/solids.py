@@ -123,17 +123,14 @@ def _hollow(arm: Manipulator, k: int, channel_radius: float) -> Any:
 
 
 def _tube(arm: Manipulator, curve: Curve, span: tuple[float, float], is_line: bool = False) -> Any:
-    """A tube by x, y, z and radius at z, which goes on where it meets an end of the arm.
-
-    Its sections are across the line, or else across the arm.
-    """
+    """A tube by x, y, z and radius at z; its sections are across its line, or across the arm."""
     (start, end), library = span, import_module("manifold3d")
     *axis, radius = traced(arm, curve, [start, *arm.breakpoints, end]).T
     axis = np.stack(axis, axis=1)
     sections = _mitered(axis) if is_line else np.tile(np.eye(3)[:2], (len(axis), 1, 1))
     sides = max(12, math.ceil(np.pi * math.sqrt(radius.max() / (3.0 * facet_tolerance(arm)))))
     turn, aside, ends = 2.0 * np.pi / sides, 1e-9 * arm.length, [0, -1]
-    meets = start <= aside, end >= arm.length - aside
+    meets = start <= aside, end >= arm.length - aside  # where it goes on beyond the arm
     station = np.pad(np.arange(len(axis)), [*map(int, meets)], mode="edge")
     ahead = np.diff(axis, axis=0)[ends]
     reach = 2.0 * radius[ends] / ahead[:, 2] * meets * [-1.0, 1.0]
