@@ -58,12 +58,13 @@ def solids(arm: Manipulator, *, channel_diameter: float | None = None) -> dict[s
     diameter = as_number("channel_diameter", given, Range(0.01 * least, least, unit="m"))
     lines = [k for k, shape in enumerate(arm.outline(0.0).shape) if shape != "sector"]
     hollows = [(arm.bundle_names[k], _hollow(arm, k, 0.5 * diameter)) for k in lines]
-    taken, bodies = sum((solid for _, solid in hollows), empty), dict[Material, Any]()
+    taken, rings = sum((solid for _, solid in hollows), empty), dict[Material, Any]()
     for inner, outer, material in arm.section.layers:
-        ring = _ring(arm, inner, outer) - taken
-        bodies[material] = bodies.get(material, empty) + ring
+        rings[material] = rings.get(material, empty) + _ring(arm, inner, outer)
+    parts = list[tuple[str, Any]]()
+    for material, ring in rings.items():
+        parts.append((material.name or "body", ring - taken))
         taken += ring
-    parts = [(material.name or "body", solid) for material, solid in bodies.items()]
     if arm.section.bore_ratio:
         parts.append(("bore", _ring(arm, 0.0, arm.section.bore_ratio)))
     parts += [(name, solid ^ _ring(arm, 0.0, 1.0)) for name, solid in hollows]
@@ -169,7 +170,7 @@ def _at_rest(arm: Manipulator, solid: Any) -> Any:
     bare = as_tip_map(arm.replace(**without, loads=None, point=None, base=UPRIGHT))
 
     def placed(points: Points) -> Points:
-        z, section = np.unique(points[:, 2].clip(0.0, arm.length).round(12), return_inverse=True)
+        z, section = np.unique(points[:, 2].round(12).clip(0.0, arm.length), return_inverse=True)
         position, directors = (each[0, section] for each in bare.frames(np.empty((1, 0)), z))
         return position + np.einsum("nk,nkx->nx", points[:, :2], directors[:, :2])
 
