@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.exchange.activefilaments import write_cloud, write_design
+from softreach.exchange.activefilaments import write_cloud
 from softreach.export import export_arm, export_cloud, export_mesh
-from softreach.models import write_mujoco
 from softreach.plot import plot_3d, save_figure
 from softreach.support.errors import NotWritten, SoftreachWarning
 from softreach.support.files.atomic import place_to_read, replacing_folder, writing
@@ -59,8 +58,6 @@ WRITERS = {
     "design.toml": lambda things: (sr.Manipulator.save, things["arm"]),
     "needs.toml": lambda things: (things["needs"].save,),
     "poses.csv": lambda things: (things["plan"].save,),
-    "design.jl": lambda things: (write_design, things["arm"]),
-    "model.xml": lambda _: (write_mujoco, sr.designs.lce_arm()),
     "pair.csv": lambda things: (write_cloud, things["cloud"]),
 }
 

@@ -20,7 +20,6 @@ from softreach.exchange.activefilaments import (
     read_cloud,
     read_design,
     write_cloud,
-    write_design,
 )
 from softreach.exchange.activefilaments.filament import filament_of
 from softreach.support.errors import SoftreachWarning
@@ -305,8 +304,8 @@ def test_a_cloud_of_an_arm_that_is_no_filament_is_refused(tmp_path):
 def folder(folder):
     """An empty folder with a definition and a cloud of the filament."""
     FILAMENT.save("filament.toml")
-    write_design(FILAMENT, "filament.jl")
-    Path("filament.json").write_text(json_of(Path("filament.jl").read_text()))
+    Path("filament.jl").write_text(design_script(FILAMENT))
+    Path("filament.json").write_text(json_of(design_script(FILAMENT)))
     sr.save_cloud(sr.compute_cloud(FILAMENT, n=ROWS), "cloud.zarr")
     return folder
 

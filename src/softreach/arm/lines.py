@@ -56,8 +56,8 @@ def lengths_of_strains(arm: Manipulator, turn: Array, zeta: Array) -> Array:
     """Length of each bundle's middle line [m] by ω (n, node, 3) and ζ (n, node) at `quadrature`."""
     z, weights, half = quadrature(body_of(arm))
     step = _STEP * half
-    slopes = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
-    speed, _ = _tangents(_places(arm, z), slopes, turn, zeta)
+    slopes = (line_places(arm, z + step) - line_places(arm, z - step)) / (2.0 * step[:, None])
+    speed, _ = _tangents(line_places(arm, z), slopes, turn, zeta)
     lengths = np.einsum("sb,nsb->nb", weights[:, None] * arm.outline(z).acts, speed)
     if has_guides(arm):
         guides = Guides(body_of(arm))
@@ -86,7 +86,7 @@ def line_strains(arm: Manipulator) -> Array:
     return np.sort(each.T, axis=1)
 
 
-def _places(arm: Manipulator, z: Array) -> Array:
+def line_places(arm: Manipulator, z: Array) -> Array:
     """Middle of each bundle in the sections [m], shape (2, station, bundle)."""
     outline = arm.outline(z)
     middle = outline.middle_ratio * arm.profile.radius(z)[:, None]
@@ -119,7 +119,7 @@ def pull_error(arm: Manipulator) -> float:
     step = arm.length / _SECTIONS
     z = np.linspace(0.5 * step, arm.length - 0.5 * step, _SECTIONS)
     table, acts = tables(body, z), body.outline(z).acts[:, pulls, None]
-    places = _places(body, z)
+    places = line_places(body, z)
     slopes = np.gradient(places, step, axis=1, edge_order=2)[..., pulls]
     places = places[..., pulls]
     x, y = places

@@ -1,5 +1,9 @@
 """`softreach design`, `export`, `import`: a design described, and files of other programs."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +14,7 @@ from softreach.cli import options
 from softreach.cli.console import console, fields_of, for_machines
 from softreach.cli.options import UNCHANGED, Changes, Number, design_from, shown_in
 from softreach.support.errors import InvalidInput, NotPossible, no_warnings
+from softreach.support.files.formats import FileFormat
 
 _PAIR = "activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."
 Format = Annotated[str | None, Parameter(help=_PAIR)]
@@ -51,7 +56,7 @@ def design(
         console.note(f"warning: {warning}")
 
 
-def _for_machines(facts: "sr.rod.DesignSummary") -> dict[str, Any]:
+def _for_machines(facts: sr.rod.DesignSummary) -> dict[str, Any]:
     arm = facts.arm
     bundles: Any = {
         "name": arm.bundle_names,
@@ -78,6 +83,7 @@ def export(
     *,
     activation: options.Activation = None,
     format: Format = None,
+    channel_mm: Number | None = None,
     changes: Changes = UNCHANGED,
     overwrite: options.Overwrite = False,
     unit: options.Unit = None,
@@ -87,21 +93,22 @@ def export(
     A cloud becomes a table or points (.ply .csv .parquet .npz .vtu).
     A design becomes the surface of the bent arm with its fibers (.ply .stl .obj
     .glb .vtu), the source of a filament of ActiveFilaments.jl (.jl), a
-    model for MuJoCo (.xml), or kinematics in C (.h .c).
+    model for MuJoCo (.xml), kinematics in C (.h .c), the pattern of its rings
+    (.svg .dxf), or, in a folder, its parts at rest as solids to print (STL).
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
 
     Args:
-        out: The file to write; its suffix chooses the format.
+        out: The file to write; its suffix chooses the format. A folder for parts.
+        channel_mm: Diameter of the channels of tendons in parts.
     """
-    from softreach.exchange.activefilaments.filament import FILAMENT_SCRIPT, write_design
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.models.c_source import SOURCE
-    from softreach.models.mjcf import MODEL
     from softreach.support.files.text import write_text
 
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
+    if options.is_stored(source) or out.suffix:
+        options.refuse("but on parts, in a folder", channel_mm=channel_mm)
     if options.is_stored(source):
         options.refuse("on a cloud, which has many", activation=activation)
         options.refuse(options.STORED, **changes.given)
@@ -109,21 +116,16 @@ def export(
         write(source, out, overwrite, unit)
     elif format is not None and out.suffix != ".jl":
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
-    elif out.suffix == ".jl":
-        options.refuse("on a filament's definition, which has none", activation=activation)
+    elif out.suffix in (texts := _texts()):
+        options.refuse("on a model or a pattern, which have none", activation=activation)
         arm = design_from(source, changes)
-        options.refuse(_OTHER, unit=unit)
-        options.check_output(out, FILAMENT_SCRIPT, overwrite)
-        write_design(arm, out, overwrite=overwrite)
+        options.refuse("on a model in m or a pattern in mm", unit=unit)
+        options.check_output(out, dict.fromkeys(texts, FileFormat()), overwrite)
+        write_text(out, texts[out.suffix](arm), overwrite=overwrite)
         console.line(out)
-    elif out.suffix in (".xml", ".h", ".c"):
-        options.refuse("on a model, whose controls they are", activation=activation)
-        arm = design_from(source, changes)
-        options.refuse("for a model, whose lengths are in m", unit=unit)
-        options.check_output(out, {**SOURCE, **MODEL}, overwrite)
-        text = sr.models.mujoco(arm) if out.suffix == ".xml" else sr.models.c(arm)
-        write_text(out, text, overwrite=overwrite)
-        console.line(out)
+    elif not out.suffix:
+        options.refuse("on parts, which are at rest", activation=activation)
+        _export_parts(design_from(source, changes, unit or "mm"), out, channel_mm, overwrite)
     else:
         arm = design_from(source, changes, unit)
         options.check_output(out, SURFACE_FILES, overwrite)
@@ -131,6 +133,26 @@ def export(
         sr.export.export_arm(arm, shape, out, unit=written, overwrite=overwrite)
         console.written(out, written)
         console.line(out)
+
+
+def _texts() -> dict[str, Callable[[sr.Manipulator], str]]:
+    """What writes a design as the text of a file, by suffix."""
+    from softreach.exchange.activefilaments import design_script
+
+    models, dxf = sr.models, partial(sr.models.pattern, format="dxf")
+    texts = {".jl": design_script, ".xml": models.mujoco, ".h": models.c, ".c": models.c}
+    return {**texts, ".svg": models.pattern, ".dxf": dxf}
+
+
+def _export_parts(arm: sr.Manipulator, out: Path, mm: float | None, overwrite: bool) -> None:
+    from softreach.export.surfaces import SURFACE_FILES
+
+    parts = sr.models.solids(arm, channel_diameter=None if mm is None else 1e-3 * mm)
+    paths = [out / f"{name.replace('/', '_')}.stl" for name in parts]
+    options.check_output(paths, SURFACE_FILES, overwrite)
+    for path, part in zip(paths, parts.values(), strict=True):
+        sr.export.export_mesh(part, path, unit=arm.length_unit, overwrite=overwrite)
+        console.line(path)
 
 
 def _export_cloud(source: str, out: Path, overwrite: bool, unit: str | None) -> None:

@@ -3,7 +3,9 @@
 from softreach.models.c_source import c
 from softreach.models.inverse_table import InverseTable, inverse_table
 from softreach.models.local_model import LocalModel, local_model
-from softreach.models.mjcf import mujoco, write_mujoco
+from softreach.models.mjcf import mujoco
+from softreach.models.pattern import pattern
+from softreach.models.solids import solids
 from softreach.models.tracker import Tracker, TrackingStep
 
 __all__ = [
@@ -15,5 +17,6 @@ __all__ = [
     "inverse_table",
     "local_model",
     "mujoco",
-    "write_mujoco",
+    "pattern",
+    "solids",
 ]

@@ -21,12 +21,9 @@ from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.support.arguments import as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, NotPossible
-from softreach.support.files.formats import FileFormat, Formats
 
 if TYPE_CHECKING:
     from softreach.models.inverse_table import InverseTable
-
-SOURCE: Formats = {".h": FileFormat(), ".c": FileFormat()}  # Formats of files with `c`
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,40}")
 _A_LINE = 8  # numbers

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from os import PathLike
 
 import numpy as np
 
@@ -16,10 +15,6 @@ from softreach.models.chain import MOST_BODIES, Chain, bodies_for, chain_of
 from softreach.support.arguments import as_integer, as_number
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, NotPossible, Range
-from softreach.support.files.formats import FileFormat, Formats
-from softreach.support.files.text import write_text
-
-MODEL: Formats = {".xml": FileFormat()}  # Format of `write_mujoco`
 
 _TOLERANCES = Range(1e-6, 0.1)
 _DAMPINGS = Range(0.0, 10.0, unit="s", open_low=True)
@@ -67,23 +62,6 @@ def mujoco(
     _check(arm)
     chain = chain_of(arm, bodies or bodies_for(arm, tol))
     return _Model(arm, chain, damping).text()
-
-
-def write_mujoco(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write the text of `mujoco` to a file, with as many bodies as an error of 0.001 L needs.
-
-    Args:
-        arm: The design.
-        path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace a file.
-
-    Raises:
-        InvalidDesign: As `mujoco`.
-        NotPossible: As `mujoco`.
-        InvalidInput: Something else is there.
-        NotWritten: It cannot be written.
-    """
-    write_text(path, mujoco(arm), overwrite=overwrite)
 
 
 def _check(arm: Manipulator) -> None:

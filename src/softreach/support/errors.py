@@ -138,7 +138,7 @@ class InvalidDesign(SoftreachError, ValueError):
         super().__init__(("\n  " if source else "\n").join([*head, *map(str, self.faults)]))
 
 
-_EXTRAS = {
+_EXTRAS = {  # module -> extra with it
     "matplotlib": "plot",
     "skimage": "surface",
     "distributed": "cluster",
@@ -148,7 +148,7 @@ _EXTRAS = {
     "optuna": "search",
     "cmaes": "search",
 }
-_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio"), "export")  # module -> extra with it
+_EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio", "manifold3d"), "export")
 
 
 class MissingExtra(SoftreachError, ImportError):

@@ -4,7 +4,6 @@
 """
 
 from softreach.exchange.activefilaments.cloud import gamma_path, read_cloud, write_cloud
-from softreach.exchange.activefilaments.filament import design_script, read_design, write_design
+from softreach.exchange.activefilaments.filament import design_script, read_design
 
 __all__ = ["design_script", "gamma_path", "read_cloud", "read_design", "write_cloud"]
-__all__ += ["write_design"]

@@ -37,7 +37,7 @@ def gamma_path(path: str | PathLike[str]) -> Path:
 def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6) -> Dataset:
     """Read a cloud of ActiveFilaments.jl, and compare its tips with those that softreach computes.
 
-    Columns of NAME_gamma.csv are the sectors of the filament that `write_design` writes for the
+    Columns of NAME_gamma.csv are the sectors of the filament that `design_script` writes for the
     arm: ring by ring, in a ring sector by sector. Where several families of fibers share a ring,
     its activations are those of the arm times their number.
 

@@ -20,10 +20,7 @@ from softreach.arm.section import Material, Ring, Section
 from softreach.support.arguments import POSITIVE, as_given, as_number, as_path
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
-from softreach.support.files.formats import FileFormat, Formats
-from softreach.support.files.text import MEGABYTE, read_text, write_text
-
-FILAMENT_SCRIPT: Formats = {".jl": FileFormat()}  # Format of `write_design`
+from softreach.support.files.text import MEGABYTE, read_text
 
 Bounds = tuple[tuple[float, float], ...]
 
@@ -84,27 +81,12 @@ class Filament:
         return columns[:, own] / scales[own]
 
 
-def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a Julia script that defines the filament of ActiveFilaments.jl with an arm's tips.
-
-    Args:
-        arm: The design.
-        path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace a file.
+def design_script(arm: Manipulator) -> str:
+    """Julia that defines the filament of ActiveFilaments.jl with an arm's tips.
 
     Raises:
         InvalidInput: The arm has what no filament there has: another profile than a linear taper,
-            a bore, or other actuators than fibers along all of it; or something else is there.
-        NotWritten: It cannot be written.
-    """
-    write_text(path, design_script(arm), overwrite=overwrite)
-
-
-def design_script(arm: Manipulator) -> str:
-    """The text that `write_design` writes.
-
-    Raises:
-        InvalidInput: As `write_design`.
+            a bore, or other actuators than fibers along all of it.
     """
     filament = filament_of(a_manipulator("arm", arm))
     rings, activations, bounds = [], [], []
