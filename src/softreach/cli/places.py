@@ -1,6 +1,9 @@
 """`softreach solve`, `track` and `equilibria`: activations that lead to places, and back."""
 
 from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
@@ -20,6 +23,7 @@ def solve(
     within: str | None = None,
     direction: Signed = None,
     cone: str | None = None,
+    markers: Annotated[list[str] | None, Parameter(name="--marker")] = None,
     family: Whole | None = None,
     changes: Changes = UNCHANGED,
     unit: options.Unit = None,
@@ -39,6 +43,7 @@ def solve(
         within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
         direction: Direction x,y,z in which the tip must point; its length does not matter.
         cone: Largest angle from --direction: 5deg, 0.1rad; 0deg if left out.
+        markers: Position of a marker as well: elbow=80mm,0,120mm. May be repeated.
         family: Number of solutions for each target, with four or more free bundles: 1 if left out.
     """
     from softreach.inverse.request import angle_in, direction_in, length_in, position_in
@@ -58,10 +63,13 @@ def solve(
     count = 1 if family is None else family
     wanted = None if direction is None else direction_in("direction", direction)
     angle = 0.0 if cone is None else angle_in("cone", cone)
-    pose = {"direction": wanted, "cone": angle}
-    solutions = sr.solve_inverse(arm, points, within=reach, family=count, **pose)
+    pairs = options.pairs_in("marker", markers, "NAME=x,y,z, such as elbow=80mm,0,120mm")
+    places = {k: position_in(f"marker {k}", x, arm.length) for k, x in pairs.items()}
+    goals: Any = {"direction": wanted, "cone": angle, "markers": places, "marker_within": reach}
+    solutions = sr.solve_inverse(arm, points, within=reach, family=count, **goals)
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
+        lengths += ("marker_errors", "marker_gaps")
         known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]
         console.json([for_machines(fields_of(each, *lengths), arm.length) for each in known])
         return

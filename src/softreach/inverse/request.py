@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.rod.inputs import ActivationBox
-from softreach.support.arrays import Array, Index, as_floats, check_finite
+from softreach.rod.rods import at_marker
+from softreach.rod.tip_map import TipMap
+from softreach.support.arguments import as_mapping, as_number, as_one_of
+from softreach.support.arrays import Array, Index, as_floats, as_points, check_finite
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import numbers_in, read_quantity, unit_names
 from softreach.support.units import TYPED, lengths_in
@@ -20,7 +25,6 @@ _HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\
 
 RESIDUALS = Range(1e-13, 1e-2)
 """|tip - target| that can be asked for, in L; below, rounding of the tips decides."""
-
 
 ANGLE_TOL = 1e-6
 """Error of the tips' directions [rad], by which a direction may miss its cone."""
@@ -36,6 +40,8 @@ class Request:
     near: Array  # activations of the free bundles to stay near to [-], (t, dimension)
     direction: Array | None = None  # wanted tip tangents, unit vectors, (t, 3)
     orientation: Array | None = None  # wanted frames, d3 the `direction`, (t, 3, 3)
+    markers: Mapping[str, Array] = field(default_factory=dict)  # their wanted positions, (t, 3)
+    marker_within: Mapping[str, float] = field(default_factory=dict)  # as `within`, of some
     cone: float = 0.0  # angle from `direction` or `orientation` that is allowed [rad]
     direction_weight: float = 0.1  # of an angle [rad] against a distance in L
     within: float = 0.0  # |tip - target| that does where no pose meets both to `residual` [m]
@@ -48,12 +54,18 @@ class Request:
         """Angle at which a direction counts as met [rad]: that of the cone and of rounding."""
         return self.cone + ANGLE_TOL
 
+    @property
+    def is_of_place(self) -> bool:
+        """True if the position of the tip is the only goal."""
+        return self.direction is None and not self.markers
+
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""
         names = ("targets", "near", "direction", "orientation")
         parts = {name: getattr(self, name) for name in names}
         chosen = {name: part[rows] for name, part in parts.items() if part is not None}
-        return replace(self, **chosen)
+        markers = {name: places[rows] for name, places in self.markers.items()}
+        return replace(self, markers=markers, **chosen)
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
@@ -75,6 +87,23 @@ def as_orientations(orientation: ArrayLike, count: int) -> Array:
     if not (np.abs(square) < 1e-6).all() or not (np.linalg.det(frames) > 0.0).all():
         raise InvalidInput("orientation", frames, "rotation matrices: orthonormal, determinant 1")
     return frames
+
+
+def as_markers(
+    tip_map: TipMap, markers: Any, within: float | Mapping[str, float], count: int
+) -> dict[str, dict[str, Any]]:
+    """Positions (3,) or (t, 3) of markers as (t, 3), and distances that do [m], of a `Request`."""
+    places = as_mapping("markers", markers, as_points)
+    for name, points in places.items():
+        at_marker(tip_map, name)  # refuses one that the arm does not have
+        if len(points) not in (1, count):
+            raise InvalidInput(f"markers[{name!r}].shape", points.shape, f"(3,) or ({count}, 3)")
+        places[name] = np.broadcast_to(points, (count, 3))
+    each = within if isinstance(within, Mapping) else dict.fromkeys(places, within)
+    for name in each:
+        as_one_of("marker_within", name, tuple(places))
+        as_number("marker_within", each[name], Range(0.0, unit="m"))
+    return {"markers": places, "marker_within": dict(each)}
 
 
 def positions_in(text: str, source: str, length: float | None = None) -> list[list[float]]:
