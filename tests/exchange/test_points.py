@@ -63,12 +63,13 @@ def test_points_are_drawn(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.csv", "x,y,z\n1,2,nan\n", "point 1"),
+        ("a.csv", "x,y,z\n1,2,nan\n", "z in row 0 = nan"),
+        ("a.csv", "x,y,z\n1,2,3\n1,2,3,4\n", "row 1 of .* = 4 cells: must be 3"),
         ("a.csv", "u,v,w\n1,2,3\n", "must be x, y and z"),
         ("a.csv", "x_mm,y_cm,z_mm\n1,2,3\n", "must be of one unit"),
-        ("a.csv", "", "a table or points"),
-        ("a.csv", "1,2,3\n1,2,a\n", "a table or points"),
-        ("a.npy", "no array", "a table or points"),
+        ("a.csv", "", "a table in CSV"),
+        ("a.csv", "1,2,3\n1,2,a\n", "column z = .*: must be numbers"),
+        ("a.npy", "no array", "a table in CSV"),
         ("a.xyz", "1 2 3\n", "a file name ending in .csv"),
     ],
 )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,11 +15,8 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_mapping, as_number, as_one_of
 from softreach.support.arrays import Array, Index, as_floats, as_points, check_finite
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.quantity import numbers_in, read_quantity, unit_names
+from softreach.support.files.columns import read_table, split_unit, tip_columns
 from softreach.support.units import TYPED, lengths_in
-
-_HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\])])")
-"""Name of a column with its unit."""
 
 RESIDUALS = Range(1e-13, 1e-2)
 """|tip - target| that can be asked for, in L; below, rounding of the tips decides."""
@@ -106,19 +101,16 @@ def as_markers(
     return {"markers": places, "marker_within": dict(each)}
 
 
-def positions_in(text: str, source: str, length: float | None = None) -> list[list[float]]:
-    """Positions [m] from lines x,y,z; a header is skipped, but for units such as x_mm,y_mm,z_mm.
+def positions_in(content: bytes, source: str, length: float | None = None) -> list[list[float]]:
+    """Positions [m] from the table in a file, whose columns or cells may name their units.
 
     Errors name the file by `source`; places in L need a `length` L [m].
     """
-    rows = [line for line in text.splitlines() if line.strip()]
-    words = [word.strip() for word in rows[0].split(",")] if rows else []
-    if words and not any(word.startswith(tuple("+-.0123456789")) for word in words):
-        units = [_header_unit(word, rows[0], source) for word in words]
-        rows = [_with_units(row, units) for row in rows[1:]]
-    if not rows:
-        raise InvalidInput("targets", source, "a CSV file with a row x,y,z for each position")
-    return [position_in(f"{source}, point {k}", row, length) for k, row in enumerate(rows, 1)]
+    table = read_table(content, source)
+    columns = [(table[x], split_unit(x)[3]) for x in tip_columns(table.columns, "m", "L", "")]
+    cells = ([f"{cell}{unit}".replace("over_length", "L") for cell in own] for own, unit in columns)
+    rows = enumerate(zip(*cells, strict=True), 1)
+    return [position_in(f"{source}, point {k}", ",".join(row), length) for k, row in rows]
 
 
 def position_in(name: str, text: str, length: float | None = None) -> list[float]:
@@ -129,42 +121,3 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
         allowed = f"three comma-separated numbers x,y,z in m, or each with its unit ({units})"
         raise InvalidInput(name, text or "''", allowed)
     return values
-
-
-def length_in(name: str, text: str, length: float) -> float:
-    """One length [m] from what was typed, 0 or more, with its unit, in m or in a length L."""
-    values = lengths_in(text, 1, length)
-    if values is None or not 0.0 <= values[0] < np.inf:
-        raise InvalidInput(name, text or "''", f"a length in m, or with {TYPED}, L")
-    return values[0]
-
-
-def direction_in(name: str, text: str) -> list[float]:
-    """A direction from x,y,z."""
-    values = numbers_in(text, 3)
-    if values is None or not any(values):
-        raise InvalidInput(name, text or "''", "three comma-separated numbers x,y,z, not all 0")
-    return values
-
-
-def angle_in(name: str, text: str) -> float:
-    """An angle [rad] from what was typed, from 0 to half a turn, with its unit."""
-    with suppress(ValueError):
-        if 0.0 <= (angle := read_quantity(text, "rad")) <= np.pi:
-            return angle
-    raise InvalidInput(name, text or "''", "an angle from 0deg to 180deg, in deg or rad")
-
-
-def _header_unit(word: str, line: str, source: str) -> str:
-    """The unit of a column of a header such as x_mm,y_mm,z_mm or x [mm],y [mm],z [mm]."""
-    match = _HEADER.fullmatch(word.strip('"'))
-    if match is None:
-        return ""
-    if match[2] and match[2] not in (*unit_names("m"), "L"):
-        raise InvalidInput(f"{source}, header", line, f"in {TYPED} or L")
-    return {"over_length": "L"}.get(match[1], match[1] or match[2] or "")
-
-
-def _with_units(line: str, units: list[str]) -> str:
-    parts = [part.strip() for part in line.split(",")]
-    return ",".join(map(str.__add__, parts, units)) if len(parts) == len(units) else line
