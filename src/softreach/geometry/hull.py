@@ -75,7 +75,8 @@ class Hull:
         """The space inside."""
         from softreach.geometry.meshes import Mesh
 
-        return Mesh(*parted(self.vertices, self.faces))
+        vertices, faces = parted(self.vertices, self.faces)
+        return Mesh(vertices, faces.astype(np.int64))
 
     @property
     def bias(self) -> float | None:
