@@ -485,6 +485,20 @@ def test_a_solution_prints_itself_as_the_command_does(capsys):
     assert capsys.readouterr().out == f"{solution}\n"
 
 
+def test_a_marker_has_a_target_too(folder, printed):
+    elbow = sr.arm.Marker(name="elbow", station_over_length=0.5)
+    arm = sr.designs.three_tendon_robot(segments=2).replace(markers=[elbow])
+    arm.save(folder / "arm.toml")
+    tip, place = (
+        of(arm, [[5, 2, 0, 0, 6, 7]]).ravel() for of in (sr.tip_positions, sr.rod.marker_positions)
+    )
+    target, marker = (",".join(f"{1000 * x:.9g}mm" for x in each) for each in (tip, place))
+    command = "solve", "arm.toml", f"--target={target}", "--within", "1mm"
+    (found,) = printed(*command, "--marker", f"elbow={marker}")
+    assert found["status"] == "reached"
+    assert found["marker_errors_m"][0][0] < 1e-6
+
+
 def test_activations_are_told_in_their_units(capsys):
     assert run(["solve", "three_tendon_robot", "--target=0,0,1"]) == 0
     assert capsys.readouterr().out.count(" N") == 3

@@ -1,16 +1,19 @@
 """The inverse problem: every branch, nearest points, least change."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Base, Manipulator
+from softreach.arm.stations import Marker
 from softreach.inverse import Status, branches, prepared_map, solve_inverse
 from softreach.inverse.path import PathStatus, track_path
 from softreach.rod import as_tip_map
-from softreach.rod.kinematics import tip_positions
+from softreach.rod.kinematics import marker_positions, tip_positions
 from softreach.support.errors import InvalidInput
 from softreach.workspace import reachable_set
 from tests.laws import in_box, miss_of_original
@@ -313,6 +316,54 @@ def test_a_frame_is_a_direction_and_a_turn_around_it():
 def test_an_orientation_is_a_rotation_matrix(trunk, wrong, name):
     with pytest.raises(InvalidInput, match=re.escape(name)):
         solve_inverse(trunk, [[0.0, 0.0, 0.5]], orientation=wrong)
+
+
+ELBOW = Marker(name="elbow", station_over_length=0.5)
+SIDE = Marker(name="side", station_over_length=0.8, offset=(0.02, 0.01, 0.03))
+HANGING = designs.three_tendon_robot(segments=2).replace(base=Base(points="down"))
+
+
+@pytest.mark.parametrize("arm", [HANGING, trunk_at(108, 2)])
+def test_markers_that_fix_the_activation_lead_back_to_it(arm):
+    arm = arm.replace(markers=(ELBOW, SIDE))
+    known = in_box(arm, 8, seed=3)
+    markers = {name: as_tip_map(arm, point=name).tips(known) for name in ("elbow", "side")}
+    solutions = solve_inverse(arm, tip_positions(arm, known), markers=markers)
+    assert (solutions.statuses == Status.REACHED).all()
+    assert max(solutions.residuals.max(), solutions.marker_errors.max()) < 1e-9 * arm.length
+    np.testing.assert_allclose(solutions.activations, known, rtol=0, atol=1e-7)
+    places = marker_positions(arm, solutions.activations)
+    np.testing.assert_allclose(places, np.stack([*markers.values()], axis=1), atol=1e-6)
+
+
+def test_out_of_reach_all_distances_are_least_as_scipy_finds_them():
+    arm = HANGING.replace(markers=(ELBOW,))
+    maps, known = [as_tip_map(arm), as_tip_map(arm, point="elbow")], in_box(arm, 4, seed=1)
+    tips, elbows = (each.tips(known) + [0.0, 0.06, 0.03] for each in maps)
+    solutions = solve_inverse(arm, tips, markers={"elbow": elbows})
+    assert (solutions.statuses == Status.NOT_FOUND).all()
+    wanted = np.concatenate([tips, elbows], axis=1)
+    for start, goal, one in zip(known, wanted, solutions, strict=True):
+        rows = lambda x, goal=goal: np.ravel([m.tips(x[None]) for m in maps]) - goal  # noqa: E731
+        tight = {"xtol": 1e-12, "gtol": 1e-12}
+        best = least_squares(rows, start, bounds=arm.bounds.T, jac="3-point", **tight)
+        assert np.hypot(one.gap, *one.marker_gaps) == pytest.approx(np.sqrt(2 * best.cost))
+
+
+def test_a_target_is_reached_if_every_marker_is_within_its_own_distance(trunk):
+    arm = trunk.replace(markers=(ELBOW,))
+    known = in_box(arm, 1, seed=0)
+    target, elbow = tip_positions(arm, known), as_tip_map(arm, point="elbow").tips(known)
+    ask = partial(solve_inverse, arm, target, markers={"elbow": elbow + [0.0, 0.03, 0.0]})
+    for within, reached in ((0.031, True), ({"elbow": 0.031}, True), (0.02, False), (0.0, False)):
+        solution = ask(marker_within=within)[0]
+        assert (solution.status is Status.REACHED) == reached
+        assert ("elbow 30 mm off" in solution.text("mm")) == reached
+    shape = {"elbow": np.zeros((2, 3))}
+    wrong = {"markers": 3, "point": {"knee": elbow}, r"\['elbow'\].shape": shape}
+    for name, markers in wrong.items():
+        with pytest.raises(InvalidInput, match=name):
+            ask(markers=markers)
 
 
 def test_a_family_of_poses_meets_the_direction_each():

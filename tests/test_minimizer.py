@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from softreach.arm import designs
+from softreach.arm.stations import Marker
 from softreach.inverse.direction import minimize, pose_model
 from softreach.inverse.request import Request
 from softreach.rod import ActivationBox, as_tip_map, configuration
@@ -68,16 +69,19 @@ def test_no_bundle_brings_the_nearest_tip_nearer_to_a_target_out_of_reach(design
 @pytest.mark.parametrize("weight", [0.7, 3.0])
 @pytest.mark.parametrize("cone", [0.0, 0.4])
 @pytest.mark.parametrize(("pull", "within"), [(0.0, 0.0), (1e-2, 0.0), (0.0, 1.6)])
-def test_the_gradient_of_a_pose_is_its_derivative(weight, cone, pull, within):
+@pytest.mark.parametrize("markers", [(), (Marker(name="elbow", station_over_length=0.4),)])
+def test_the_gradient_of_a_pose_is_its_derivative(weight, cone, pull, within, markers):
     # Directions and Jacobians have steps of their own; the finer they are, the nearer they agree.
-    rod, rng = as_tip_map(designs.redundant_trunk(), tol=1e-10), np.random.default_rng(2)
+    arm, rng = designs.redundant_trunk().replace(markers=markers), np.random.default_rng(2)
+    rod = as_tip_map(arm, tol=1e-10)
     gamma = in_box(rod.arm, 9)
     direction = rng.normal(size=(9, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     request = Request(
         targets=rng.normal(size=(9, 3)), residual=1e-10, reach_tol=1e-6, direction_weight=weight,
         near=in_box(rod.arm, 9, seed=5), direction=direction, cone=cone,
-        within=within,
+        within=within, markers={x.name: rng.normal(size=(9, 3)) for x in markers},
+        marker_within={"elbow": within},
     )  # fmt: skip
     which = np.array([3, 3, 0, 8, 1, 2, 7, 5, 4])
     expected = differences(lambda x: pose_model(rod, request, pull, which, x)[0], gamma)

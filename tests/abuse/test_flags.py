@@ -90,11 +90,11 @@ def test_a_whole_number_may_be_written_in_every_way_that_rounds_nothing_and_in_n
 
 FILES = {
     "must be text in UTF-8": b"\x00\xff\xfe" * 50,
-    "point 2 = 0,0: must be three": b"0,0,1\n0,0",
-    "point 1 = 0,0,1,5: must be three": b"x,y,z\n0,0,1,5",
+    "row 1 of targets.csv = 2 cells: must be 3": b"0,0,1\n0,0",
+    "row 0 of targets.csv = 4 cells: must be 3": b"x,y,z\n0,0,1,5",
     "must be three": b"x,y,z\n0,0,nan",
-    "header = x [inch]": b"x [inch],y [inch],z [inch]\n1,2,3\n",
-    "a row x,y,z for each position": b"x,y,z\n",
+    "columns = x [inch]": b"x [inch],y [inch],z [inch]\n1,2,3\n",
+    "at least one row": b"x,y,z\n",
 }
 
 

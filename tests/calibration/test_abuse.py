@@ -86,7 +86,7 @@ FILES = {
     "a header": (b"t 1_N,t 2_N\n", "at least one row"),
     "bytes": (bytes(range(128)), "character 0 is NUL"),
     "a picture": (b"\x89PNG\r\n\x1a\n\xff\xfe", "text in UTF-8"),
-    "ragged": (b"a,b\n1,2\n1,2,3\n", "a table in CSV or Parquet"),
+    "ragged": (b"a,b\n1,2\n1,2,3\n", "row 1 of poses.csv = 3 cells: must be 2"),
 }
 
 
@@ -111,7 +111,7 @@ def test_a_row_that_was_cut_short_and_a_column_named_twice_are_refused(good, tmp
     lines = text.splitlines()
     lines[4] = lines[4].rpartition(",")[0]
     path.write_text("\n".join(lines))
-    assert "row 3 of the data has 8 cells" in refusal(path)
+    assert "row 3 of poses.csv = 8 cells: must be 9" in refusal(path)
     path.write_text(text.replace("tool_x_mm", "half_x_mm", 1))
     assert "two columns of this name" in refusal(path)
 

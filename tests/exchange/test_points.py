@@ -1,5 +1,8 @@
 """Points of other programs: the same places from every format, and their hulls in closed form."""
 
+import json
+import re
+
 import numpy as np
 import pytest
 
@@ -52,6 +55,47 @@ def test_the_volume_of_a_cube_and_the_area_of_a_square_are_printed(tmp_path, cap
     assert "area (in one plane)  10000 mm²" in capsys.readouterr().out
 
 
+def test_places_inside_and_another_shape_are_those_of_two_cubes(tmp_path, capsys):
+    names = [str(tmp_path / name) for name in ("cube.csv", "moved.csv")]
+    write_csv(names[0], CUBE, "x_mm,y_mm,z_mm")
+    write_csv(names[1], CUBE + [60.0, 0.0, 0.0], "x_mm,y_mm,z_mm")
+    words = ["volume", names[0], "--alpha", "60mm", "--inside", names[1], "--compare", names[1]]
+    assert run([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["places_inside"] == (CUBE[:, 0] <= 40.0).tolist()
+    assert found["overlap_m3"] == pytest.approx(4e-4, rel=1e-9)
+    assert found["symmetric_difference_m3"] == pytest.approx(12e-4, rel=1e-9)
+    assert found["farthest_m"] == found["farthest_of_other_m"] == pytest.approx(0.06)
+    assert run(words) == 0
+    assert re.search("places inside +108 of 216", capsys.readouterr().out)
+
+
+def test_a_place_is_inside_if_it_is_in_a_tetrahedron_that_is_kept():
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(0)
+    points, places = rng.random((1000, 3)), rng.random((4000, 3))
+    hull, mesh = sr.concave_hull(points, 0.3), Delaunay(points)
+    cell = mesh.find_simplex(places)
+    edges = points[mesh.simplices[cell, 1:]] - points[mesh.simplices[cell, :1]]
+    center = np.linalg.solve(2.0 * edges, (edges**2).sum(axis=2, keepdims=True))
+    kept = (cell >= 0) & (np.linalg.norm(center[..., 0], axis=1) <= 0.3)
+    assert (hull.contains(places) == kept).all()
+
+
+def test_the_largest_region_is_that_of_the_larger_of_two_cubes():
+    both = np.concatenate([CUBE, 0.5 * CUBE + [300.0, 0.0, 0.0]])
+    hull = sr.concave_hull(both, 60.0)
+    assert hull.regions == 2
+    assert hull.largest_region == pytest.approx(1e6)
+    assert hull.volume == pytest.approx(1.125e6)
+    ball = np.random.default_rng(0).normal(size=(40_000, 3))  # cut into boxes
+    ball /= np.linalg.norm(ball, axis=1)[:, None].clip(1.0)
+    shapes = (sr.concave_hull(x, 0.3) for x in (ball, np.concatenate([ball, ball[:5000] + 5.0])))
+    alone, beside = (each.largest_region for each in shapes)
+    assert alone == pytest.approx(beside, rel=1e-9)
+
+
 def test_points_are_drawn(tmp_path):
     pytest.importorskip("matplotlib")
     np.save(tmp_path / "a.npy", CUBE)
@@ -63,12 +107,13 @@ def test_points_are_drawn(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.csv", "x,y,z\n1,2,nan\n", "point 1"),
+        ("a.csv", "x,y,z\n1,2,nan\n", "z in row 0 = nan"),
+        ("a.csv", "x,y,z\n1,2,3\n1,2,3,4\n", "row 1 of .* = 4 cells: must be 3"),
         ("a.csv", "u,v,w\n1,2,3\n", "must be x, y and z"),
         ("a.csv", "x_mm,y_cm,z_mm\n1,2,3\n", "must be of one unit"),
-        ("a.csv", "", "a table or points"),
-        ("a.csv", "1,2,3\n1,2,a\n", "a table or points"),
-        ("a.npy", "no array", "a table or points"),
+        ("a.csv", "", "a table in CSV"),
+        ("a.csv", "1,2,3\n1,2,a\n", "column z = .*: must be numbers"),
+        ("a.npy", "no array", "a table in CSV"),
         ("a.xyz", "1 2 3\n", "a file name ending in .csv"),
     ],
 )

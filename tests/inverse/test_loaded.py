@@ -7,6 +7,7 @@ import pytest
 
 from softreach.arm import Loads, designs
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.stations import Marker
 from softreach.inverse import PathStatus, Status, prepared_map, solve_inverse
 from softreach.inverse.path import Drag, track_path
 from softreach.rod import as_tip_map
@@ -14,7 +15,7 @@ from softreach.rod.kinematics import configuration
 from softreach.rod.loaded.all_equilibria import equilibria
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.tip_map import TipStatus
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, NotPossible
 from tests.bodies import DOWN, SIDE, by_lines, oracle_rod, rubber
 from tests.oracles import loaded_rod
 
@@ -45,6 +46,17 @@ def stable(heavy):
     gamma = gamma[loaded(heavy).status(gamma) == TipStatus.STABLE][40:60]
     targets = as_tip_map(heavy).tips_and_slopes(gamma)[0]
     return gamma, targets, solve_inverse(heavy, targets)
+
+
+def test_a_marker_of_a_loaded_arm_has_a_target_in_postures_from_rest():
+    arm = hanging(0.0).replace(markers=(Marker(name="elbow", station_over_length=0.5),))
+    gamma = np.random.default_rng(0).uniform(*arm.bounds.T, (2, 3))
+    elbow = {"elbow": as_tip_map(arm, point="elbow").tips_and_slopes(gamma)[0]}
+    targets = as_tip_map(arm).tips_and_slopes(gamma)[0]
+    solutions = solve_inverse(arm, targets, markers=elbow)
+    np.testing.assert_allclose(solutions.activations, gamma, rtol=0, atol=1e-6)
+    with pytest.raises(NotPossible, match="straight from rest"):
+        solve_inverse(solutions[0].posture(), targets, markers=elbow)
 
 
 @pytest.mark.parametrize(

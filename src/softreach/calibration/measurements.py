@@ -1,19 +1,12 @@
 """Measured poses of an arm: a table of inputs and of the places of markers, with units in names."""
 
-import bz2
-import csv
-import gzip
 import hashlib
-import io
-import lzma
 import re
-import zipfile
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,19 +15,19 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_one_of, as_text
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, NotPossible, counted, did_you_mean, warn
-from softreach.support.files.text import MEGABYTE, text_of
+from softreach.support.files.columns import (
+    MOST,
+    numbers_of,
+    place_columns,
+    read_table,
+    split_unit,
+)
+from softreach.support.files.text import read_bytes
 from softreach.support.lazy import DataFrame
-from softreach.support.quantity import sizes_in
-
-_SIZES = {x.lower(): (u, s) for u in ("m", "N", "Pa") for x, s in sizes_in(u).items()}
-_SIZES |= {"gf": ("N", 9.80665e-3), "mbar": ("Pa", 1e2), "psi": ("Pa", 6894.757293168361)}
-_SIZES |= {"percent": ("1", 1e-2)}  # suffixes in small letters: SI unit, size
 
 _RUNS = ("run", "pattern", "group", "trial", "cluster", "sequence")
 _ORDERS = ("time_s", "time", "t_s", "sample", "order", "index", "frame")
-_PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNORECASE)
 _MOST_ROWS = 2_000_000
-_MOST_BYTES = 1000 * MEGABYTE
 _WIDEST = 4.0  # Distance of a place from the middle of all, in lengths of the arm, that is no pose
 _HARD = 100.0  # inputs beyond the bounds of the design, in them, that are a wrong unit or a slip
 _SLACK = 0.01  # of the largest tension: a negative one that is the zero of a load cell
@@ -154,13 +147,15 @@ def _runs_and_order(table: DataFrame, run: str | None, order: str | None) -> dic
     names, begins, runs = np.unique(every.astype(str), return_index=True, return_inverse=True)
     taken = np.arange(len(table))
     if order is not None and table[order].dtype.kind in "iuf":  # names of samples say nothing
-        taken = np.lexsort((_numbers(table, order, gaps=True), begins[runs])).astype(np.intp)
+        taken = np.lexsort((numbers_of(table, order, gaps=True), begins[runs])).astype(np.intp)
     return {"run_names": tuple(names.tolist()), "runs": runs, "order": taken}
 
 
 def _places(table: DataFrame, columns: Mapping[str, Sequence[str]]) -> Array:
     """Places of markers from their columns [m], NaN where one was not seen."""
-    each = [[_numbers(table, x, gaps=True) * _unit(x)[2] for x in y] for y in columns.values()]
+    each = [
+        [numbers_of(table, x, gaps=True) * split_unit(x)[2] for x in y] for y in columns.values()
+    ]
     places = np.moveaxis(np.array(each), 2, 0)
     seen = np.isfinite(places).all(axis=2)
     if not seen.any():
@@ -175,13 +170,13 @@ def _inputs(table: DataFrame, sources: Sequence[str], units: Sequence[str]) -> A
     for k, (name, unit) in enumerate(zip(sources, units, strict=True)):
         if not name:
             continue
-        _, own, size = _unit(name)
+        _, own, size, _ = split_unit(name)
         if own and own != unit:
             raise NotPossible(f"column {name} is in {own}, and must be in {_unit_text(unit)}")
         if not own and unit in ("m", "N", "Pa"):
             usual = f"{name}_{'mm' if unit == 'm' else unit}"
             raise NotPossible(f"the name of column {name} must end in its unit, such as {usual}")
-        values[:, k] = _numbers(table, name) * size
+        values[:, k] = numbers_of(table, name) * size
     return values
 
 
@@ -214,47 +209,7 @@ def _opened(data: Any) -> tuple[DataFrame, str]:
             raise InvalidInput("data", str(error), "columns of one length") from None
     if not isinstance(data, str | PathLike):
         raise InvalidInput("data", as_given(data), "a path, a DataFrame, or columns")
-    path = Path(data)
-    if not path.is_file():
-        raise InvalidInput("data", str(path), "a file that exists")
-    return read_table(path, str(path)), path.name
-
-
-def read_table(file: Path | IO[bytes], name: str) -> DataFrame:
-    """The table of a file whose name says Parquet, else CSV, packed if it says .gz or .zip."""
-    import pandas as pd
-
-    suffix = Path(name).suffix.lower()
-    try:
-        if suffix in (".parquet", ".pq"):
-            return pd.read_parquet(file)
-        with (
-            file.open("rb") if isinstance(file, Path) else file as packed,
-            _UNPACKED.get(suffix, nullcontext)(packed) as opened,
-        ):
-            text = text_of("data", name, opened.read(_MOST_BYTES + 1), _MOST_BYTES)
-        _refuse_short(text)
-        return pd.read_csv(io.StringIO(text), skipinitialspace=True, comment="#")
-    except (InvalidInput, NotPossible):
-        raise
-    except Exception as error:  # each kind of compression has its own
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InvalidInput("data", name, f"a table in CSV or Parquet: {reason}") from None
-
-
-_UNPACKED: dict[str, Any] = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}
-_UNPACKED[".zip"] = lambda file: (packed := zipfile.ZipFile(file)).open(packed.namelist()[0])
-
-
-def _refuse_short(text: str) -> None:
-    """Refuse a row with fewer cells than the header, the rest of which pandas takes as empty."""
-    lines = (line if '"' in line else line.partition("#")[0] for line in text.splitlines())
-    head, *rows = list(csv.reader(line for line in lines if line.strip())) or [[]]
-    count = len([name for name in head if name.strip()])
-    for k, row in enumerate(rows):
-        if len(row) < count:
-            cells = counted(len(row), "cell")
-            raise NotPossible(f"row {k} of the data has {cells}, and the header {count}")
+    return read_table(read_bytes("data", data, MOST), str(data)), Path(data).name
 
 
 def _named(columns: list[str], given: str | None, usual: Sequence[str], what: str) -> str | None:
@@ -304,22 +259,9 @@ def _missing(what: str, name: str, columns: Sequence[str]) -> InvalidInput:
     return InvalidInput(what, name, f"a column: {listed}", did_you_mean(name, columns))
 
 
-def _unit(column: str) -> tuple[str, str, float]:
-    """Name without its unit, the SI unit and its size; no unit where none is known."""
-    match = re.fullmatch(r"(.*?)\s*[\[(](.*)[\])]|(.+)_([^_]*)", column)
-    name, suffix = (part for part in match.groups() if part is not None) if match else ("", "")
-    unit = _SIZES.get(suffix.lower())
-    return (column, "", 1.0) if unit is None else (name, *unit)
-
-
 def _triples(columns: list[str]) -> dict[str, list[str]]:
     """Columns x, y, z of places by the start, or the number, that they share."""
-    places: dict[str, dict[str, str]] = {}
-    for column in columns:
-        name, unit, _ = _unit(column)
-        if unit == "m" and (match := _PLACE.fullmatch(name)):
-            start = match["head"].rstrip("_ ") + match["number"]
-            places.setdefault(start, {})[match["axis"].lower()] = column
+    places = place_columns(columns, "m")
     for axes in places.values():
         if lacking := [axis for axis in "xyz" if axis not in axes]:
             given = ", ".join(axes.values())
@@ -363,13 +305,13 @@ def _matched(
 
 def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str]) -> list[str]:
     """Column of each input; "" for one that stays at zero."""
-    chosen = _matched("input", arm.input_names, given, {c: _unit(c)[0] for c in columns})
+    chosen = _matched("input", arm.input_names, given, {c: split_unit(c)[0] for c in columns})
     units = dict(zip(arm.input_names, arm.input_units, strict=True))
     left = [name for name in arm.input_names if name not in chosen]
     for unit in dict.fromkeys(units[name] for name in left):
         wanting = [name for name in left if units[name] == unit]
         fitting = {unit} if unit in ("m", "N", "Pa") else {unit, ""}  # a plain number has none
-        free = [c for c in columns if c not in chosen.values() and _unit(c)[1] in fitting]
+        free = [c for c in columns if c not in chosen.values() and split_unit(c)[1] in fitting]
         if len(free) != len(wanting):
             want = f"{counted(len(wanting), 'column')} in {_unit_text(unit)}"
             want += f" for {', '.join(wanting)}, and has {', '.join(free) or 'none'}"
@@ -380,16 +322,3 @@ def _input_columns(arm: Manipulator, columns: list[str], given: Mapping[str, str
 
 def _unit_text(unit: str) -> str:
     return {"1": "no unit", "m": "m, cm or mm", "N": "N", "Pa": "Pa, kPa or bar"}.get(unit, unit)
-
-
-def _numbers(table: DataFrame, column: str, *, gaps: bool = False) -> Array:
-    """Finite numbers of a column; NaN where there is none, if it may have gaps."""
-    try:
-        values = table[column].to_numpy(float)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(f"column {column}", str(error), "numbers") from None
-    wrong = np.isinf(values) if gaps else ~np.isfinite(values)
-    if wrong.any():
-        row = int(wrong.argmax())
-        raise InvalidInput(f"{column} in row {row}", values[row], "a finite number")
-    return values

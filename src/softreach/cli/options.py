@@ -20,7 +20,7 @@ from softreach.support.arguments import POSITIVE, as_one_of
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, Range
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
-from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.files.text import MEGABYTE, read_bytes
 from softreach.support.lazy import Dataset
 from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
@@ -364,7 +364,7 @@ def points_in(name: str, file: Path, arm: sr.Manipulator) -> list[list[float]]:
     """Positions [m] from a CSV file with columns x, y, z; a header says no more than units."""
     from softreach.inverse.request import positions_in
 
-    return positions_in(read_text(name, file, _MOST_TARGETS), str(file), arm.length)
+    return positions_in(read_bytes(name, file, _MOST_TARGETS), str(file), arm.length)
 
 
 def radius_of(text: str, length: float | None) -> float | str:

@@ -1,14 +1,21 @@
 """`softreach solve`, `track` and `equilibria`: activations that lead to places, and back."""
 
+import math
+from functools import partial
 from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import Parameter
 
 import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import console, fields_of, for_machines
-from softreach.cli.options import UNCHANGED, Changes, Signed, Whole, design_from
-from softreach.support.errors import NotPossible
+from softreach.cli.options import UNCHANGED, Changes, Signed, Whole, design_from, read_as
+from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
+from softreach.support.quantity import numbers_in, read_quantity
+from softreach.support.units import TYPED, read_length
 
 
 def solve(
@@ -20,6 +27,7 @@ def solve(
     within: str | None = None,
     direction: Signed = None,
     cone: str | None = None,
+    markers: Annotated[list[str] | None, Parameter(name="--marker")] = None,
     family: Whole | None = None,
     changes: Changes = UNCHANGED,
     unit: options.Unit = None,
@@ -39,9 +47,10 @@ def solve(
         within: Distance at which a target counts as reached: 1mm, 0.005L, 0.001 (m).
         direction: Direction x,y,z in which the tip must point; its length does not matter.
         cone: Largest angle from --direction: 5deg, 0.1rad; 0deg if left out.
+        markers: Position of a marker as well: elbow=80mm,0,120mm. May be repeated.
         family: Number of solutions for each target, with four or more free bundles: 1 if left out.
     """
-    from softreach.inverse.request import angle_in, direction_in, length_in, position_in
+    from softreach.inverse.request import position_in
 
     if (target is None) == (targets is None):
         raise NotPossible("give either --target or --targets")
@@ -54,14 +63,21 @@ def solve(
         points = [position_in("target", target or "", arm.length)]
     else:
         points = options.points_in("targets", targets, arm)
-    reach = 0.0 if within is None else length_in("within", within, arm.length)
+    distance = partial(read_length, length=arm.length), f"a length in m, or with {TYPED}, L"
+    reach = read_as("within", "0" if within is None else within, *distance, Range(0.0))
     count = 1 if family is None else family
-    wanted = None if direction is None else direction_in("direction", direction)
-    angle = 0.0 if cone is None else angle_in("cone", cone)
-    pose = {"direction": wanted, "cone": angle}
-    solutions = sr.solve_inverse(arm, points, within=reach, family=count, **pose)
+    wanted = None if direction is None else numbers_in(direction, 3)
+    if direction is not None and wanted is None:
+        raise InvalidInput("direction", direction or "''", "three comma-separated numbers x,y,z")
+    turn = partial(read_quantity, unit="rad"), "an angle from 0deg to 180deg, in deg or rad"
+    angle = read_as("cone", "0" if cone is None else cone, *turn, Range(0.0, math.pi))
+    pairs = options.pairs_in("marker", markers, "NAME=x,y,z, such as elbow=80mm,0,120mm")
+    places = {k: position_in(f"marker {k}", x, arm.length) for k, x in pairs.items()}
+    goals: Any = {"direction": wanted, "cone": angle, "markers": places, "marker_within": reach}
+    solutions = sr.solve_inverse(arm, points, within=reach, family=count, **goals)
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
+        lengths += ("marker_errors", "marker_gaps")
         known = [{k: x for k, x in vars(one).items() if k != "tip_maps"} for one in solutions]
         console.json([for_machines(fields_of(each, *lengths), arm.length) for each in known])
         return

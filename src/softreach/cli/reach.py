@@ -253,6 +253,8 @@ def volume(
     /,
     *,
     alpha: str | None = None,
+    inside: Path | None = None,
+    compare: str | None = None,
     sampling: options.Sampling = options.SAMPLING,
     changes: Changes = UNCHANGED,
     out: options.Out = None,
@@ -269,6 +271,8 @@ def volume(
     Args:
         alpha: α-shape radius: 0.05L, 5cm, 0.05 (m), or critical. 0.05L if left out; critical, the
             smallest that keeps the points together, for points without a design.
+        inside: File of places: counts those inside of the shape; --json lists each.
+        compare: Cloud, design or points whose shape is compared: overlap, difference, distances.
         out: Write the α-shape here: .ply .stl .obj .glb .vtu
     """
     from softreach.export.surfaces import SURFACE_FILES
@@ -295,6 +299,17 @@ def volume(
         rows = {name: rows[name] for name in ("points", "alpha")}
         rows |= {"area (in one plane)": (areas[0], "m²"), "convex area": (areas[1], "m²")}
         rows["unreachability"] = (share, "")
+    in_points = output.unit if options.is_points(source) else None
+    if inside is not None:
+        places = sr.exchange.read_points(inside, unit=in_points).tip
+        are_in = concave.contains(places).tolist()
+        rows["places inside"] = are_in if output.json else f"{sum(are_in)} of {len(are_in)}", ""
+    if compare is not None:
+        if options.is_points(compare):
+            other = sr.exchange.read_points(compare, unit=in_points)
+        else:
+            other, _ = options.cloud_of(compare, sampling, changes, output.unit)
+        rows |= rows_of(sr.volume.compare(concave, sr.concave_hull(other.tip, radius)))
     console.rows(f"volume of {source}", rows, output.json, arm, unit)
     if out is not None:
         options.save_mesh(concave, unit, out, output.overwrite)
@@ -308,6 +323,7 @@ def volume_rows(concave: sr.volume.Hull, convex: sr.volume.Hull) -> Rows:
         "alpha": (concave.alpha, "m"),
         "mean spacing": (concave.spacing, "m"),
         "regions": (concave.regions, ""),
+        "largest region": (concave.largest_region, "m³"),
     }
     rows["volume"] = concave.volume, "m³"
     rows["volume without sampling bias (estimate)"] = concave.volume_corrected, "m³"

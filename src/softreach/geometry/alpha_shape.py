@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.geometry.hull import Hull
-from softreach.geometry.surface import compact_surface, surface_area, unit_scale
+from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area, unit_scale
 from softreach.kernels.points import alpha as kernels
 from softreach.kernels.points.bowyer_watson import insertion_order, triangulate
 from softreach.kernels.points.predicates import scratch
@@ -166,9 +166,9 @@ class AlphaComplex:
     def hull(self, alpha: float) -> Hull:
         """The shape of one radius [m]: surface, volume, area and regions."""
         mesh, kept = self.triangulation, self.least <= alpha
-        faces, regions = _joined([_kept_piece(mesh.tetrahedra, mesh.neighbors, kept, self.flat)])
+        surface = _joined([_kept_piece(mesh.tetrahedra, mesh.neighbors, kept, self.flat)])
         volume = _sum(self.volumes[kept & ~self.flat])
-        return _hull(mesh.points, faces, volume, alpha, regions)
+        return _hull(mesh.points, *surface, volume, alpha)
 
 
 def alpha_hull(
@@ -187,12 +187,12 @@ def alpha_hull(
         chosen = np.random.default_rng(0).integers(len(points), size=SAMPLED)
         parts = _divided(scaled[chosen], radius, WHOLE, most)
     pieces = _pieces(scaled, radius, part, parts)
-    faces, regions = _joined(pieces)
+    surface = _joined(pieces)
     volume, volume_of_part = (
         float(np.ldexp(_sum(np.concatenate(volumes)), 3 * exponent))
         for volumes in zip(*(piece.volumes for piece in pieces), strict=True)
     )
-    return _hull(points, faces, volume, alpha, regions), volume_of_part
+    return _hull(points, *surface, volume, alpha), volume_of_part
 
 
 class _Piece(NamedTuple):
@@ -267,22 +267,22 @@ def _kept_piece(cells: np.ndarray, neighbors: np.ndarray, kept: Mask, flat: Mask
     return _Piece(faces, np.searchsorted(roots, owners), solid[roots])
 
 
-def _joined(pieces: list[_Piece]) -> tuple[Faces, int]:
-    """The faces around the regions of all pieces together, and the number of regions."""
+def _joined(pieces: list[_Piece]) -> tuple[Faces, Index]:
+    """The faces around the regions of all pieces together, and the region of each."""
     solid = np.concatenate([piece.solid for piece in pieces])
     firsts = np.cumsum([0, *(len(piece.solid) for piece in pieces)])
     faces = np.concatenate([piece.faces for piece in pieces])
     sets = np.concatenate([k + piece.sets for k, piece in zip(firsts, pieces, strict=False)])
     if len(pieces) == 1:
-        return faces[solid[sets]], int(solid.sum())
+        return faces[solid[sets]], sets[solid[sets]]
     inner = np.zeros(len(faces), bool)
     table = np.full(1 << (2 * len(faces)).bit_length(), -1)
     parent = np.arange(len(solid))
     kernels.join_pieces(np.sort(faces, axis=1), sets, solid, parent, table, inner)
     while not np.array_equal(above := parent[sets], sets):
         sets = above
-    roots = parent == np.arange(len(parent))
-    return faces[~inner & solid[sets]], int(solid[roots].sum())
+    outer = ~inner & solid[sets]
+    return faces[outer], sets[outer]
 
 
 def _divided(sample: Points, alpha: float, box: Array, most: int) -> list[Array]:
@@ -324,8 +324,10 @@ def _near(points: Points, alpha: float, box: Array) -> Mask:
     return near
 
 
-def _hull(points: Points, faces: Faces, volume: float, alpha: float, regions: int) -> Hull:
+def _hull(points: Points, faces: Faces, sets: Index, volume: float, alpha: float) -> Hull:
     """A shape, its faces in an order that does not depend on where they come from."""
+    regions, region = np.unique(sets, return_inverse=True)
+    parts = [enclosed_volume(points, faces[region == k]) for k in range(len(regions))]
     vertices, faces = compact_surface(points, faces)
     first = faces.argmin(axis=1)[:, None] if len(faces) else faces[:, :1]
     faces = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
@@ -336,7 +338,8 @@ def _hull(points: Points, faces: Faces, volume: float, alpha: float, regions: in
         volume=volume,
         area=surface_area(vertices, faces),
         alpha=float(alpha),
-        regions=regions,
+        regions=len(regions),
+        largest_region=max(parts, default=0.0),
         n=len(points),
     )
 

@@ -6,14 +6,26 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area, unit_scale
+from softreach.geometry.surface import (
+    compact_surface,
+    enclosed_volume,
+    parted,
+    surface_area,
+    unit_scale,
+)
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
+from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
 from softreach.support.versions import versions
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from softreach.geometry.meshes import Mesh
+
+_ROUNDING = 1e-12  # of its size, by which a place may be beyond a surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -32,6 +44,8 @@ class Hull:
     """Radius of the alpha shape [m]; inf for the convex hull."""
     regions: int
     """Number of parts that are connected through faces."""
+    largest_region: float
+    """Volume of the largest of these [m³]."""
     n: int
     """Number of points N of the cloud."""
     volume_corrected: float | None = None
@@ -47,6 +61,23 @@ class Hull:
         """Mean distance between neighboring points, (V/N)^(1/3) [m]; NaN without points."""
         return float(np.cbrt(self.volume / self.n)) if self.n else np.nan
 
+    def contains(self, places: ArrayLike) -> Mask:
+        """Mask of places [m], shape (k, 3), that are inside or, to rounding, on the surface.
+
+        Raises:
+            NotPossible: There is no volume.
+        """
+        size = float(np.ptp(self.vertices, axis=0).max(initial=0.0))
+        return self.solid.distance(places) <= _ROUNDING * size
+
+    @lazy
+    def solid(self) -> Mesh:
+        """The space inside."""
+        from softreach.geometry.meshes import Mesh
+
+        vertices, faces = parted(self.vertices, self.faces)
+        return Mesh(vertices, faces.astype(np.int64))
+
     @property
     def bias(self) -> float | None:
         """Estimated error of the volume [m³], below zero if it is too small."""
@@ -61,6 +92,7 @@ class Hull:
             "area": ("m2", "area of the surface, inner walls included"),
             "alpha": ("m", "radius of the alpha shape"),
             "regions": ("1", "parts connected through faces"),
+            "largest_region": ("m3", "volume of the largest of these"),
             "n": ("1", "points of the cloud"),
             "volume_corrected": ("m3", "volume without sampling bias (estimate)"),
         }
@@ -91,10 +123,12 @@ class Hull:
 def convex_hull(points: np.ndarray) -> Hull:
     """The convex hull of a cloud (n, 3) [m] by Qhull; without faces if it is flat."""
     vertices, faces = compact_surface(points, convex_faces(points))
+    volume = enclosed_volume(vertices, faces)
     return Hull(
         vertices=vertices,
         faces=faces,
-        volume=enclosed_volume(vertices, faces),
+        volume=volume,
+        largest_region=volume,
         area=surface_area(vertices, faces),
         alpha=np.inf,
         regions=int(len(faces) > 0),

@@ -40,6 +40,24 @@ class TriangleTree(NamedTuple):
     corners: Array  # Of the triangles, in this order [m], shape (f, 3, 3)
     normals: Array  # Of each face, of its edges, and of its corners by their angles, (f, 7, 3)
 
+    @classmethod
+    def of(cls, corners: Array, normals: Array) -> Self:
+        """The tree of triangles (f, 3, 3) [m] with normals of their parts (f, 7, 3)."""
+        count, order = len(corners), np.arange(len(corners))
+        middles, boxes = corners.mean(axis=1), list[Array]()
+        depth = max(0, int(np.ceil(np.log2(count / _FEW))))
+        for level in range(depth + 1):
+            starts = np.arange(2**level + 1) * count // 2**level
+            own = corners[order]
+            ends = own.min(axis=1), own.max(axis=1)
+            low, high = (f.reduceat(x, starts[:-1]) for f, x in zip(_ENDS, ends, strict=True))
+            boxes.append(np.concatenate([low, high], axis=1))
+            block = np.repeat(np.arange(2**level), np.diff(starts))
+            along = middles[order, (high - low).argmax(axis=1)[block]]
+            order = order[np.lexsort((along, block))]  # within each box
+        starts = np.arange(2**depth + 1) * count // 2**depth
+        return cls(np.concatenate(boxes), starts, corners[order], normals[order])
+
     def nearest(self, points: Array, enough: float = 1.0) -> tuple[Array, Array, Index]:
         """Signed distances of points (n, 3) [m], gradients (n, 3), and the nearest triangles.
 
@@ -163,20 +181,7 @@ class Mesh(Region):
     @lazy
     def tree(self) -> TriangleTree:
         """Boxes around its triangles, by which the nearest one is found."""
-        corners, count = self._corners, len(self.faces)
-        order, middles, boxes = np.arange(count), corners.mean(axis=1), list[Array]()
-        depth = max(0, int(np.ceil(np.log2(count / _FEW))))
-        for level in range(depth + 1):
-            starts = np.arange(2**level + 1) * count // 2**level
-            own = corners[order]
-            ends = own.min(axis=1), own.max(axis=1)
-            low, high = (f.reduceat(x, starts[:-1]) for f, x in zip(_ENDS, ends, strict=True))
-            boxes.append(np.concatenate([low, high], axis=1))
-            block = np.repeat(np.arange(2**level), np.diff(starts))
-            along = middles[order, (high - low).argmax(axis=1)[block]]
-            order = order[np.lexsort((along, block))]  # within each box
-        starts = np.arange(2**depth + 1) * count // 2**depth
-        return TriangleTree(np.concatenate(boxes), starts, corners[order], self._normals[order])
+        return TriangleTree.of(self._corners, self._normals)
 
     def wireframe(self, around: Array) -> list[Array]:
         edges, beside = self._edges[:2]

@@ -15,11 +15,10 @@ from softreach.support.errors import InvalidInput, check_installed
 from softreach.support.lazy import lazy
 
 if TYPE_CHECKING:
-    from scipy.spatial import KDTree
+    from softreach.geometry.meshes import TriangleTree
 
 FINEST = 200  # bits below the largest coordinate that `kernels.points.predicates` may see
 _ASIDE = 1e-3  # of the length of an edge, by which a wedge is drawn back
-_NEIGHBORS = 16  # with 4, distances to long triangles came out up to a cell too large
 
 
 class SurfaceMesh(Protocol):
@@ -56,33 +55,19 @@ class Surface:
         return surface_area(self.vertices, self.faces)
 
     def distance(self, points: Array) -> Array:
-        """Distance of points to the nearest triangle around their 16 nearest vertices [m], (n,)."""
-        if not len(self.faces):
-            return np.full(len(points), np.inf)
-        from softreach.kernels.points.triangles import distances_to_faces
-
-        count = min(_NEIGHBORS, len(self.vertices))
-        near = self._tree.query(points, count, workers=-1)[1].reshape(len(points), count)
-        out = np.empty(len(points))
-        distances_to_faces(points, self.vertices, self.faces, *self._incidence, near, out)
-        return out
+        """Distance of points to the nearest triangle [m], shape (n,)."""
+        return self._tree.nearest(points)[0] if len(self.faces) else np.full(len(points), np.inf)
 
     def __repr__(self) -> str:
         corners, triangles = len(self.vertices), len(self.faces)
         return f"Surface: {triangles:,} triangles, {corners:,} vertices, area {self.area:.6g} m²"
 
     @lazy
-    def _tree(self) -> KDTree:
-        from scipy.spatial import KDTree
+    def _tree(self) -> TriangleTree:
+        from softreach.geometry.meshes import TriangleTree
 
-        return KDTree(self.vertices)
-
-    @lazy
-    def _incidence(self) -> tuple[Index, Index]:
-        """Faces around each vertex, one after the other, and where each vertex's begin."""
-        corners = self.faces.ravel()
-        ends = np.cumsum(np.bincount(corners, minlength=len(self.vertices)))
-        return np.argsort(corners, kind="stable") // 3, np.concatenate([[0], ends])
+        corners = self.vertices[np.asarray(self.faces)]
+        return TriangleTree.of(corners, np.zeros((len(corners), 7, 3)))  # no side is inside
 
 
 def level_set(field: Array, level: float) -> tuple[Points, Faces]:

@@ -1,9 +1,9 @@
-"""Poses: a place and a direction of the tip as rows of one search, by Gauss-Newton in the box.
+"""Poses: places of tip and markers and a direction as rows of one search, by Gauss-Newton in a box.
 
-Rows are (tip - target)/L and w q, where the rotation vector q = (θ - cone)+ (e × d3)/|e × d3| says
-how far the direction d3 is from the cone around the wanted e: theory (40). Where a whole frame is
-wanted, q is the rotation vector between both frames. Both vanish at a pose that meets its goals,
-next to which steps gain twice as many digits each.
+Rows are (tip - target)/L, the same of each marker, and w q, where the rotation vector
+q = (θ - cone)+ (e × d3)/|e × d3| says how far the direction d3 is from the cone around the wanted
+e: theory (40). Where a whole frame is wanted, q is the rotation vector between both frames. All
+vanish at a pose that meets its goals, next to which steps gain twice as many digits each.
 """
 
 from __future__ import annotations
@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softreach.inverse.request import Request
 from softreach.kernels.box.bounded_descent import box_steps
 from softreach.rod.inputs import ActivationBox
+from softreach.rod.rods import at_marker
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 
@@ -29,6 +30,7 @@ _STEP_TOL = 1e-12  # step at which a search has converged, in ranges
 _VALUE_TOL = 1e-14  # relative increase of a value that is rounding
 _INSIDE = 0.999  # of a distance that is allowed: a search for it comes no nearer than that
 _LEAST_DAMPING, _LARGEST_DAMPING = 1e-12, 1e8  # parts of the largest curvature
+_EXACTLY: dict[str, Any] = {"within": 0.0, "marker_within": {}}
 _PULLS = (1e-2, 1e-4, 1e-7, 0.0)
 """Falling weights of ½|γ - near|² beside the goals, so that of all poses that of least change is
 found."""
@@ -39,21 +41,22 @@ class Poses(NamedTuple):
 
     gamma: Array  # activations [-], (n, m)
     merit: Array  # half the sum of the squared rows, (n,)
-    miss: Array  # |tip - target|, or L times the angle to the cone if that is more [m], (n,)
+    miss: Array  # largest of distances to targets and L times the angle to the cone [m], (n,)
 
 
 def compromises(tip_map: TipMap, request: Request, start: Array) -> Poses:
-    """Local minima of |tip - target|²/L² + w² |q|² from starts (n, m), one for each target.
+    """Local minima of the sum of squared rows from starts (n, m), one for each target.
 
-    From there those with what |tip - target| exceeds `within`, where that is asked for.
+    From there those with what distances exceed `within` by, where that is asked for.
     """
-    ends = _descended(tip_map, replace(request, within=0.0), start, (0.0,))
-    return _descended(tip_map, request, ends.gamma, (0.0,)) if request.within else ends
+    ends = _descended(tip_map, replace(request, **_EXACTLY), start, (0.0,))
+    wide = request.within or any(request.marker_within.values())
+    return _descended(tip_map, request, ends.gamma, (0.0,)) if wide else ends
 
 
 def nearest_poses(tip_map: TipMap, request: Request, start: Array) -> Poses:
     """Poses that meet their goals with little change from `near`, from starts (n, m)."""
-    return _descended(tip_map, replace(request, within=0.0), start, _PULLS)
+    return _descended(tip_map, replace(request, **_EXACTLY), start, _PULLS)
 
 
 def direction_errors(tip_map: TipMap, request: Request, target: Index, gamma: Array) -> Array:
@@ -67,32 +70,56 @@ def direction_errors(tip_map: TipMap, request: Request, target: Index, gamma: Ar
     return angles_from(tip_map.tip_directions(gamma), request.direction[target])[0]
 
 
-def goal_rows(
-    tip_map: TipMap, request: Request, which: Index, gamma: Array
-) -> tuple[Array, Array, Array]:
-    """Rows (n, 6), their derivatives (n, 6, m) and the miss [m] at activations (n, m)."""
+def marker_errors(tip_map: TipMap, request: Request, target: Index, gamma: Array) -> Array:
+    """Distances of markers from where they are wanted for some targets [m], (n, markers)."""
+    errors = [
+        np.linalg.norm(at_marker(tip_map, name).tips(gamma) - places[target], axis=1)
+        for name, places in request.markers.items()
+    ]
+    return np.reshape(errors, (len(request.markers), len(gamma))).T
+
+
+_Rows = tuple[Array, Array, Array]
+"""Rows (n, 3), their derivatives (n, 3, m), and their lengths without weights, (n,)."""
+
+
+def goal_rows(tip_map: TipMap, request: Request, which: Index, gamma: Array) -> _Rows:
+    """Rows (n, r) of all goals, their derivatives (n, r, m) and the miss [m] at γ (n, m)."""
+    motions = tip_map.tips_and_slopes if request.direction is None else tip_map.tip_motions
+    (tips, slopes, *turns), length = motions(gamma), tip_map.length
+    parts = [_place_rows(tips, slopes, request.targets[which], request.within, length)]
+    if turns:
+        parts.append(_turn_rows(tip_map, request, which, gamma, *turns))
+    for name, places in request.markers.items():
+        moved, within = at_marker(tip_map, name).tips_and_slopes(gamma), request.marker_within
+        parts.append(_place_rows(*moved, places[which], within.get(name, 0.0), length))
+    rows, slopes = (np.concatenate([part[k] for part in parts], axis=1) for k in (0, 1))
+    return rows, slopes, length * np.max([part[2] for part in parts], axis=0)
+
+
+def _place_rows(points: Array, slopes: Array, wanted: Array, within: float, length: float) -> _Rows:
+    away, moves = (points - wanted) / length, slopes / length
+    if within:
+        away, moves = _beyond(away, moves, _INSIDE * within / length)
+    return away, moves, np.linalg.norm(away, axis=1)
+
+
+def _turn_rows(
+    tip_map: TipMap, request: Request, which: Index, gamma: Array, directions: Array, turn: Array
+) -> _Rows:
     assert request.direction is not None
-    motions, wanted = tip_map.tip_motions(gamma), request.direction[which]
-    away = (motions.tips - request.targets[which]) / tip_map.length
-    moves = motions.slopes / tip_map.length
-    if request.within:
-        away, moves = _beyond(away, moves, _INSIDE * request.within / tip_map.length)
-    turn = motions.rotations
     if request.orientation is not None:
         angle, axis = _angles_of_frames(tip_map.tip_frames(gamma), request.orientation[which])
     else:
-        angle, axis = angles_from(motions.directions, wanted)
-        along = np.einsum("ni,nij->nj", motions.directions, turn)
-        turn = turn - motions.directions[:, :, None] * along[:, None]
+        angle, axis = angles_from(directions, request.direction[which])
+        along = np.einsum("ni,nij->nj", directions, turn)
+        turn = turn - directions[:, :, None] * along[:, None]
     excess = (angle - request.cone).clip(0.0)
     if request.cone:  # along the cone nothing is wanted, nor inside of it
         turn = axis[:, :, None] * np.einsum("ni,nij->nj", axis, turn)[:, None]
         turn *= (excess > 0.0)[:, None, None]
     weight = request.direction_weight
-    rows = np.concatenate([away, weight * excess[:, None] * axis], axis=1)
-    slopes = np.concatenate([moves, weight * turn], axis=1)
-    miss = tip_map.length * np.maximum(np.linalg.norm(away, axis=1), excess)
-    return rows, slopes, miss
+    return weight * excess[:, None] * axis, weight * turn, excess
 
 
 def _beyond(away: Array, moves: Array, room: float) -> tuple[Array, Array]:

@@ -51,7 +51,7 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     The others are nearest to random activations, and apart: fewer than `family` where searches end
     at what is known. Numbers of targets, activations, and the best place for every target.
     """
-    search = _in_blocks if request.direction is None else _posed
+    search = _in_blocks if request.is_of_place else _posed
     known = search(prepared, request)
     reached = np.flatnonzero(known.residual <= request.residual)
     solved = request.of(reached)
@@ -218,7 +218,7 @@ def _posed(prepared: PreparedMap, request: Request, known: Array | None = None) 
     Its residual [m] holds L times the angle by which the direction misses, if that is more.
     """
     count, tip_map = len(request.targets), prepared.tip_map
-    at_place = _in_blocks(prepared, replace(request, direction=None), known).gamma
+    at_place = _in_blocks(prepared, replace(request, direction=None, markers={}), known).gamma
     owner, start = _starts(prepared, request)
     begun = [at_place] if known is None else [at_place, known]
     owner = np.concatenate([*[np.arange(count)] * len(begun), owner])

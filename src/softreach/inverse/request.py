@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import re
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.rod.inputs import ActivationBox
-from softreach.support.arrays import Array, Index, as_floats, check_finite
+from softreach.rod.rods import at_marker
+from softreach.rod.tip_map import TipMap
+from softreach.support.arguments import as_mapping, as_number, as_one_of
+from softreach.support.arrays import Array, Index, as_floats, as_points, check_finite
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.quantity import numbers_in, read_quantity, unit_names
+from softreach.support.files.columns import read_table, split_unit, tip_columns
 from softreach.support.units import TYPED, lengths_in
-
-_HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\])])")
-"""Name of a column with its unit."""
 
 RESIDUALS = Range(1e-13, 1e-2)
 """|tip - target| that can be asked for, in L; below, rounding of the tips decides."""
-
 
 ANGLE_TOL = 1e-6
 """Error of the tips' directions [rad], by which a direction may miss its cone."""
@@ -36,6 +35,8 @@ class Request:
     near: Array  # activations of the free bundles to stay near to [-], (t, dimension)
     direction: Array | None = None  # wanted tip tangents, unit vectors, (t, 3)
     orientation: Array | None = None  # wanted frames, d3 the `direction`, (t, 3, 3)
+    markers: Mapping[str, Array] = field(default_factory=dict)  # their wanted positions, (t, 3)
+    marker_within: Mapping[str, float] = field(default_factory=dict)  # as `within`, of some
     cone: float = 0.0  # angle from `direction` or `orientation` that is allowed [rad]
     direction_weight: float = 0.1  # of an angle [rad] against a distance in L
     within: float = 0.0  # |tip - target| that does where no pose meets both to `residual` [m]
@@ -48,12 +49,18 @@ class Request:
         """Angle at which a direction counts as met [rad]: that of the cone and of rounding."""
         return self.cone + ANGLE_TOL
 
+    @property
+    def is_of_place(self) -> bool:
+        """True if the position of the tip is the only goal."""
+        return self.direction is None and not self.markers
+
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""
         names = ("targets", "near", "direction", "orientation")
         parts = {name: getattr(self, name) for name in names}
         chosen = {name: part[rows] for name, part in parts.items() if part is not None}
-        return replace(self, **chosen)
+        markers = {name: places[rows] for name, places in self.markers.items()}
+        return replace(self, markers=markers, **chosen)
 
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
@@ -77,19 +84,33 @@ def as_orientations(orientation: ArrayLike, count: int) -> Array:
     return frames
 
 
-def positions_in(text: str, source: str, length: float | None = None) -> list[list[float]]:
-    """Positions [m] from lines x,y,z; a header is skipped, but for units such as x_mm,y_mm,z_mm.
+def as_markers(
+    tip_map: TipMap, markers: Any, within: float | Mapping[str, float], count: int
+) -> dict[str, dict[str, Any]]:
+    """Positions (3,) or (t, 3) of markers as (t, 3), and distances that do [m], of a `Request`."""
+    places = as_mapping("markers", markers, as_points)
+    for name, points in places.items():
+        at_marker(tip_map, name)  # refuses one that the arm does not have
+        if len(points) not in (1, count):
+            raise InvalidInput(f"markers[{name!r}].shape", points.shape, f"(3,) or ({count}, 3)")
+        places[name] = np.broadcast_to(points, (count, 3))
+    each = within if isinstance(within, Mapping) else dict.fromkeys(places, within)
+    for name in each:
+        as_one_of("marker_within", name, tuple(places))
+        as_number("marker_within", each[name], Range(0.0, unit="m"))
+    return {"markers": places, "marker_within": dict(each)}
+
+
+def positions_in(content: bytes, source: str, length: float | None = None) -> list[list[float]]:
+    """Positions [m] from the table in a file, whose columns or cells may name their units.
 
     Errors name the file by `source`; places in L need a `length` L [m].
     """
-    rows = [line for line in text.splitlines() if line.strip()]
-    words = [word.strip() for word in rows[0].split(",")] if rows else []
-    if words and not any(word.startswith(tuple("+-.0123456789")) for word in words):
-        units = [_header_unit(word, rows[0], source) for word in words]
-        rows = [_with_units(row, units) for row in rows[1:]]
-    if not rows:
-        raise InvalidInput("targets", source, "a CSV file with a row x,y,z for each position")
-    return [position_in(f"{source}, point {k}", row, length) for k, row in enumerate(rows, 1)]
+    table = read_table(content, source)
+    columns = [(table[x], split_unit(x)[3]) for x in tip_columns(table.columns, "m", "L", "")]
+    cells = ([f"{cell}{unit}".replace("over_length", "L") for cell in own] for own, unit in columns)
+    rows = enumerate(zip(*cells, strict=True), 1)
+    return [position_in(f"{source}, point {k}", ",".join(row), length) for k, row in rows]
 
 
 def position_in(name: str, text: str, length: float | None = None) -> list[float]:
@@ -100,42 +121,3 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
         allowed = f"three comma-separated numbers x,y,z in m, or each with its unit ({units})"
         raise InvalidInput(name, text or "''", allowed)
     return values
-
-
-def length_in(name: str, text: str, length: float) -> float:
-    """One length [m] from what was typed, 0 or more, with its unit, in m or in a length L."""
-    values = lengths_in(text, 1, length)
-    if values is None or not 0.0 <= values[0] < np.inf:
-        raise InvalidInput(name, text or "''", f"a length in m, or with {TYPED}, L")
-    return values[0]
-
-
-def direction_in(name: str, text: str) -> list[float]:
-    """A direction from x,y,z."""
-    values = numbers_in(text, 3)
-    if values is None or not any(values):
-        raise InvalidInput(name, text or "''", "three comma-separated numbers x,y,z, not all 0")
-    return values
-
-
-def angle_in(name: str, text: str) -> float:
-    """An angle [rad] from what was typed, from 0 to half a turn, with its unit."""
-    with suppress(ValueError):
-        if 0.0 <= (angle := read_quantity(text, "rad")) <= np.pi:
-            return angle
-    raise InvalidInput(name, text or "''", "an angle from 0deg to 180deg, in deg or rad")
-
-
-def _header_unit(word: str, line: str, source: str) -> str:
-    """The unit of a column of a header such as x_mm,y_mm,z_mm or x [mm],y [mm],z [mm]."""
-    match = _HEADER.fullmatch(word.strip('"'))
-    if match is None:
-        return ""
-    if match[2] and match[2] not in (*unit_names("m"), "L"):
-        raise InvalidInput(f"{source}, header", line, f"in {TYPED} or L")
-    return {"over_length": "L"}.get(match[1], match[1] or match[2] or "")
-
-
-def _with_units(line: str, units: list[str]) -> str:
-    parts = [part.strip() for part in line.split(",")]
-    return ",".join(map(str.__add__, parts, units)) if len(parts) == len(units) else line

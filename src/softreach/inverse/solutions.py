@@ -22,7 +22,7 @@ from softreach.schema import (
 )
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
-from softreach.support.units import as_unit
+from softreach.support.units import LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,6 +57,8 @@ class Solution:
     """|tip - target| [m], shape (k,)."""
     direction_errors: Array
     """Angles between the tip's direction and that wanted [rad], NaN if none is, shape (k,)."""
+    marker_errors: Array
+    """Distances of markers from their targets [m], shape (k, markers)."""
     conditions: Array
     """Condition numbers of ∂r/∂γ of the free bundles [-], infinite on a fold, shape (k,)."""
     margins: Array
@@ -74,11 +76,15 @@ class Solution:
     """|nearest - target| [m]."""
     direction_gap: float
     """Angle between the tip's direction there and that wanted [rad]; NaN if none is."""
+    marker_gaps: Array
+    """Distances of markers from their targets there [m], shape (markers,)."""
     gap_bound: float
     """A proved lower bound of the distance to all tips within the bounds [m], more than their
     error; 0 if nothing is proved."""
     tip_maps: tuple[TipMap, ...]
     """Tip maps: that of postures from rest, and those of other sheets that loads leave."""
+    marker_names: tuple[str, ...]
+    """Names of the markers that have targets."""
 
     def __len__(self) -> int:
         return len(self.activations)
@@ -125,6 +131,7 @@ class Solution:
         for k, gamma in enumerate(self.activations):
             quality = f"residual {shown.rounded(self.residuals[k], digits='.1e')}"
             quality += _off(self.direction_errors[k])
+            quality += self._markers_off(self.marker_errors[k], shown)
             if gamma.size:
                 quality += f", condition {self.conditions[k]:.3g}, margin {self.margins[k]:.3g}"
             if self.sheets[k]:
@@ -134,10 +141,15 @@ class Solution:
             least = shown.rounded(self.gap_bound)
             bound = f"; every tip is proved to be {least} away or farther" if self.gap_bound else ""
             nearest, gap = shown.place(self.nearest), shown.rounded(self.gap)
-            lines.append(f"nearest {nearest}, {gap} away{_off(self.direction_gap)}{bound}")
+            off = _off(self.direction_gap) + self._markers_off(self.marker_gaps, shown)
+            lines.append(f"nearest {nearest}, {gap} away{off}{bound}")
             gamma = activation_text(arm, self.nearest_activation, names)
             lines.append(f"the tip is there at {gamma}")
         return "\n  ".join(lines)
+
+    def _markers_off(self, errors: Array, unit: LengthUnit) -> str:
+        pairs = zip(self.marker_names, errors, strict=True)
+        return "".join(f", {name} {unit.rounded(x, digits='.3g')} off" for name, x in pairs)
 
 
 def _off(angle: float) -> str:
@@ -158,6 +170,8 @@ class Solutions(Sequence[Solution]):
     """Shape (n,) [m]."""
     direction_errors: Array
     """Shape (n,) [rad]."""
+    marker_errors: Array
+    """Shape (n, markers) [m]."""
     conditions: Array
     """Shape (n,) [-]."""
     margins: Array
@@ -174,6 +188,8 @@ class Solutions(Sequence[Solution]):
     """Shape (t,) [m]."""
     direction_gaps: Array
     """Shape (t,) [rad]."""
+    marker_gaps: Array
+    """Shape (t, markers) [m]."""
     gap_bounds: Array
     """Proved lower bounds of the distance to all tips, 0 if nothing is proved, shape (t,) [m]."""
     offsets: Index
@@ -186,6 +202,8 @@ class Solutions(Sequence[Solution]):
     """Names of the bundles that were solved for."""
     tip_maps: tuple[TipMap, ...]
     """Tip maps: that of postures from rest, and those of other sheets."""
+    marker_names: tuple[str, ...]
+    """Names of the markers that have targets."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -226,7 +244,8 @@ class Solutions(Sequence[Solution]):
             i = range(len(self))[index]
             rows = {"target": i, "solution": slice(self.offsets[i], self.offsets[i + 1])}
             target, status, *others = self._of(rows).values()
-            return Solution(target, Status(status), *others, tip_maps=self.tip_maps)
+            common = {"tip_maps": self.tip_maps, "marker_names": self.marker_names}
+            return Solution(target, Status(status), *others, **common)
         chosen = np.arange(len(self))[index]
         counts = self.counts[chosen]
         offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -261,9 +280,11 @@ class Solutions(Sequence[Solution]):
         variables = {
             name: (axes, getattr(self, field), units if "bundle" in axes else about)
             for field, (name, axes, about) in _COLUMNS.items()
+            if self.marker_names or "marker" not in axes
         }
         variables["target_of"] = ("solution",), np.repeat(np.arange(len(self)), self.counts), {}
         coordinates = {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)}
+        coordinates |= {"marker": list(self.marker_names)} if self.marker_names else {}
         return xr.Dataset(variables, coordinates, provenance(self.arm, self.frame))
 
 
@@ -274,6 +295,7 @@ _COLUMNS: dict[str, tuple[str, tuple[str, ...], dict[str, str]]] = {
     "activations": ("activation", ("solution", "bundle"), {}),
     "residuals": ("residual", ("solution",), {"units": "m"}),
     "direction_errors": ("direction_error", ("solution",), {"units": "rad"}),
+    "marker_errors": ("marker_error", ("solution", "marker"), {"units": "m"}),
     "conditions": ("condition", ("solution",), {"units": "1"}),
     "margins": ("margin", ("solution",), {"units": "1"}),
     "leans": ("leans", ("solution",), {}),
@@ -282,6 +304,7 @@ _COLUMNS: dict[str, tuple[str, tuple[str, ...], dict[str, str]]] = {
     "nearest_activations": ("nearest_activation", ("target", "bundle"), {}),
     "gaps": ("gap", ("target",), {"units": "m"}),
     "direction_gaps": ("direction_gap", ("target",), {"units": "rad"}),
+    "marker_gaps": ("marker_gap", ("target", "marker"), {"units": "m"}),
     "gap_bounds": ("gap_bound", ("target",), {"units": "m"}),
 }
 """Fields of `Solutions` in the order of those of `Solution`, as they are stored."""

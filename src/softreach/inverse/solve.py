@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch, with_other_sheets
-from softreach.inverse.direction import compromises, direction_errors
+from softreach.inverse.direction import compromises, direction_errors, marker_errors
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import RESIDUALS, Request, as_activations, as_orientations
+from softreach.inverse.request import (
+    RESIDUALS,
+    Request,
+    as_activations,
+    as_markers,
+    as_orientations,
+)
 from softreach.inverse.roots import (
     Roots,
     conditions,
@@ -47,6 +55,8 @@ def solve_inverse(
     orientation: ArrayLike | None = None,
     cone: float = 0.0,
     direction_weight: float = 0.1,
+    markers: Mapping[str, ArrayLike] | None = None,
+    marker_within: float | Mapping[str, float] = 0.0,
     family: int = 1,
     seed: int = 0,
     from_rest: bool = False,
@@ -91,6 +101,11 @@ def solve_inverse(
             rounding.
         direction_weight: w [-] where no activation meets both: `nearest` has least
             |tip - target|²/L² + w² θ² with the angle θ beyond the cone.
+        markers: Wanted positions of markers of the arm by name [m], shape (3,) or (t, 3) each. A
+            target then counts as reached only where each marker is at its own as well; else
+            `nearest` has the least sum of all squared distances. Of an arm under loads only
+            postures from rest are searched.
+        marker_within: As `within`, for all markers or for each by name [m].
         family: With more than three free bundles: how many activations to give for each target,
             the others being those nearest to random activations and apart by a thousandth of a
             range; fewer where no more of them are found.
@@ -137,16 +152,17 @@ def solve_inverse(
         orientation=frames,
         cone=as_number("cone", cone, Range(0.0, np.pi, unit="rad")),
         direction_weight=as_number("direction_weight", direction_weight, _WEIGHTS),
+        **as_markers(prepared.whole, markers or {}, marker_within, len(points)),
         within=within,
         family=as_integer("family", family, 1, 10_000),
         seed=as_integer("seed", seed, 0, 2**63),
-        from_rest=as_flag("from_rest", from_rest),
+        from_rest=as_flag("from_rest", from_rest) or bool(markers),
     )
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
         solve = _by_least_change
     elif prepared.dimension == 3:
-        solve, size = _by_branches, _BRANCH_BLOCK if request.direction is None else _BLOCK
+        solve, size = _by_branches, _BRANCH_BLOCK if request.is_of_place else _BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
     return solutions.in_units_of(measures)
@@ -156,7 +172,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     roots = every_branch(prepared, request)
     if not request.from_rest:
         roots = with_other_sheets(prepared, request, roots)
-    if request.direction is not None:
+    if not request.is_of_place:
         return _by_distance(prepared, request, roots)
     missing = roots.missing(len(request.targets))
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
@@ -178,7 +194,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 def _by_distance(prepared: PreparedMap, request: Request, every: Roots | None = None) -> Solutions:
     """The nearest place or pose, but where one of all roots points the way that is wanted."""
     every = no_roots(prepared.tip_map) if every is None else every
-    roots = rows(every, _pointing(prepared, request, every))
+    roots = rows(every, _meeting(prepared, request, every))
     missing = roots.missing(len(request.targets))
     known = rows(every, np.isin(every.target, missing))
     closest = _closest(prepared, request, missing, known)
@@ -190,9 +206,9 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     roots = roots_at(tip_map, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
     left, start = request.targets[missing], best.gamma[missing]
-    if request.direction is None:
+    if request.is_of_place:
         start = nearest_tips(tip_map, start, left, request.residual, CLOSELY).gamma
-    elif request.within:
+    else:
         start = compromises(tip_map, request.of(missing), start).gamma
     closest = roots_at(tip_map, request.targets, missing, start)
     return _solutions(prepared, request, roots, closest)
@@ -206,7 +222,7 @@ def _closest(prepared: PreparedMap, request: Request, chosen: Index, known: Root
     target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
     target = np.concatenate([target, np.searchsorted(chosen, known.target)])
     start = np.concatenate([start, known.gamma])
-    if request.direction is None:
+    if request.is_of_place:
         gamma, _, left = nearest_tips(tip_map, start, targets[target], request.residual, CLOSELY)
     else:
         gamma, left, _ = compromises(tip_map, request.of(chosen[target]), start)
@@ -219,7 +235,7 @@ def _gap_bounds(prepared: PreparedMap, request: Request, closest: Roots) -> Arra
     gap = closest.residual
     bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.reach_tol)
     # Where the position yields to a direction, the gap says nothing of what can be reached.
-    if len(out) and request.direction is None and (prepared.proves or not prepared.dimension):
+    if len(out) and request.is_of_place and (prepared.proves or not prepared.dimension):
         gaps = request.targets[closest.target[out]], gap[out], request.reach_tol
         bounds[out] = gap_bounds(prepared.tip_map, prepared.coarse_cells, *gaps)
     # Within the error of the tips, what is true of them need not be true of the arm.
@@ -238,7 +254,7 @@ def _solutions(
     if bounds is None:
         bounds = _gap_bounds(prepared, request, closest)
     hit = closest.residual <= request.reach_tol
-    hit &= _pointing(prepared, request, closest)
+    hit &= _meeting(prepared, request, closest)
     roots = roots.joined(rows(closest, hit))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     beside = roots.residual > request.residual
@@ -263,6 +279,8 @@ def _solutions(
         activations=activations,
         residuals=roots.residual,
         direction_errors=_direction_errors(prepared, request, roots),
+        marker_names=tuple(request.markers),
+        marker_errors=marker_errors(tip_map, request, roots.target, roots.gamma),
         conditions=conditions(roots.slope),
         margins=tip_map.box.margin(roots.gamma),
         leans=leans,
@@ -272,15 +290,20 @@ def _solutions(
         nearest_activations=whole.box.with_fixed(best.gamma),
         gaps=best.residual,
         direction_gaps=_direction_errors(prepared, request, best),
+        marker_gaps=marker_errors(tip_map, request, best.target, best.gamma),
         gap_bounds=proved_gaps,
     )
 
 
-def _pointing(prepared: PreparedMap, request: Request, roots: Roots) -> Mask:
-    """Mask of the roots whose tips point within the cone; all, where no direction is wanted."""
-    if request.direction is None:
-        return np.ones(len(roots.target), bool)
-    return _direction_errors(prepared, request, roots) <= request.direction_tol
+def _meeting(prepared: PreparedMap, request: Request, roots: Roots) -> Mask:
+    """Mask of the roots that meet the goals beside the position of the tip."""
+    meet = np.ones(len(roots.target), bool)
+    if request.direction is not None:
+        meet = _direction_errors(prepared, request, roots) <= request.direction_tol
+    least = max(request.residual, prepared.whole.tol * prepared.whole.length)
+    enough = [max(request.marker_within.get(name, 0.0), least) for name in request.markers]
+    errors = marker_errors(prepared.tip_map, request, roots.target, roots.gamma)
+    return meet & (errors <= enough).all(axis=1)
 
 
 def _direction_errors(prepared: PreparedMap, request: Request, roots: Roots) -> Array:

@@ -102,6 +102,6 @@ def back(q):
     return -q[0], q[1], q[2], q[3]
 
 
-strict_row, strict_difference = strict(row), strict(difference)
+strict_difference = strict(difference)
 strict_minus, strict_times = strict(minus), strict(times)
 strict_cross, strict_dot = strict(cross), strict(dot)

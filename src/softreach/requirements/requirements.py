@@ -21,7 +21,7 @@ from softreach.support.arguments import POSITIVE, as_given, as_instance, as_numb
 from softreach.support.arrays import Array, as_floats, joined
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files import toml
-from softreach.support.files.text import MEGABYTE, read_text, write_text
+from softreach.support.files.text import MEGABYTE, read_bytes, read_text, write_text
 
 LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
 
@@ -301,8 +301,9 @@ class _Reader(RegionReader):
             return self._refuse(path, None, allowed)
         if file is not None:
             try:
-                text = read_text("file", self._beside(as_text("file", file), "places_m"), LONGEST)
-                values["places"] = np.array(positions_in(text, file, self.length))
+                place = self._beside(as_text("file", file), "places_m")
+                content = read_bytes("file", place, LONGEST)
+                values["places"] = np.array(positions_in(content, file, self.length))
             except InvalidInput as error:
                 allowed = f"must be {error.allowed} ({error.name} = {error.value})"
                 values["places"] = self._refuse(f"{path}.file", file, allowed)

@@ -34,7 +34,7 @@ from softreach.rod.tip_map import (
     drop,
 )
 from softreach.support.arguments import as_flag, as_instance, as_one_of
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.errors import warn as issue_warning
 from softreach.support.lazy import lazy
 
@@ -294,6 +294,21 @@ def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
     inputs = _with_tensions(known.inputs, tol)
     device: Device = "cpu" if known.device == "cpu" else "cuda"
     return replace(known, rod=_known_rod(known.rod.arm, tol, device), inputs=inputs)
+
+
+@lru_cache(maxsize=64)
+def at_marker(tip_map: TipMap, name: str) -> ArmMap:
+    """The same map of another marker in place of the tip.
+
+    Raises:
+        InvalidInput: The arm has no such marker.
+        NotPossible: The map is not that of an arm straight from rest.
+    """
+    known, device = as_tip_map(tip_map), "cpu" if tip_map.device == "cpu" else "cuda"
+    rod = _known_rod(known.rod.arm.at_point(name), known.tol, device)
+    if type(rod) is not type(known.rod):
+        raise NotPossible(f"{name} is known only of an arm in postures straight from rest")
+    return replace(known, rod=rod)
 
 
 def effective(tip_map: TipMap) -> TipMap:

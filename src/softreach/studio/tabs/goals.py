@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import count
@@ -12,7 +11,7 @@ import numpy as np
 
 from softreach.calibration import calibrate
 from softreach.calibration.free_numbers import free_numbers
-from softreach.calibration.measurements import read_measurements, read_table
+from softreach.calibration.measurements import read_measurements
 from softreach.calibration.model import MarkerModel
 from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target, check
 from softreach.requirements.checks import checked
@@ -29,6 +28,7 @@ from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
 from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
+from softreach.support.files.columns import read_table
 from softreach.support.palette import MET, MISSED, eight_bit
 from softreach.support.units import LengthUnit
 
@@ -285,7 +285,7 @@ def _is_free(name: str) -> Attribute:
 
 def _read_poses(session: Session, file: UploadedFile) -> None:
     arm, before = session.state.design, session.found.bench
-    data = read_measurements(arm, read_table(io.BytesIO(file.content), file.name))
+    data = read_measurements(arm, read_table(file.content, file.name))
     free = ("pose",) if before is None else before.free
     _pose(session, Bench(data=replace(data, source=file.name), arm=arm, free=free))
 

@@ -16,7 +16,7 @@ from softreach.inverse.path import Drag, PathStatus, end_text, track_path
 from softreach.inverse.request import positions_in
 from softreach.schema import input_symbols
 from softreach.studio.captions import place_text, tip_text
-from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute, file_text
+from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
 from softreach.studio.found import Found, Lag, Pull
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
@@ -251,7 +251,7 @@ def extend_path(session: Session, point: np.ndarray) -> None:
 
 
 def _read_path(session: Session, file: UploadedFile) -> None:
-    points = positions_in(file_text(file.name, file.content), file.name)
+    points = positions_in(file.content, file.name)
     state = session.state
     near = np.linalg.norm(_tip(state) - points[0]) < 1e-3 * state.design.length
     read = TipPath.through(points, state.activation if near else None)
