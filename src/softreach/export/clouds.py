@@ -1,19 +1,17 @@
 """Clouds for other programs: tips and activations of all samples, in every format."""
 
-import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from io import BufferedWriter
-from itertools import chain, count
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.export.formats import write_by_suffix, write_ply, write_vtu
-from softreach.schema import a_cloud, activation_units
+from softreach.schema import a_cloud, activation_units, column_names
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -92,21 +90,6 @@ def arrays_of(cloud: Dataset, unit: LengthUnit = METER) -> CloudTable:
         {str(key): x if isinstance(x, str | int | float) else str(x) for key, x in plain.items()},
         unit,
     )
-
-
-def column_names(bundles: Sequence[str]) -> list[str]:
-    """Column names that every format and language can hold, all different.
-
-    >>> column_names(["left", "fiber 1 2", "left"])
-    ['gamma_left', 'gamma_fiber_1_2', 'gamma_left_2']
-    """
-    names: list[str] = []
-    for k, bundle in enumerate(bundles):
-        safe = re.sub(r"[^0-9A-Za-z]+", "_", bundle).strip("_") or str(k + 1)
-        plain = f"gamma_{safe}"
-        numbered = (f"{plain}_{number}" for number in count(k))
-        names.append(next(name for name in chain([plain], numbered) if name not in names))
-    return names
 
 
 def export_cloud(
