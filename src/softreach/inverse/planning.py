@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _CELLS = {1: (1024,), 2: (64, 256), 3: (24, 48, 72)}  # along each bundle, until one does
-_SHORTEST = 2.0**-14  # share that a motion is cut into
+_SHORTEST = 2.0**-11  # share that a motion is cut into
 _ROUNDS, _TOGETHER = 40, 16  # of shortening, and motions tried in each
 _GAIN = 1e-3  # of the length of a path, that a shortcut must spare
 _FAMILY = 16  # solutions for a goal that are looked at, with four free bundles or more
@@ -202,7 +202,9 @@ def _to_position(motions: ClearMotions, first: Array, position: ArrayLike, seed:
     family = {"family": _FAMILY, "seed": seed} if box.dimension > 3 else {}
     (solution,) = solve_inverse(whole, place, near=first, free=True, **family)
     if not len(solution):
-        raise NotPossible(f"the tip does not get to goal_position without contact: {solution}")
+        why = solution.status.name.lower().replace("_", " ")
+        where = "" if solution.gap <= whole.tol * whole.length else f", {solution.gap:.3g} m away"
+        raise NotPossible(f"no free activation puts the tip at goal_position: {why}{where}")
     failed: NotPossible | None = None
     for goal in solution.activations:
         try:

@@ -257,16 +257,16 @@ def _images(cells: FreeCells, rest: Array, grid: LiftedGrid, lattice: Lattice) -
 
 def _volumes(fine: list[Image], coarse: list[Image]) -> dict[str, float]:
     """The three volumes, with their errors."""
-    reached, maybe, free, every = (
-        Estimate(x.value, x.error + abs(x.value - y.value))
-        for x, y in zip(map(covered_volume, fine), map(covered_volume, coarse), strict=True)
-    )
-    unsure = maybe.value - reached.value
-    return named(
-        reached=reached._replace(error=reached.error + unsure),
-        walled_off=Estimate(free.value - reached.value, free.error + reached.error + unsure),
-        blocked=Estimate(every.value - free.value, every.error + free.error),
-    )
+    found = [covered_volume(image) for image in fine]
+    rough = [covered_volume(image).value for image in coarse]
+    unsure = found[1].value - found[0].value
+    volumes = {"reached": Estimate(found[0].value, abs(found[0].value - rough[0]) + unsure)}
+    for name, outer, inner in (("walled_off", 2, 0), ("blocked", 3, 2)):
+        value = found[outer].value - found[inner].value
+        change = abs(value - rough[outer] + rough[inner])
+        volumes[name] = Estimate(value, change + unsure * (inner == 0))
+    scatter = max(each.error for each in found)
+    return named(**{name: Estimate(x, error + scatter) for name, (x, error) in volumes.items()})
 
 
 def _states(images: list[Image], tip_map: TipMap) -> xr.Dataset:
