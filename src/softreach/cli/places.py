@@ -114,7 +114,6 @@ def plan(
     to: Signed = None,
     rate: str | None = None,
     margin: str | None = None,
-    seed: Whole = 0,
     changes: Changes = UNCHANGED,
     out: options.Place = Path("plan.csv"),
     overwrite: options.Overwrite = False,
@@ -132,7 +131,6 @@ def plan(
         to: Tip position x,y,z to end at, in m unless each has a unit: 80mm,50mm,-24cm.
         rate: Largest change of each activation per second, one number or one per bundle: 0.5
         margin: Clearance to keep all along, beyond that of each obstacle: 2mm, 0.01L.
-        seed: Seed of what is random.
         out: CSV file for the plan.
     """
     from softreach.inverse.request import length_in, position_in
@@ -142,16 +140,14 @@ def plan(
     options.check_output(out, TABLES, overwrite)
     if (goal is None) == (to is None):
         raise NotPossible("give either --goal or --to")
-    rest = [min(max(0.0, low), high) for low, high in arm.input_bounds.tolist()]
     rates = None if rate is None else numbers_in(rate) or rate
     planned = sr.inverse.plan(
         arm,
-        rest if start is None else options.activation_of(start, arm, "start"),
+        None if start is None else options.activation_of(start, arm, "start"),
         None if goal is None else options.activation_of(goal, arm, "goal"),
         goal_position=None if to is None else position_in("to", to, arm.length),
         rate=rates[0] if isinstance(rates, list) and len(rates) == 1 else rates,
         margin=0.0 if margin is None else length_in("margin", margin, arm.length),
-        seed=seed,
     )
     planned.to_csv(out, overwrite=overwrite)
     console.line(f"{out}: {planned}")

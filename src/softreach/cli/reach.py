@@ -54,8 +54,8 @@ def reach(
     arm = design_from(design, changes, output.unit)
     if free:
         options.refuse("with --free, which prints volumes alone", out=out, at=at)
-        rows = rows_of(sr.workspace.free_set(arm).to_dataset())
-        console.rows(f"free set of {design}", rows, output.json, arm)
+        found = sr.workspace.free_set(arm).drop_vars(["state", *"xyz"])
+        console.rows(f"free set of {design}", rows_of(found), output.json, arm)
         return
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
     meshed = ["skimage"] * any(path.suffix.lower() in SURFACE_FILES for path in outs)

@@ -1,5 +1,4 @@
 from . import payload as payload
-from .free import FreeSet as FreeSet
 from .free import free_set as free_set
 from .gradient import VolumeGradient as VolumeGradient
 from .gradient import volume_gradient as volume_gradient
