@@ -12,7 +12,7 @@ from scipy.io import loadmat
 
 import softreach as sr
 from softreach.export import export_arm, export_cloud, export_mesh
-from softreach.schema import column_names
+from softreach.export.clouds import column_names
 from softreach.support.errors import InvalidInput
 
 meshio = pytest.importorskip("meshio")

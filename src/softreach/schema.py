@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import chain, count
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -341,18 +339,3 @@ def cell_dataset(grid: CellGrid, **variables: tuple[NDArray[Any], dict[str, str]
     centers = {axis: (axis, places, {"units": "m"}) for axis, places in pairs}
     data = {name: (AXES, *content) for name, content in variables.items()}
     return xr.Dataset(data, centers, {"cell": grid.edge})
-
-
-def column_names(bundles: Sequence[str]) -> list[str]:
-    """Column names that every format and language can hold, all different.
-
-    >>> column_names(["left", "fiber 1 2", "left"])
-    ['gamma_left', 'gamma_fiber_1_2', 'gamma_left_2']
-    """
-    names: list[str] = []
-    for k, bundle in enumerate(bundles):
-        safe = re.sub(r"[^0-9A-Za-z]+", "_", bundle).strip("_") or str(k + 1)
-        plain = f"gamma_{safe}"
-        numbered = (f"{plain}_{number}" for number in count(k))
-        names.append(next(name for name in chain([plain], numbered) if name not in names))
-    return names

@@ -133,6 +133,7 @@ def plan(
         margin: Clearance to keep all along, beyond that of each obstacle: 2mm, 0.01L.
         out: CSV file for the plan.
     """
+    from softreach.export.clouds import path_csv
     from softreach.inverse.request import length_in, position_in
     from softreach.support.quantity import numbers_in
 
@@ -149,8 +150,10 @@ def plan(
         rate=rates[0] if isinstance(rates, list) and len(rates) == 1 else rates,
         margin=0.0 if margin is None else length_in("margin", margin, arm.length),
     )
-    planned.to_csv(out, overwrite=overwrite)
-    console.line(f"{out}: {planned}")
+    write_text(out, path_csv(planned), overwrite=overwrite)
+    least = arm.length_unit.rounded(float(planned.clearance.min()))
+    time = "" if rate is None else f", {float(planned.time[-1]):.3g} s"
+    console.line(f"{out}: {planned.sizes['point']} points, least clearance {least}{time}")
 
 
 def equilibria(

@@ -1,17 +1,19 @@
 """Clouds for other programs: tips and activations of all samples, in every format."""
 
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from io import BufferedWriter
+from itertools import chain, count
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.export.formats import write_by_suffix, write_ply, write_vtu
-from softreach.schema import a_cloud, activation_units, column_names
+from softreach.schema import a_cloud, activation_units
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -92,6 +94,21 @@ def arrays_of(cloud: Dataset, unit: LengthUnit = METER) -> CloudTable:
     )
 
 
+def column_names(bundles: Sequence[str]) -> list[str]:
+    """Column names that every format and language can hold, all different.
+
+    >>> column_names(["left", "fiber 1 2", "left"])
+    ['gamma_left', 'gamma_fiber_1_2', 'gamma_left_2']
+    """
+    names: list[str] = []
+    for k, bundle in enumerate(bundles):
+        safe = re.sub(r"[^0-9A-Za-z]+", "_", bundle).strip("_") or str(k + 1)
+        plain = f"gamma_{safe}"
+        numbered = (f"{plain}_{number}" for number in count(k))
+        names.append(next(name for name in chain([plain], numbered) if name not in names))
+    return names
+
+
 def export_cloud(
     cloud: Dataset, path: StrPath, *, unit: str | LengthUnit = "m", overwrite: bool = False
 ) -> None:
@@ -127,9 +144,12 @@ def export_cloud(
 
 
 def path_csv(found: Dataset) -> str:
-    """Activations and tip errors [m] at the points that `track_path` found, as lines of CSV."""
-    names = [*column_names(found["bundle"].values.astype(str).tolist()), "tip_error_m"]
-    rows = np.column_stack([found.activation.values, found.tip_error.values]).tolist()
+    """What `track_path` or `plan` found at each point of a path, as lines of CSV."""
+    names = column_names(found["bundle"].values.astype(str).tolist())
+    parts = {"tip": ("x", "y", "z"), "tip_error": ("tip_error_m",), "clearance": ("clearance_m",)}
+    parts = {each: own for each, own in (parts | {"time": ("time_s",)}).items() if each in found}
+    names += [name for own in parts.values() for name in own]
+    rows = np.column_stack([found[each].values for each in ("activation", *parts)]).tolist()
     return "\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in rows), ""])
 
 

@@ -1,7 +1,6 @@
 from . import path as path
 from .directions_at import directions_at as directions_at
 from .path import PathStatus as PathStatus
-from .planning import Plan as Plan
 from .planning import plan as plan
 from .prepared import PreparedMap as PreparedMap
 from .prepared import prepared_map as prepared_map

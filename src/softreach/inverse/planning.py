@@ -7,9 +7,8 @@ certified by `rod.clear_motion`: between two rows no point of the arm moves as f
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,13 +20,16 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.request import as_rates
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.clear_motion import CLEAR, ClearMotions, clear_motions
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
-from softreach.schema import column_names
+from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arguments import as_integer, as_number
 from softreach.support.arrays import Array, Mask, as_points
-from softreach.support.errors import InvalidInput, NotPossible, Range, counted
-from softreach.support.files.text import write_text
+from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.workspace.free import FreeGraph, free_grid
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CELLS = {1: (1024,), 2: (64, 256), 3: (24, 48, 72)}  # along each free bundle, until a path is
 _RANDOM, _NEIGHBORS = (1000, 4000, 16_000), 16  # activations with more bundles
@@ -35,45 +37,6 @@ _SHORTEST = 2.0**-11  # share that a motion is cut into
 _ROUNDS, _TOGETHER = 40, 16  # of shortening, and motions tried in each
 _GAIN = 1e-3  # of the length of a path, that a shortcut must spare
 _FAMILY = 16  # solutions for a goal that are looked at, with four free bundles or more
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Plan:
-    """A free path of activation, straight between its rows."""
-
-    activations: Array
-    """Inputs of the arm [unit of each], shape (n, bundles); from the start to the goal."""
-    tips: Array
-    """Their tips [m], shape (n, 3)."""
-    clearances: Array
-    """Their clearances [m], shape (n,); what lies between them keeps the margin, too."""
-    times: Array | None
-    """When the arm is there, at its rates [s], shape (n,); None without rates."""
-    arm: Manipulator
-    """The design."""
-
-    def __repr__(self) -> str:
-        least = self.arm.length_unit.rounded(float(self.clearances.min()))
-        time = "" if self.times is None else f", {self.times[-1]:.3g} s"
-        return f"<Plan of {counted(len(self.tips), 'row')}: least clearance {least}{time}>"
-
-    def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
-        """Write a row for each configuration: time, activations, tip and clearance [s, m].
-
-        Args:
-            path: The file.
-            overwrite: Whether it may replace a file.
-
-        Raises:
-            NotWritten: It cannot be written.
-        """
-        names = [*column_names(self.arm.input_names), "x", "y", "z", "clearance_m"]
-        columns = [self.activations, self.tips, self.clearances]
-        if self.times is not None:
-            names, columns = ["time_s", *names], [self.times, *columns]
-        rows = np.column_stack(columns).tolist()
-        lines = [",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in rows), ""]
-        write_text(path, "\n".join(lines), overwrite=overwrite)
 
 
 def plan(
@@ -85,7 +48,7 @@ def plan(
     rate: ArrayLike | None = None,
     margin: float = 0.0,
     seed: int = 0,
-) -> Plan:
+) -> xr.Dataset:
     """A path of activation that keeps the whole arm clear of its surroundings and of itself.
 
     Up to three free bundles cells of the activation box are searched, finer and finer ones until
@@ -105,8 +68,9 @@ def plan(
         seed: Seed of what is random.
 
     Returns:
-        Configurations in order. From one to the next the activations change in proportion, and no
-        point of the arm moves as far as both clearances add up to.
+        Dataset over `point` with `activation`, `tip` [m], `clearance` [m] and, at given rates,
+        `time` [s]. From one point to the next activations change in proportion, and no point of the
+        arm moves as far as both clearances add up to.
 
     Raises:
         InvalidInput: An argument of another shape, not finite or out of range; both goals or none.
@@ -115,10 +79,10 @@ def plan(
 
     Examples:
         >>> path = sr.inverse.plan(sr.designs.minimal_trunk(), goal=[-1, 0, -0.5], rate=0.5)
-        >>> print(f"{path.times[-1]:.3g} s")
+        >>> print(f"{float(path.time[-1]):.3g} s")
         2 s
     """
-    motions = clear_motions(arm, as_number("margin", margin, Range(0.0, unit="m")))
+    motions = clear_motions(as_tip_map(arm), as_number("margin", margin, Range(0.0, unit="m")))
     seed, rates = as_integer("seed", seed, 0, 2**63), as_rates(rate, motions.box.bundles)
     if (goal is None) == (goal_position is None):
         raise InvalidInput("goal", goal, "either activations, or a goal_position")
@@ -128,23 +92,32 @@ def plan(
     for left, each in enumerate(goals, 1 - len(goals)):
         try:
             corners = _corners(motions, first, motions.free_at("goal", each), seed)
+            return _dataset(motions, corners, rates)
         except NotPossible:
             if left == 0:
                 raise
-        else:
-            break
+    raise AssertionError
+
+
+def _dataset(motions: ClearMotions, corners: Array, rates: Array | None) -> xr.Dataset:
+    """The path with the configurations that certify it."""
+    import xarray as xr
+
     checked = motions.check(corners[:-1], corners[1:], _SHORTEST)
     own = np.append(checked.share[:-1] < 1.0, True)  # each corner once
-    begin, share = corners[checked.motion[own]], checked.share[own, None]
-    rows = begin + share * (corners[checked.motion[own] + 1] - begin)
-    durations = (np.abs(np.diff(rows, axis=0)) / (1.0 if rates is None else rates)).max(axis=1)
-    return Plan(
-        activations=rows,
-        tips=motions.clearance.whole.tips(rows),
-        clearances=checked.room[own] + motions.error + motions.margin,
-        times=None if rates is None else np.append(0.0, np.cumsum(durations)),
-        arm=motions.clearance.arm,
-    )
+    k, share = checked.motion[own], checked.share[own, None]
+    rows = corners[k] + share * (corners[k + 1] - corners[k])
+    tip_map, clearance = motions.clearance.whole, checked.room[own] + motions.error + motions.margin
+    variables: dict[str, Any] = {
+        "activation": (("point", "bundle"), rows, activation_attributes(tip_map.arm)),
+        "tip": (("point", "axis"), tip_map.tips(rows), {"units": "m"}),
+        "clearance": ("point", clearance, {"units": "m"}),
+    }
+    if rates is not None:
+        durations = (np.abs(np.diff(rows, axis=0)) / rates).max(axis=1)
+        variables["time"] = "point", np.append(0.0, np.cumsum(durations)), {"units": "s"}
+    coordinates = {"axis": list(AXES), **bundle_coordinates(tip_map.arm)}
+    return xr.Dataset(variables, coordinates, provenance(tip_map.arm) | {"margin": motions.margin})
 
 
 def _goals(motions: ClearMotions, first: Array, position: ArrayLike, seed: int) -> Array:

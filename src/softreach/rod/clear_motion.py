@@ -18,12 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.manipulator import Manipulator
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.clearance import ClearanceMap, Clearances
 from softreach.rod.free import FreeRod
 from softreach.rod.inputs import ActivationBox
-from softreach.rod.rods import all_inputs, as_tip_map
+from softreach.rod.rods import all_inputs
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput, NotPossible
@@ -186,11 +185,7 @@ def _least(factors: Array, low: Array, high: Array) -> Array:
     return np.minimum(factors * low, factors * high).sum(axis=1)
 
 
-def clear_motions(arm: Manipulator | TipMap, margin: float = 0.0) -> ClearMotions:
-    """Clear motions of an arm in all of its inputs, kept for the next call."""
-    return _of_map(all_inputs(as_tip_map(arm)), margin)
-
-
 @lru_cache(maxsize=8)
-def _of_map(tip_map: TipMap, margin: float) -> ClearMotions:
-    return ClearMotions(ClearanceMap(tip_map), margin)
+def clear_motions(tip_map: TipMap, margin: float = 0.0) -> ClearMotions:
+    """Clear motions of an arm in all of its inputs, kept for the next call."""
+    return ClearMotions(ClearanceMap(all_inputs(tip_map)), margin)

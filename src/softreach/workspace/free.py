@@ -16,6 +16,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.clear_motion import CLEAR, UNDECIDED, ClearMotions, clear_motions
 from softreach.rod.loaded.flood import edges_along
+from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.support.arguments import as_integer
@@ -120,7 +121,10 @@ def free_set(arm: Manipulator | TipMap, *, cells: int = 64) -> xr.Dataset:
         NotPossible: There are not three free bundles, the arm touches something at rest, has loads,
             or has tendons that are driven by length.
     """
-    n, motions = 2 * (as_integer("cells", cells, 8, _MOST_CELLS) // 2), clear_motions(arm)
+    n, motions = (
+        2 * (as_integer("cells", cells, 8, _MOST_CELLS) // 2),
+        clear_motions(as_tip_map(arm)),
+    )
     if (m := motions.box.dimension) != 3:
         raise NotPossible(
             f"a free set is known of three free bundles, and this arm has {m}: hold some of them, "
