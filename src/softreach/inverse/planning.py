@@ -2,7 +2,7 @@
 
 Links between activations that are free (`workspace.free`) hold the path: neighbors on a grid up to
 three free bundles, random ones with more [Kavraki1996]. It is then shortened. Every piece is
-certified by `rod.clear_motion`: between two rows no point of the arm moves as far as it is clear.
+certified by `workspace.free`: between two rows no point of the arm moves as far as it is clear.
 """
 
 from __future__ import annotations
@@ -19,14 +19,13 @@ from scipy.sparse.csgraph import dijkstra
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.request import as_rates
 from softreach.inverse.solve import solve_inverse
-from softreach.rod.clear_motion import CLEAR, ClearMotions, clear_motions
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arguments import as_integer, as_number
 from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import InvalidInput, NotPossible, Range
-from softreach.workspace.free import FreeGraph, free_grid
+from softreach.workspace.free import CLEAR, FreeGraph, FreeMotions, free_grid, free_motions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,12 +81,11 @@ def plan(
         >>> print(f"{float(path.time[-1]):.3g} s")
         2 s
     """
-    motions = clear_motions(as_tip_map(arm), as_number("margin", margin, Range(0.0, unit="m")))
+    motions = free_motions(as_tip_map(arm), as_number("margin", margin, Range(0.0, unit="m")))
     seed, rates = as_integer("seed", seed, 0, 2**63), as_rates(rate, motions.box.bundles)
     if (goal is None) == (goal_position is None):
         raise InvalidInput("goal", goal, "either activations, or a goal_position")
-    rest = motions.box.clip(np.zeros((1, motions.box.bundles)))
-    first = motions.free_at("start", rest if start is None else start)
+    first = motions.free_at("start", start)
     goals = [goal] if goal_position is None else _goals(motions, first, goal_position, seed)
     for left, each in enumerate(goals, 1 - len(goals)):
         try:
@@ -99,19 +97,18 @@ def plan(
     raise AssertionError
 
 
-def _dataset(motions: ClearMotions, corners: Array, rates: Array | None) -> xr.Dataset:
+def _dataset(motions: FreeMotions, corners: Array, rates: Array | None) -> xr.Dataset:
     """The path with the configurations that certify it."""
     import xarray as xr
 
-    checked = motions.check(corners[:-1], corners[1:], _SHORTEST)
-    own = np.append(checked.share[:-1] < 1.0, True)  # each corner once
-    k, share = checked.motion[own], checked.share[own, None]
-    rows = corners[k] + share * (corners[k + 1] - corners[k])
-    tip_map, clearance = motions.clearance.whole, checked.room[own] + motions.error + motions.margin
+    _, k, share, clearance = motions.check(corners[:-1], corners[1:], _SHORTEST)
+    rows = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
+    once = np.append(share[:-1] < 1.0, True)  # each corner
+    rows, clearance, tip_map = rows[once], clearance[once], motions.clearance.whole
     variables: dict[str, Any] = {
         "activation": (("point", "bundle"), rows, activation_attributes(tip_map.arm)),
         "tip": (("point", "axis"), tip_map.tips(rows), {"units": "m"}),
-        "clearance": ("point", clearance, {"units": "m"}),
+        "clearance": ("point", clearance + motions.margin, {"units": "m"}),
     }
     if rates is not None:
         durations = (np.abs(np.diff(rows, axis=0)) / rates).max(axis=1)
@@ -120,7 +117,7 @@ def _dataset(motions: ClearMotions, corners: Array, rates: Array | None) -> xr.D
     return xr.Dataset(variables, coordinates, provenance(tip_map.arm) | {"margin": motions.margin})
 
 
-def _goals(motions: ClearMotions, first: Array, position: ArrayLike, seed: int) -> Array:
+def _goals(motions: FreeMotions, first: Array, position: ArrayLike, seed: int) -> Array:
     """Free activations that put the tip at a place, the nearest first, shape (k, bundles)."""
     whole, family = motions.clearance.whole, _FAMILY if motions.box.dimension > 3 else 1
     place, options = as_points("goal_position", position), {"family": family, "seed": seed}
@@ -132,7 +129,7 @@ def _goals(motions: ClearMotions, first: Array, position: ArrayLike, seed: int) 
     return solution.activations
 
 
-def _corners(motions: ClearMotions, first: Array, last: Array, seed: int) -> Array:
+def _corners(motions: FreeMotions, first: Array, last: Array, seed: int) -> Array:
     """Corners of a free path, shape (k, bundles)."""
     ends, rng = np.stack([first, last]), np.random.default_rng(seed)
     if _are_clear(motions, ends[:1], ends[1:])[0]:
@@ -151,11 +148,11 @@ def _corners(motions: ClearMotions, first: Array, last: Array, seed: int) -> Arr
     )
 
 
-def _are_clear(motions: ClearMotions, begin: Array, end: Array) -> Mask:
-    return motions.check(begin, end, _SHORTEST).outcome == CLEAR
+def _are_clear(motions: FreeMotions, begin: Array, end: Array) -> Mask:
+    return motions.check(begin, end, _SHORTEST)[0] == CLEAR
 
 
-def _graphs(motions: ClearMotions, rng: np.random.Generator) -> Iterator[tuple[FreeGraph, int]]:
+def _graphs(motions: FreeMotions, rng: np.random.Generator) -> Iterator[tuple[FreeGraph, int]]:
     """Finer and finer graphs of free activations, and cells of their grids; 0 for random ones."""
     m = motions.box.dimension
     for cells in _CELLS.get(m, ()):
@@ -197,7 +194,7 @@ def _on_links(graph: FreeGraph, first: Array, last: Array) -> Array | None:
     return np.concatenate([first[None], graph.gamma[nodes[::-1]], last[None]])
 
 
-def _shortened(motions: ClearMotions, path: Array, rng: np.random.Generator) -> Array:
+def _shortened(motions: FreeMotions, path: Array, rng: np.random.Generator) -> Array:
     """The path with shortcuts between random places on it."""
     scales = motions.box.scales
     for _ in range(_ROUNDS):

@@ -23,7 +23,7 @@ from softreach.inverse.roots import (
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.clearance import ClearanceMap
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import all_inputs, as_tip_map
+from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
@@ -100,9 +100,8 @@ def solve_inverse(
         seed: Seed of these.
         from_rest: Of an arm under loads: only postures to which activations lead straight from
             rest, or from where the arm is in whose tip map is given.
-        free: Only activations at which the arm touches neither its `surroundings` nor itself, those
-            nearest to `near` first, and from rest; a target with others alone is `IN_CONTACT`. With
-            more than three free bundles 16 activations or more of each target are looked at.
+        free: Only activations from rest at which the arm touches neither its `surroundings` nor
+            itself, those nearest to `near` first; a target with others alone is `IN_CONTACT`.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
             keeps its own.
@@ -157,29 +156,20 @@ def solve_inverse(
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
     solutions = solutions.in_units_of(measures)
-    return _free_of(solutions, prepared, preferred, most) if free else solutions
+    most = most if prepared.dimension > 3 else len(solutions.activations)
+    return _free_of(solutions, all_inputs(prepared.whole), preferred, most) if free else solutions
 
 
-def _free_of(
-    solutions: Solutions, prepared: PreparedMap, near: ArrayLike, family: int
-) -> Solutions:
-    """The solutions that touch nothing, the nearest first; of families so many at most."""
-    whole, target = (
-        all_inputs(prepared.whole),
-        np.repeat(np.arange(len(solutions)), solutions.counts),
-    )
-    clearance = ClearanceMap(whole).of(solutions.activations).value
+def _free_of(solutions: Solutions, whole: ArmMap, near: ArrayLike, most: int) -> Solutions:
+    """The solutions that touch nothing, the nearest first, so many of each target at most."""
+    target = np.repeat(np.arange(len(solutions)), solutions.counts)
     preferred = np.broadcast_to(np.asarray(near, float), (len(solutions), whole.box.bundles))
     away = np.linalg.norm((solutions.activations - preferred[target]) / whole.box.scales, axis=1)
     rows = np.lexsort((away, target))
-    rows = rows[clearance[rows] > 0.0]
-    if prepared.dimension > 3:
-        own = target[rows]
-        rows = rows[np.arange(len(rows)) - np.searchsorted(own, own) < family]
-    counts = np.bincount(target[rows], minlength=len(solutions))
-    touches = (counts == 0) & (solutions.counts > 0)
-    statuses = np.where(touches, Status.IN_CONTACT, solutions.statuses).astype(np.int8)
-    return solutions.only(rows, counts, statuses)
+    rows = rows[ClearanceMap(whole).of(solutions.activations[rows]).value > 0.0]
+    own = target[rows]
+    rows = rows[np.arange(len(own)) - np.searchsorted(own, own) < most]
+    return solutions.only(rows, np.bincount(target[rows], minlength=len(solutions)))
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
