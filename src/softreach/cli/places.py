@@ -118,9 +118,7 @@ def plan(
     overwrite: options.Overwrite = False,
     unit: options.Unit = None,
 ) -> None:
-    """Plan a motion that touches neither the surroundings nor the arm itself.
-
-    The activations go into a CSV file, with tips, clearances and, at given rates, times.
+    """Plan a motion that touches nothing, with times at given rates, into a CSV file.
 
     Example: softreach plan tank.toml --goal -1,0,-0.5 --rate 0.5 --out plan.csv
 
@@ -148,8 +146,7 @@ def plan(
     )
     write_text(out, path_csv(planned), overwrite=overwrite)
     least = arm.length_unit.rounded(float(planned.clearance.min()))
-    time = "" if rate is None else f", {float(planned.time[-1]):.3g} s"
-    console.line(f"{out}: {planned.sizes['point']} points, least clearance {least}{time}")
+    console.line(f"{out}: {planned.sizes['point']} points, least clearance {least}")
 
 
 def equilibria(

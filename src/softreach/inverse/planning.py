@@ -8,6 +8,8 @@ certified by `workspace.free`: between two rows no point of the arm moves as far
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arguments import as_integer, as_number
-from softreach.support.arrays import Array, Mask, as_points
+from softreach.support.arrays import Array, as_points
 from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.workspace.free import CLEAR, FreeGraph, FreeMotions, free_grid, free_motions
 
@@ -50,36 +52,28 @@ def plan(
 ) -> xr.Dataset:
     """A path of activation that keeps the whole arm clear of its surroundings and of itself.
 
-    Up to three free bundles cells of the activation box are searched, finer and finer ones until
-    those that are free connect start and goal. Where cells in which the arm touches a solid
-    everywhere part them, there is no path. With more bundles random activations are linked, which
-    proves nothing. The path found is shortened.
+    Up to three free bundles finer and finer cells of the activation box are searched until free
+    ones connect start and goal; where cells that touch a solid everywhere part them, there is no
+    path. With more bundles random activations are linked, which proves nothing.
 
     Args:
         arm: The design with its `surroundings`, or its tip map; without loads.
         start: Activations to begin with [unit of each], shape (bundles,); at rest if left out.
         goal: Activations to end with, shape (bundles,).
-        goal_position: Position of the tip to end at [m], shape (3,), in place of `goal`: the
-            nearest of its free solutions to which there is a path.
+        goal_position: Tip to end at [m], shape (3,), by the nearest free solution with a path.
         rate: Largest change of each activation per second, in its own unit, one number for all or
-            shape (bundles,). The times of the plan follow from it.
+            shape (bundles,).
         margin: Clearance to keep all along [m], beyond that of each obstacle.
         seed: Seed of what is random.
 
     Returns:
-        Dataset over `point` with `activation`, `tip` [m], `clearance` [m] and, at given rates,
-        `time` [s]. From one point to the next activations change in proportion, and no point of the
-        arm moves as far as both clearances add up to.
+        Dataset over `point` with `activation`, `tip` and `clearance` [m], and at given rates `time`
+        [s]. In between activations change in proportion, and the arm touches nothing.
 
     Raises:
         InvalidInput: An argument of another shape, not finite or out of range; both goals or none.
-        NotPossible: The arm touches something at an end, or there is no path, or none was found;
-            the arm has loads, or tendons that are driven by length.
-
-    Examples:
-        >>> path = sr.inverse.plan(sr.designs.minimal_trunk(), goal=[-1, 0, -0.5], rate=0.5)
-        >>> print(f"{float(path.time[-1]):.3g} s")
-        2 s
+        NotPossible: The arm touches something at an end, there is no path, or none was found; or it
+            has loads, or tendons that are driven by length.
     """
     motions = free_motions(as_tip_map(arm), as_number("margin", margin, Range(0.0, unit="m")))
     seed, rates = as_integer("seed", seed, 0, 2**63), as_rates(rate, motions.box.bundles)
@@ -87,20 +81,18 @@ def plan(
         raise InvalidInput("goal", goal, "either activations, or a goal_position")
     first = motions.free_at("start", start)
     goals = [goal] if goal_position is None else _goals(motions, first, goal_position, seed)
-    for left, each in enumerate(goals, 1 - len(goals)):
-        try:
-            corners = _corners(motions, first, motions.free_at("goal", each), seed)
-            return _dataset(motions, corners, rates)
-        except NotPossible:
-            if left == 0:
-                raise
-    raise AssertionError
+    for each in goals[:-1]:
+        with suppress(NotPossible):
+            return _planned(motions, first, each, rates, seed)
+    return _planned(motions, first, goals[-1], rates, seed)
 
 
-def _dataset(motions: FreeMotions, corners: Array, rates: Array | None) -> xr.Dataset:
-    """The path with the configurations that certify it."""
+def _planned(
+    motions: FreeMotions, first: Array, goal: ArrayLike, rates: Array | None, seed: int
+) -> xr.Dataset:
     import xarray as xr
 
+    corners = _corners(motions, first, motions.free_at("goal", goal), seed)
     _, k, share, clearance = motions.check(corners[:-1], corners[1:], _SHORTEST)
     rows = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     once = np.append(share[:-1] < 1.0, True)  # each corner
@@ -119,37 +111,25 @@ def _dataset(motions: FreeMotions, corners: Array, rates: Array | None) -> xr.Da
 
 def _goals(motions: FreeMotions, first: Array, position: ArrayLike, seed: int) -> Array:
     """Free activations that put the tip at a place, the nearest first, shape (k, bundles)."""
-    whole, family = motions.clearance.whole, _FAMILY if motions.box.dimension > 3 else 1
-    place, options = as_points("goal_position", position), {"family": family, "seed": seed}
-    (solution,) = solve_inverse(whole, place, near=first, free=True, **options)
+    place, options = as_points("goal_position", position), {"family": _FAMILY, "seed": seed}
+    (solution,) = solve_inverse(motions.clearance.whole, place, near=first, free=True, **options)
     if not len(solution):
         why = solution.status.name.lower().replace("_", " ")
-        where = "" if solution.gap <= whole.tol * whole.length else f", {solution.gap:.3g} m away"
-        raise NotPossible(f"no free activation puts the tip at goal_position: {why}{where}")
+        raise NotPossible(f"no free activation puts the tip at goal_position, which is {why}")
     return solution.activations
 
 
 def _corners(motions: FreeMotions, first: Array, last: Array, seed: int) -> Array:
     """Corners of a free path, shape (k, bundles)."""
     ends, rng = np.stack([first, last]), np.random.default_rng(seed)
-    if _are_clear(motions, ends[:1], ends[1:])[0]:
+    if motions.check(ends[:1], ends[1:], _SHORTEST)[0] == CLEAR:
         return ends
     for graph, cells in _graphs(motions, rng):
         if cells and _are_parted(graph, cells, first, last):
-            raise NotPossible(
-                "there is no free path: activations at which the arm touches its surroundings part "
-                f"start and goal, as cells of 1/{cells} of each range prove"
-            )
+            raise NotPossible("there is no free path: contact all around parts start and goal")
         if (path := _on_links(graph, first, last)) is not None:
             return _shortened(motions, path, rng)
-    raise NotPossible(
-        "no free path was found, which does not prove that there is none: a way may be narrower "
-        "than what was searched"
-    )
-
-
-def _are_clear(motions: FreeMotions, begin: Array, end: Array) -> Mask:
-    return motions.check(begin, end, _SHORTEST)[0] == CLEAR
+    raise NotPossible("no free path was found; that there is none is not proved")
 
 
 def _graphs(motions: FreeMotions, rng: np.random.Generator) -> Iterator[tuple[FreeGraph, int]]:
@@ -157,11 +137,9 @@ def _graphs(motions: FreeMotions, rng: np.random.Generator) -> Iterator[tuple[Fr
     m = motions.box.dimension
     for cells in _CELLS.get(m, ()):
         yield free_grid(motions, cells), cells
-    from scipy.spatial import cKDTree
-
     for count in _RANDOM if m > max(_CELLS) else ():
         places = rng.random((count, m))
-        pairs = cKDTree(places).query(places, _NEIGHBORS)[1]
+        pairs = import_module("scipy.spatial").cKDTree(places).query(places, _NEIGHBORS)[1]
         pairs = np.stack([np.repeat(pairs[:, 0], _NEIGHBORS - 1), pairs[:, 1:].ravel()], axis=1)
         yield FreeGraph(motions, motions.box.from_free_cube(places), pairs), 0
 
@@ -203,7 +181,7 @@ def _shortened(motions: FreeMotions, path: Array, rng: np.random.Generator) -> A
         ends = np.stack([np.interp(cuts, lengths, x) for x in path.T], axis=-1)
         gain = np.diff(cuts, axis=1)[:, 0]
         gain -= np.linalg.norm(np.diff(ends, axis=1)[:, 0] / scales, axis=1)
-        gain[~_are_clear(motions, ends[:, 0], ends[:, 1])] = 0.0
+        gain[motions.check(ends[:, 0], ends[:, 1], _SHORTEST)[0] != CLEAR] = 0.0
         best = gain.argmax()
         if gain[best] > _GAIN * lengths[-1]:
             before, after = path[lengths < cuts[best, 0]], path[lengths > cuts[best, 1]]

@@ -23,7 +23,7 @@ from softreach.inverse.roots import (
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.clearance import ClearanceMap
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
+from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
@@ -156,19 +156,18 @@ def solve_inverse(
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
     solutions = solutions.in_units_of(measures)
-    most = most if prepared.dimension > 3 else len(solutions.activations)
-    return _free_of(solutions, all_inputs(prepared.whole), preferred, most) if free else solutions
+    return _free_of(solutions, prepared, preferred, most) if free else solutions
 
 
-def _free_of(solutions: Solutions, whole: ArmMap, near: ArrayLike, most: int) -> Solutions:
-    """The solutions that touch nothing, the nearest first, so many of each target at most."""
-    target = np.repeat(np.arange(len(solutions)), solutions.counts)
+def _free_of(solutions: Solutions, known: PreparedMap, near: ArrayLike, most: int) -> Solutions:
+    """The solutions that touch nothing, the nearest first; of families so many at most."""
+    whole, target = all_inputs(known.whole), np.repeat(np.arange(len(solutions)), solutions.counts)
     preferred = np.broadcast_to(np.asarray(near, float), (len(solutions), whole.box.bundles))
     away = np.linalg.norm((solutions.activations - preferred[target]) / whole.box.scales, axis=1)
     rows = np.lexsort((away, target))
     rows = rows[ClearanceMap(whole).of(solutions.activations[rows]).value > 0.0]
-    own = target[rows]
-    rows = rows[np.arange(len(own)) - np.searchsorted(own, own) < most]
+    if known.dimension > 3:
+        rows = rows[np.arange(len(rows)) - np.searchsorted(target[rows], target[rows]) < most]
     return solutions.only(rows, np.bincount(target[rows], minlength=len(solutions)))
 
 

@@ -13,7 +13,7 @@ thin it is. A way that is narrower than a cell of the box may be missed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.clearance import ClearanceMap, Clearances
 from softreach.rod.free import FreeRod
-from softreach.rod.inputs import ActivationBox
 from softreach.rod.loaded.flood import edges_along
 from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import TipMap
@@ -51,39 +50,23 @@ _BYTES, _MOST_CELLS = 300, 400  # of a cell: clearances, places and links; along
 _ALONG = 48  # cells of space along the mean side of the set
 
 
-@dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """Which straight motions between activations keep the arm clear of everything.
+    """Which straight motions between activations keep an arm clear of everything.
 
     Clearances count parts of the arm as near each other once their gap is below half of their
     width, so that no step closes so much. Only where an arm bends to a radius below 1.5 of its own
     may they begin to count nearer, between two configurations.
-
-    Raises:
-        NotPossible: The arm has loads, or tendons that are driven by length or have guides.
     """
 
-    clearance: ClearanceMap
-    margin: float = 0.0  # clearance to keep [m]
-
-    def __post_init__(self) -> None:
+    def __init__(self, tip_map: TipMap, margin: float = 0.0) -> None:
+        """Those that keep a margin [m], in all inputs of an arm."""
+        self.clearance, self.margin = ClearanceMap(all_inputs(tip_map)), margin
         driving = self.clearance.tip_map.inputs.driving
         is_known = driving is None or driving.is_bundles
         if not is_known or not isinstance(self.clearance.tip_map.rod, FreeRod):
-            raise NotPossible(
-                "free motions are not known of arms under loads, or with tendons that are driven "
-                "by length or have guides: check configurations by compute_clearance"
-            )
-
-    @property
-    def box(self) -> ActivationBox:
-        """The activations within bounds."""
-        return self.clearance.whole.box
-
-    @property
-    def error(self) -> float:
-        """How much smaller a clearance may be than it is said to be [m]."""
-        return self.clearance.contact_error
+            unknown = "under loads, or with tendons that are driven by length or have guides"
+            raise NotPossible(f"free motions are not known of arms {unknown}")
+        self.box, self.error = self.clearance.whole.box, self.clearance.contact_error
 
     def at(self, gamma: Array) -> Clearances:
         """Clearances at activations (n, bundles), less the margin."""
@@ -92,9 +75,8 @@ class FreeMotions:
 
     def free_at(self, name: str, activations: ArrayLike | None) -> Array:
         """One activation (bundles,), or that at rest, that is within the bounds and free."""
-        box = self.box
-        given = box.clip(np.zeros(box.bundles)) if activations is None else activations
-        gamma = box.check(np.atleast_2d(np.asarray(given)))
+        box, rest = self.box, self.box.clip(np.zeros(self.box.bundles))
+        gamma = box.check(np.atleast_2d(np.asarray(rest if activations is None else activations)))
         if len(gamma) != 1 or (box.excess(gamma) > _ROUNDING).any():
             allowed = f"{box.bundles} numbers between {box.low.tolist()} and {box.high.tolist()}"
             raise InvalidInput(name, activations, allowed)
@@ -128,7 +110,8 @@ class FreeMotions:
         wide = arm.widest(arm.profile.station(np.repeat(0.5 * (edges[1:] + edges[:-1]), 3)))
         swells = poisson * np.abs(z) / least[:, None]
         speed += 2.0 * (swells * (wide * least**-poisson)[:, None]).max(axis=0)
-        turned, levers = np.cumsum(turn, axis=0), np.cumsum(turn * along[:, None], axis=0)
+        middle = (along - 0.5 * weight * most)[:, None]
+        turned, levers = np.cumsum(turn, axis=0), np.cumsum(turn * middle, axis=0)
         half = np.searchsorted(along, 0.5 * along)
         closing = along[:, None] * (turned - turned[half]) + 2.0 * levers[half] - levers
         closing += np.cumsum(stretch, axis=0)
@@ -178,24 +161,17 @@ class FreeMotions:
 
 
 def _least(factors: Array, low: Array, high: Array) -> Array:
-    """Least values of factors (n, bundle) times activations within bounds, shape (n,)."""
     return np.minimum(factors * low, factors * high).sum(axis=1)
 
 
-@lru_cache(maxsize=8)
-def free_motions(tip_map: TipMap, margin: float = 0.0) -> FreeMotions:
-    """Free motions of an arm in all of its inputs, kept for the next call."""
-    return FreeMotions(ClearanceMap(all_inputs(tip_map)), margin)
+free_motions = lru_cache(maxsize=8)(FreeMotions)  # kept for the next call
 
 
 class FreeGraph:
-    """Activations that may be free, and links between those between which motions are clear.
+    """Activations, and links between those that clear motions connect.
 
-    Links are checked until they connect all that they can, those with most room first.
+    Links with most room are checked first, until they connect all that they can.
     """
-
-    links: Index
-    """Nodes at both ends of each, shape (k, 2)."""
 
     def __init__(self, motions: FreeMotions, gamma: Array, pairs: Index) -> None:
         """Link nodes (n, bundles) where pairs of them (k, 2) are neighbors."""
@@ -211,8 +187,7 @@ class FreeGraph:
         self.links, self._maybe = left[:0], left[:0]
         while len(left):
             chosen, left = np.split(left, [some])
-            known = self.clearance[chosen.T]
-            found = motions.check(*gamma[chosen.T], _SHORTEST, known)[0]
+            found = motions.check(*gamma[chosen.T], _SHORTEST, self.clearance[chosen.T])[0]
             self.links = np.concatenate([self.links, chosen[found == CLEAR]])
             self._maybe = np.concatenate([self._maybe, chosen[found == UNDECIDED]])
             part = components(self.links, len(gamma))
@@ -266,8 +241,8 @@ def free_set(arm: Manipulator | TipMap, *, cells: int = 64) -> xr.Dataset:
 
     Raises:
         InvalidInput: A number of cells out of range.
-        NotPossible: There are not three free bundles, the arm touches something at rest, has loads,
-            or has tendons that are driven by length.
+        NotPossible: There are not three free bundles, or the arm touches something at rest, has
+            loads, or tendons that are driven by length.
     """
     half, motions = as_integer("cells", cells, 8, _MOST_CELLS) // 2, free_motions(as_tip_map(arm))
     if motions.box.dimension != 3:
