@@ -135,26 +135,28 @@ class FreeMotions:
         Clearances of both ends, (2, n), may be known. The outcomes (n,); then the number of the
         motion, the share of it and the clearance of each configuration looked at, in order, (k,).
         """
-        delta, which = end - begin, np.arange(len(begin))
+        delta, n = end - begin, len(begin)
         speed, closing = self.largest(delta)
         a, b = (self.at(begin).value, self.at(end).value) if known is None else known
-        low, high, outcome = np.zeros(len(which)), np.ones(len(which)), np.full(len(which), CLEAR)
-        looked_at = [(which, low, a), (which, high, b)]
-        while len(which):
+        outcome = np.full(n, CLEAR)
+        pieces: Any = np.arange(n), np.zeros(n), np.ones(n), a, b
+        looked_at: list[Any] = [(pieces[0], pieces[1], a), (pieces[0], pieces[2], b)]
+        while len(pieces[0]):
+            which, low, high, a, b = pieces
             with np.errstate(divide="ignore", invalid="ignore"):
                 rooms = [(x - self.error) / speed[which] for x in (a, b)]
-                clear = sum(np.minimum(x, 1.0 / closing[which]) for x in rooms) > high - low
-            worst, is_short = np.minimum(a, b), high - low <= shortest
-            unsure = (worst <= self.error) | (~clear & is_short)
+                reach = np.minimum(rooms, 1.0 / closing[which]).sum(axis=0)
+            worst, clear = np.minimum(a, b), reach > high - low
+            unsure = (worst <= self.error) | (~clear & (high - low <= shortest))
             state = np.select([~(worst > 0.0), unsure], [TOUCHES, UNDECIDED], CLEAR)
             np.maximum.at(outcome, which, state)
             left = ~clear & (outcome[which] == CLEAR)
-            which, low, high, a, b = (x[left] for x in (which, low, high, a, b))
+            which, low, high, a, b = (x[left] for x in pieces)
             middle = 0.5 * (low + high)
             c = self.at(begin[which] + middle[:, None] * delta[which]).value
             looked_at.append((which, middle, c))
-            which, low = np.concatenate([which, which]), np.concatenate([low, middle])
-            high, a, b = (np.concatenate(x) for x in ((middle, high), (a, c), (c, b)))
+            halves = (which, which), (low, middle), (middle, high), (a, c), (c, b)
+            pieces = [np.concatenate(each) for each in halves]
         which, share, value = (np.concatenate(each) for each in zip(*looked_at, strict=True))
         order = np.lexsort((share, which))
         return outcome, which[order], share[order], value[order]
