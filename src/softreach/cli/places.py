@@ -1,4 +1,4 @@
-"""`softreach solve`, `track` and `equilibria`: activations that lead to places, and back."""
+"""`softreach solve`, `track`, `plan`, `equilibria`: activations that lead to places, and back."""
 
 import math
 from functools import partial
@@ -119,6 +119,50 @@ def track(
     tracked = sr.track_path(arm, options.points_in("path", path, arm), first)
     write_text(out, path_csv(tracked), overwrite=overwrite)
     console.line(f"{out}: {end_text(tracked, arm.length_unit)}")
+
+
+def plan(
+    design: options.Design,
+    /,
+    *,
+    start: Signed = None,
+    goal: Signed = None,
+    to: Signed = None,
+    rate: str | None = None,
+    changes: Changes = UNCHANGED,
+    out: options.Place = Path("plan.csv"),
+    overwrite: options.Overwrite = False,
+    unit: options.Unit = None,
+) -> None:
+    """Plan a motion that touches nothing, with times at given rates, into a CSV file.
+
+    Example: softreach plan tank.toml --goal -1,0,-0.5 --rate 0.5 --out plan.csv
+
+    Args:
+        start: Activations to start from: -1,0,-0.5; those at rest if left out.
+        goal: Activations to end with.
+        to: Tip position x,y,z to end at, in m unless each has a unit: 80mm,50mm,-24cm.
+        rate: Largest change of each activation per second, one number or one per bundle: 0.5
+        out: CSV file for the plan.
+    """
+    from softreach.export.clouds import path_csv
+    from softreach.inverse.request import position_in
+    from softreach.support.quantity import numbers_in
+
+    arm = design_from(design, changes, unit)
+    options.check_output(out, TABLES, overwrite)
+    if (goal is None) == (to is None):
+        raise NotPossible("give either --goal or --to")
+    planned = sr.inverse.plan(
+        arm,
+        None if start is None else options.activation_of(start, arm, "start"),
+        None if goal is None else options.activation_of(goal, arm, "goal"),
+        goal_position=None if to is None else position_in("to", to, arm.length),
+        rate=None if rate is None else numbers_in(rate) or rate,
+    )
+    write_text(out, path_csv(planned), overwrite=overwrite)
+    least = arm.length_unit.rounded(float(planned.clearance.min()))
+    console.line(f"{out}: {planned.sizes['point']} points, least clearance {least}")
 
 
 def equilibria(

@@ -25,6 +25,7 @@ def reach(
     /,
     *,
     accuracy: Number = 3e-3,
+    free: bool = False,
     changes: Changes = UNCHANGED,
     out: Annotated[list[Path] | None, options.OUT] = None,
     output: options.Output = options.DEFAULT,
@@ -38,6 +39,7 @@ def reach(
 
     Args:
         accuracy: Relative error allowed in the volume.
+        free: Print what the arm reaches without touching anything, and what only through a wall.
         out: Write the boundary (.ply .stl .obj .glb .vtu), draw slices (.png .pdf .svg), or
             the set as a web page that turns (.html). May be repeated.
     """
@@ -45,12 +47,17 @@ def reach(
     from softreach.rod.summary import load_rows
 
     arm = design_from(design, changes, output.unit)
+    if free:
+        options.refuse("with --free, which prints volumes alone", out=out, at=at)
+        found = sr.workspace.free_set(arm).drop_vars(["state", *"xyz"])
+        console.rows(f"free set of {design}", rows_of(found), output.json, arm)
+        return
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
     meshed = ["skimage"] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
     options.check_output(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, output.overwrite, *meshed)
-    free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
+    dimension = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:
-        _check_dimension(path, free)
+        _check_dimension(path, dimension)
     with progress.bar("mapping the activation box", None) as step:
         reached = sr.reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | rows_of(reached.to_dataset())
