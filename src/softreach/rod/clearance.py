@@ -21,7 +21,7 @@ from softreach.arm.tables import tables
 from softreach.geometry.meshes import STACK, DistanceField, Mesh, MeshFile, field_around
 from softreach.kernels.rod.frames import centerlines
 from softreach.kernels.room import HALF_SPACE, MESH, NUMBERS
-from softreach.kernels.room.nearest import FIELD_ERROR, ITSELF, MOST_PARTS, NONE, nearest, swollen
+from softreach.kernels.room.nearest import ARC_SERIES, ITSELF, NONE, nearest, swollen, weights
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import ArmMap, as_tip_map, coarsened, with_unstable
 from softreach.rod.steps import pilot_activations
@@ -36,14 +36,14 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ACCURACY = 1e-3  # over L: largest error of a clearance
-_PLACES, _CUBICS, _SEARCH = 1 / 16, 1 / 8, 3 / 4  # shares of the accuracy
+_PLACES, _CUBICS, _SEARCH = 1 / 16, 3 / 8, 1 / 2  # shares of the accuracy
 _BLOCK = 1024  # arms at once
 _PILOTS = 64
 _MOST_EDGES = 2048
 _FIELD = 1.25  # half an edge of fields around meshes, over the longest arm
 _STRANGE = 300.0  # sizes of meshes over L, or the inverse, at which a wrong unit is likely
 
-
+_weights: Any = getattr(weights, "py_func", weights)  # of the same cubics, for arrays
 _NOTHING: tuple[Any, ...] = (
     *(np.empty((0, 6)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
     *(np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64)),
@@ -151,9 +151,9 @@ class ClearanceMap:
         frames = self.tip_map.frames(gamma, every)
         points, tangents = frames.position, frames.directors[:, :, 2]
         ends = points[:, ::2], tangents[:, ::2]
-        weights = hermite(arcs(*ends), np.full(len(z) - 1, 0.5))
+        factors = _weights(arcs(*ends)[..., None], 0.5)
         terms = (ends[0][:, :-1], ends[0][:, 1:], ends[1][:, :-1], ends[1][:, 1:])
-        apart = sum(w[..., None] * x for w, x in zip(weights, terms, strict=True)) - points[:, 1::2]
+        apart = sum(w * x for w, x in zip(factors, terms, strict=True)) - points[:, 1::2]
         along = (apart * tangents[:, 1::2]).sum(axis=-1, keepdims=True) * tangents[:, 1::2]
         return np.nanmax(np.linalg.norm(apart - along, axis=-1), initial=0.0)
 
@@ -172,9 +172,8 @@ class ClearanceMap:
         for each in edges[:3]:
             each[lost] = 0.0
         steps = len(disks) - 1
-        most = steps * (MOST_PARTS + 1)
-        line = np.empty((most, 3)), *np.empty((3, most)), np.empty(steps + 1, np.int64)
-        room = np.empty(steps), np.empty(STACK, np.int64), np.empty((STACK + steps, 5)), *line
+        room = *np.empty((2, steps)), np.empty(STACK, np.int64), np.empty((STACK + steps, 6))
+        room = *room, np.empty((steps, 3)), *np.empty((2, steps + 1))
         tol = _SEARCH * self.error
         nearest(*edges[:3], disks, edges.tool, *solids, meshes, tol, room, *out)
         out.value[out.which == NONE] = np.inf
@@ -185,15 +184,14 @@ class ClearanceMap:
         tip_map, z = self.tip_map, self.stations
         inner, lost = tip_map.known_activations(tip_map.inputs.activations(gamma))
         shape, power = (len(gamma), len(z)), self._poisson
-        radius, rates = self.arm.widest(z), self._rates
         if isinstance(tip_map.rod, FreeRod):
             points, tangents, widths = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape)
             centerlines(self._table, inner, self._start, points, tangents)
-            swollen(inner, rates, radius, power, widths)
+            swollen(inner, self._rates, self._radius, power, widths)
         else:
             shapes = tip_map.shapes(gamma, z, z)
             points, tangents = shapes.position, np.ascontiguousarray(shapes.directors[:, :, 2])
-            widths = radius * shapes.extension**-power
+            widths = self._radius * shapes.extension**-power
         points[lost] = np.nan
         return _Edges(points, tangents, widths, self._tools(gamma))
 
@@ -204,16 +202,13 @@ class ClearanceMap:
         return np.nan_to_num(self.tip_map.tips(gamma))
 
     @lazy
-    def contact_error(self) -> float:
-        """How much smaller a clearance may be where the field of a mesh decides [m]."""
-        meshes = self._prepared[-1]
-        spacing = max(meshes[5][:, 3], default=0.0)
-        return self.error + FIELD_ERROR * spacing
-
-    @lazy
     def _poisson(self) -> float:
         rings = self.arm.section.rings
         return max(rings, key=lambda ring: ring.outer_ratio).material.poisson_ratio
+
+    @lazy
+    def _radius(self) -> Array:
+        return self.arm.widest(self.stations)
 
     @lazy
     def _rates(self) -> Array:
@@ -271,7 +266,7 @@ class ClearanceMap:
         number = np.where(found.which == ITSELF, len(self.obstacles), found.which)
         edges = np.arange(len(self.stations) + 1.0)
         z = np.interp(found.place[:, 0], edges, np.append(self.stations, self.arm.length))
-        error = {"error": self.error, "error_apart": self.contact_error}
+        error = {"error": self.error}
         return {
             "clearance": ("sample", found.value, {"units": "m", "names": self.names, **error}),
             "obstacle": ("sample", np.maximum(number, -1), {}),
@@ -321,17 +316,12 @@ class ClearanceMap:
         ends = [self._turned(edges, gamma, k + side) for side in (0, 1)]
         p, u = (np.stack([x[rows, k], x[rows, k + 1]], axis=1) for x in edges[:2])
         arc, rates = arcs(p, u), _arc_slopes(p, u, ends)
-        h = hermite(arc, t[:, None])
-        weights = [w[:, 0] for w in h]
+        h = _weights(arc[:, 0], t)
         terms = (p[:, 0], p[:, 1], u[:, 0], u[:, 1])
-        points: Array = np.sum(
-            [w[:, None] * x for w, x in zip(weights, terms, strict=True)], axis=0
-        )
+        points: Array = np.sum([w[:, None] * x for w, x in zip(h, terms, strict=True)], axis=0)
         each = (ends[0][0], ends[1][0], ends[0][1], ends[1][1])
-        moves[:, :3] = np.sum(
-            [w[:, None, None] * x for w, x in zip(weights, each, strict=True)], axis=0
-        )
-        bow = (weights[2][:, None] * u[:, 0] + weights[3][:, None] * u[:, 1]) / arc
+        moves[:, :3] = np.sum([w[:, None, None] * x for w, x in zip(h, each, strict=True)], axis=0)
+        bow = (h[2][:, None] * u[:, 0] + h[3][:, None] * u[:, 1]) / arc
         moves[:, :3] += bow[:, :, None] * rates[:, None]
         shrink = [self._swelling(edges, gamma, k + side) for side in (0, 1)]
         moves[:, 3] = (1.0 - t)[:, None] * shrink[0] + t[:, None] * shrink[1]
@@ -412,7 +402,7 @@ def compute_clearance(
         near, NaN without an equilibrium. `obstacle`, its number among the `names` in the attributes
         of `clearance`, -1 for none; `station`, Z of the place [m]. With `slopes`, also
         `clearance_slope` (sample, bundle) [m per unit]. The attribute `error` says how much smaller
-        a clearance may be [m], `error_apart` that near a mesh, unless the arm just touches it.
+        a clearance may be [m].
 
     Raises:
         InvalidInput: As for `tip_positions`, or an accuracy out of range.
@@ -456,7 +446,7 @@ def _turn(tangents: Array) -> Array:
     return 0.25 * (np.diff(tangents, axis=1) ** 2).sum(axis=2)
 
 
-_SERIES = np.array([1.0, 1 / 6, 3 / 40, 5 / 112, 35 / 1152, 63 / 2816])  # of asin(√s)/√s
+_SERIES = np.array(ARC_SERIES)
 
 
 def _arc_slopes(p: Array, u: Array, ends: list[tuple[Array, Array]]) -> Array:
@@ -469,10 +459,3 @@ def _arc_slopes(p: Array, u: Array, ends: list[tuple[Array, Array]]) -> Array:
     series = polynomial.polyval(s, _SERIES)[:, None]
     slope = polynomial.polyval(s, polynomial.polyder(_SERIES))[:, None]
     return series * grown + size[:, None] * slope * turned
-
-
-def hermite(arc: Array, t: Array) -> tuple[Array, Array, Array, Array]:
-    """Weights of both centers and of both tangents at shares t of arcs (n, step)."""
-    a, b = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-    ones = np.ones_like(arc)
-    return a * ones, b * ones, arc * t * (1.0 - t) ** 2, arc * t * t * (t - 1.0)

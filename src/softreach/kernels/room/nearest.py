@@ -2,29 +2,31 @@
 
 Between two edges of its steps an arm is the cubic through their centers and tangents, which are as
 long as the arc, and its radius is linear. Half-spaces take the least value of that cubic. Past
-others it is cut into halves where a nearer point may be, as distances change no faster than
-places. Two pieces come near each other only if the arm turns
-by 1.77 rad between them: less keeps the chord of an arc above 2/π of its length.
+others it is cut into halves where a nearer point may be. Two pieces come near each other only if
+the arm turns by 1.77 rad between them: less keeps the chord of an arc above 2/π of its length.
 """
 
 from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inline, kernel, lean_kernel
 from softreach.kernels.room import HALF_SPACE, MESH
 from softreach.kernels.room.shapes import signed_distance
-from softreach.kernels.room.triangles import in_field, nearest_in
-from softreach.kernels.vector import dot, minus, plus, row, spot, times
+from softreach.kernels.room.triangles import least_in_field, nearest_in
+from softreach.kernels.vector import difference, dot, minus, plus, row, spot, times
 
 NONE, ITSELF = -1, -2
 """In place of the number of a solid."""
-FIELD_ERROR = 0.87
-"""Of the spacing of a field: √3/2."""
-MOST_PARTS = 64
-"""Chords of the polyline of a step."""
+ARC_SERIES = 1.0, 1 / 6, 3 / 40, 5 / 112, 35 / 1152, 63 / 2816
+"""Of asin(√s)/√s: the arc of a circle over its chord, of which tangents differ by 2√s."""
 _FARTHEST = 1e300  # as kernels know no infinity
 _BACK, _TURN = 2.0 / math.pi, 1.76  # chord over arc of half a circle; twice its arc cosine
+_MOST_PARTS = 64  # chords of a step
+_MOST_MOVES = 40  # of two places toward each other
+_FARTHEST_MOVE = 0.25  # over the gap
+_SMALL = 1e-9  # last of these moves, over the gap
+_SMALLEST = 1e-3  # curvature of the gap in a move, times it
 
 
 @kernel
@@ -45,41 +47,64 @@ def swollen(gamma, rates, radius, power, out):
 
 
 @inline
-def _arc(points, tangents, i, k):
-    """Length of the arc between two edges, that of a circle with their chord and tangents."""
+def _measure(points, tangents, i, k):
+    """Length of the arc between two edges, that of a circle with their chord and tangents.
+
+    And the largest second derivative of the cubic by its share, which it has at an end.
+    """
     chord, square = 0.0, 0.0
     for axis in range(3):
         chord += (points[i, k + 1, axis] - points[i, k, axis]) ** 2
         square += (tangents[i, k + 1, axis] - tangents[i, k, axis]) ** 2
-    s = 0.25 * square
-    series = 1.0 + s * (1 / 6 + s * (3 / 40 + s * (5 / 112 + s * (35 / 1152 + s * (63 / 2816)))))
-    return math.sqrt(chord) * series
-
-
-@inline
-def _at(points, tangents, i, k, length, t):
-    """The point of the cubic of step k at a share t of its arc."""
-    a, b = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-    c, d = length * t * (1.0 - t) ** 2, length * t * t * (t - 1.0)
-    p, q = spot(points, i, k), spot(points, i, k + 1)
-    u, v = spot(tangents, i, k), spot(tangents, i, k + 1)
-    return (
-        a * p[0] + b * q[0] + c * u[0] + d * v[0],
-        a * p[1] + b * q[1] + c * u[1] + d * v[1],
-        a * p[2] + b * q[2] + c * u[2] + d * v[2],
-    )
-
-
-@inline
-def _bend(points, tangents, i, k, length):
-    """Largest second derivative of the cubic of step k by its share, at an end."""
-    first, second = 0.0, 0.0
+    s, series = 0.25 * square, 0.0
+    for n in range(5, -1, -1):
+        series = ARC_SERIES[n] + s * series
+    length, first, second = math.sqrt(chord) * series, 0.0, 0.0
     for axis in range(3):
         apart = 6.0 * (points[i, k + 1, axis] - points[i, k, axis])
         u, v = length * tangents[i, k, axis], length * tangents[i, k + 1, axis]
         first += (apart - 4.0 * u - 2.0 * v) ** 2
         second += (apart - 2.0 * u - 4.0 * v) ** 2
-    return math.sqrt(max(first, second))
+    return length, math.sqrt(max(first, second))
+
+
+@inline
+def weights(length, t):
+    """Those of both centers and of both tangents at a share t of the arc of a step."""
+    return (
+        (1.0 + 2.0 * t) * (1.0 - t) ** 2,
+        t * t * (3.0 - 2.0 * t),
+        length * t * (1.0 - t) ** 2,
+        length * t * t * (t - 1.0),
+    )
+
+
+@inline
+def _sum(points, tangents, i, k, w):
+    p, q = spot(points, i, k), spot(points, i, k + 1)
+    u, v = spot(tangents, i, k), spot(tangents, i, k + 1)
+    return plus(plus(times(w[0], p), times(w[1], q)), plus(times(w[2], u), times(w[3], v)))
+
+
+@inline
+def _at(points, tangents, i, k, length, t):
+    """The point of the cubic of step k at a share t of its arc."""
+    return _sum(points, tangents, i, k, weights(length, t))
+
+
+@inline
+def _turning(points, tangents, i, k, length, t):
+    """First and second derivatives of that point by the arc."""
+    e = 6.0 * t * (1.0 - t) / length
+    first = -e, e, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
+    e = (6.0 - 12.0 * t) / (length * length)
+    second = -e, e, (6.0 * t - 4.0) / length, (6.0 * t - 2.0) / length
+    return _sum(points, tangents, i, k, first), _sum(points, tangents, i, k, second)
+
+
+@inline
+def _radius(radius, i, k, t):
+    return radius[i, k] + t * (radius[i, k + 1] - radius[i, k])
 
 
 @inline
@@ -125,33 +150,24 @@ def _over_plane(points, tangents, radius, disks, lengths, i, q, first, last, bes
 
 
 @inline
-def _gap(
-    kind, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k, t, exact,
-    most
-):  # fmt: skip
-    """Gap between a solid and the ball around a point of an arm.
-
-    Or to all but the solid where side is -1; to meshes by their fields, if not `exact` or `most`
-    is nearer by far.
-    """
-    width = wanted
-    if k < len(lengths):
-        x = _at(points, tangents, i, k, lengths[k], t)
-        width += radius[i, k] + t * (radius[i, k + 1] - radius[i, k])
-    else:  # a tool that the tip holds
-        x = spot(points, i, k)
-        x = plus(x, times(t, minus(row(tool, i), x)))
-    if kind == MESH:
-        return _of_mesh(side, int(q[0]), meshes, stack, x, exact, most + width) - width
-    return side * signed_distance(kind, q, x)[0] - width
+def _bound(kind, side, q, meshes, x):
+    """As `_distance`, but for meshes no larger, and a node of their field."""
+    if kind != MESH:
+        return side * signed_distance(kind, q, x)[0], 0
+    m = int(q[0])  # arrays of a tuple are counted when they have names: they have none here
+    return least_in_field(x, side, meshes[5], meshes[6], meshes[7], meshes[0][m, 2], m)
 
 
 @inline
-def _of_mesh(side, m, meshes, stack, x, exact, most):
-    # Arrays of a tuple are counted when they have names: they have none here.
-    near, node = in_field(x, meshes[5], meshes[6], meshes[7], meshes[0][m, 2], m)
-    if not exact or side * near - FIELD_ERROR * meshes[5][m, 3] > most:
-        return side * near
+def _distance(kind, side, q, meshes, stack, x, most):
+    """Distance of a point from a solid, or from all but the solid where side is -1.
+
+    Of a mesh, from which it is farther than `most`, some smaller distance that is larger than that.
+    """
+    near, node = _bound(kind, side, q, meshes, x)
+    if kind != MESH or near > most:
+        return near
+    m = int(q[0])
     root, begin = meshes[0][m, 0], meshes[0][m, 1]
     found = nearest_in(
         x, meshes[8][node], meshes[1], root, meshes[2], begin, meshes[0][m + 1, 1] - begin - 1,
@@ -161,130 +177,103 @@ def _of_mesh(side, m, meshes, stack, x, exact, most):
 
 
 @inline
-def _past_mesh(
-    side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths, parts, i,
-    first, last, best, tol
-):  # fmt: skip
-    """As `_past` by the field of a mesh, and exactly where that cannot tell whether arms touch."""
-    error = FIELD_ERROR * meshes[5][int(q[0]), 3]
-    near, place = _past(
-        MESH, side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths,
-        parts, i, first, last, best + error, tol, False,
-    )  # fmt: skip
-    if place < 0.0:
-        return best, place
-    k = min(int(place), max(len(lengths) - 1, last - 1))
-    gap = _gap(
-        MESH, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k,
-        place - k, True, _FARTHEST,
-    )  # fmt: skip
-    e = int(place)
-    if place == e and e < len(disks) and disks[e] > 0.0:
-        gap += radius[i, e] - disks[e]
-    place = place if gap < best else -1.0
-    best = min(gap, best)
-    if near - error < 0.0 < best:
-        again, its = _past(
-            MESH, side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths,
-            parts, i, first, last, best, tol, True,
-        )  # fmt: skip
-        if its >= 0.0:
-            best, place = again, its
-    return best, place
+def _least_between(d0, d1, w0, w1, apart, bulge):
+    """Least gap on an arc of a length between two points at distances from a solid.
+
+    No point of the solid is nearer than those distances: to the chord, none is nearer than the
+    one at just these from both ends. Widths w are linear in between, and the arc bulges.
+    """
+    slope = (w1 - w0) / max(apart, 1e-300)
+    if (
+        d0 <= 0.0 or d1 <= 0.0 or d0 + d1 <= apart or abs(slope) >= 1.0
+    ):  # as it changes by 1 per arc
+        return 0.5 * (d0 + d1 - apart) - max(w0, w1)
+    along = 0.5 * (apart * apart + d0 * d0 - d1 * d1) / apart
+    away = math.sqrt(max(d0 * d0 - along * along, 0.0))
+    cosine = math.sqrt(1.0 - slope * slope)
+    foot = along * cosine + away * slope
+    if foot <= 0.0 or foot >= apart * cosine:
+        return min(d0 - w0, d1 - w1) - bulge
+    return away * cosine - slope * along - w0 - bulge
 
 
 @inline
-def _speed(points, tangents, radius, tool, lengths, i, k):
-    """How fast the gap of step k may change with the share of its arc at most."""
-    middle, apart = 0.0, 0.0
-    if k == len(lengths):
-        for axis in range(3):
-            apart += (tool[i, axis] - points[i, k, axis]) ** 2
-        return math.sqrt(apart)
+def _speed(points, tangents, lengths, i, k):
+    """How long the arc of step k would be at the largest speed of its cubic."""
+    square = 0.0
     for axis in range(3):
         each = 3.0 * (points[i, k + 1, axis] - points[i, k, axis])
-        each -= lengths[k] * (tangents[i, k, axis] + tangents[i, k + 1, axis])
-        middle += each * each
-    change = abs(radius[i, k + 1] - radius[i, k])
-    return max(lengths[k], math.sqrt(middle)) + change
+        square += (each - lengths[k] * (tangents[i, k, axis] + tangents[i, k + 1, axis])) ** 2
+    return max(lengths[k], math.sqrt(square))
 
 
 @inline
 def _past(
-    kind, side, wanted, q, meshes, stack, points, tangents, radius, disks, tool, lengths, parts, i,
-    first, last, best, tol, exact
+    kind, side, q, meshes, stack, points, tangents, radius, disks, tool, lengths, bends, parts, i,
+    first, last, best, tol
 ):  # fmt: skip
-    """The least gap between two edges that is below `best`, and its place.
+    """The least gap between two edges that is below `best`, and its place; -1 if none is.
 
-    Between two points with gaps a and b, that may change by d between them, it is at least
-    (a + b - d)/2. Gaps at the edges come first, as the nearest of them spares most of the others.
+    Gaps at the edges come first, as the nearest of them spares most of the others.
     """
-    place, steps, size = -1.0, len(lengths), 0
+    place, steps, near, least = -1.0, len(lengths), first, _FARTHEST
     for e in range(first, last + 1):
-        k = min(e, steps - 1) if e <= steps else steps
-        gap = _gap(
-            kind, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k,
-            float(e - k), exact, best + tol,
-        )  # fmt: skip
-        parts[e, 4] = gap
-        if e <= steps and disks[e] > 0.0:
-            gap += radius[i, e] - disks[e]
-        if gap < best:
-            best, place = gap, float(e)
+        x = spot(points, i, e) if e <= steps else row(tool, i)
+        parts[e, 4] = _bound(kind, side, q, meshes, x)[0]
+        parts[e, 5] = max(radius[i, e], disks[e]) if e <= steps else 0.0
+        if parts[e, 4] - parts[e, 5] < least:
+            least, near = parts[e, 4] - parts[e, 5], e
+    for j in range(first - 1, last + 1 if kind == MESH else first):
+        e = near if j < first else j
+        if parts[e, 4] - parts[e, 5] >= best + tol or j == near:
+            continue
+        x = spot(points, i, e) if e <= steps else row(tool, i)
+        parts[e, 4] = _distance(kind, side, q, meshes, stack, x, _FARTHEST)
+        if parts[e, 4] - parts[e, 5] < best:
+            best, place = parts[e, 4] - parts[e, 5], float(e)
     for k in range(first, last):
-        speed = _speed(points, tangents, radius, tool, lengths, i, k)
+        r, change, bulge = 0.0, 0.0, 0.0
+        if k < steps:
+            r, change, bulge = radius[i, k], radius[i, k + 1] - radius[i, k], bends[k] / 8.0
+            speed = _speed(points, tangents, lengths, i, k)
+        else:
+            apart = minus(row(tool, i), spot(points, i, k))
+            speed = math.sqrt(dot(apart, apart))
         parts[0, 0], parts[0, 1], size = 0.0, parts[k, 4], 1
         parts[0, 2], parts[0, 3] = 1.0, parts[k + 1, 4]
-        if k == steps:  # without the width of the tip
-            parts[0, 1] += radius[i, k]
         while size:
             size -= 1
             lower, below, upper, above = (
                 parts[size, 0], parts[size, 1], parts[size, 2], parts[size, 3]
             )  # fmt: skip
-            if 0.5 * (below + above - (upper - lower) * speed) >= best - tol:
+            share, width = upper - lower, r + lower * change
+            bound = _least_between(
+                below, above, width, r + upper * change, share * speed, share * share * bulge
+            )
+            if bound >= best - tol:
                 continue
-            middle = 0.5 * (lower + upper)
-            gap = _gap(
-                kind, side, wanted, q, meshes, stack, points, tangents, radius, tool, lengths, i, k,
-                middle, exact, best + tol,
-            )  # fmt: skip
-            if gap < best:
-                best, place = gap, k + middle
-            parts[size, 2], parts[size, 3] = middle, gap
+            t = 0.5 * (lower + upper)
+            if k < steps:
+                x = _at(points, tangents, i, k, lengths[k], t)
+            else:  # on the line to a tool that the tip holds
+                x = plus(spot(points, i, k), times(t, apart))
+            width = r + t * change
+            middle = _distance(kind, side, q, meshes, stack, x, best + tol + width)
+            if middle - width < best:
+                best, place = middle - width, k + t
+            parts[size, 2], parts[size, 3] = t, middle
             size += 1
             parts[size, 0], parts[size, 1], parts[size, 2], parts[size, 3] = (
-                middle, gap, upper, above
+                t, middle, upper, above
             )  # fmt: skip
             size += 1
     return best, place
 
 
 @inline
-def _lay(points, tangents, radius, lengths, i, sag, spots, widths, arc, share, firsts):
-    """Put a polyline of an arm into place."""
-    n = 0
-    for k in range(len(lengths)):
-        firsts[k] = n
-        bend = _bend(points, tangents, i, k, lengths[k])
-        parts = min(max(math.ceil(math.sqrt(bend / (8.0 * sag))), 1), MOST_PARTS)
-        for j in range(parts + 1):
-            t = j / parts
-            x = _at(points, tangents, i, k, lengths[k], t)
-            spots[n, 0], spots[n, 1], spots[n, 2] = x
-            widths[n], share[n] = radius[i, k] + t * (radius[i, k + 1] - radius[i, k]), k + t
-            arc[n] = (arc[n - 1] if n else 0.0) + (lengths[k] / parts if j else 0.0)
-            n += 1
-    firsts[len(lengths)] = n
-
-
-@inline
-def _apart(spots, a, b):
-    """Shares of chords a and b at which they come nearest, and the distance there."""
-    p, r = row(spots, a), row(spots, b)
-    u = minus(row(spots, a + 1), p)
-    v = minus(row(spots, b + 1), r)
-    w = minus(p, r)
+def _chords(p, q, r, x):
+    """Shares of chords from p to q and from r to x at which these come nearest, and how near."""
+    u, v, w = minus(q, p), minus(x, r), minus(p, r)
     uu, vv, uv, uw, vw = dot(u, u), dot(v, v), dot(u, v), dot(u, w), dot(v, w)
     size, s = uu * vv - uv * uv, 0.0
     if size > 1e-12 * uu * vv:
@@ -298,56 +287,140 @@ def _apart(spots, a, b):
 
 
 @inline
-def _from_start_to_end(spots, a, b):
-    apart = minus(row(spots, a), row(spots, b + 1))
-    return math.sqrt(dot(apart, apart))
+def _refined(points, tangents, radius, lengths, passed, i, k, s, m, t):
+    """The least gap between two parts of an arm close to shares s, t of steps k, m, and places.
+
+    By Newton's method along the arc, of which each step must shorten the gap.
+    """
+    best, along, across = _FARTHEST, 0.0, 0.0
+    for _ in range(_MOST_MOVES):
+        (a, u), (b, v) = _moved(lengths, k, s, along), _moved(lengths, m, t, across)
+        x = _at(points, tangents, i, a, lengths[a], u)
+        apart = minus(x, _at(points, tangents, i, b, lengths[b], v))
+        size = math.sqrt(dot(apart, apart))
+        gap = size - _radius(radius, i, a, u) - _radius(radius, i, b, v)
+        arc = passed[b] + v * lengths[b] - passed[a] - u * lengths[a]
+        if gap >= best or (best < _FARTHEST and not _is_back(size, arc, lengths[k])):
+            along, across = 0.5 * along, 0.5 * across
+        else:
+            best, k, s, m, t = gap, a, u, b, v
+            along, across = _toward(points, tangents, radius, lengths, i, k, s, m, t, apart, size)
+        if abs(along) + abs(across) < _SMALL * size:
+            break
+    return best, k + s, m + t
 
 
 @inline
-def _folded(
-    points, tangents, radius, lengths, i, sag, spots, widths, arc, share, firsts, best
-):  # fmt: skip
+def _moved(lengths, k, t, arc):
+    """Step and share at an arc from a share of step k, at the most in the step next to it."""
+    t += arc / lengths[k]
+    if t > 1.0 and k + 1 < len(lengths):
+        return k + 1, min((t - 1.0) * lengths[k] / lengths[k + 1], 1.0)
+    if t < 0.0 and k > 0:
+        return k - 1, max(1.0 + t * lengths[k] / lengths[k - 1], 0.0)
+    return k, min(max(t, 0.0), 1.0)
+
+
+@inline
+def _toward(points, tangents, radius, lengths, i, k, s, m, t, apart, size):
+    """Newton's step to the least gap between two places, in arc; none beyond ends of the arm."""
+    n, one = times(1.0 / size, apart), radius[i, k + 1] - radius[i, k]
+    u, du = _turning(points, tangents, i, k, lengths[k], s)
+    v, dv = _turning(points, tangents, i, m, lengths[m], t)
+    f, g = dot(n, u) - one / lengths[k], -dot(n, v) - (radius[i, m + 1] - radius[i, m]) / lengths[m]
+    a = dot(n, du) + (dot(u, u) - dot(n, u) ** 2) / size
+    c = -dot(n, dv) + (dot(v, v) - dot(n, v) ** 2) / size
+    b = (dot(n, u) * dot(n, v) - dot(u, v)) / size
+    if k + s <= 0.0 and f > 0.0:
+        f, b = 0.0, 0.0
+    if m + t >= len(lengths) and g < 0.0:
+        g, b = 0.0, 0.0
+    least = 0.5 * (a + c) - math.sqrt(0.25 * (a - c) ** 2 + b * b)
+    more = max(_SMALLEST / size - least, 0.0)
+    a, c = a + more, c + more
+    along, across, scale = b * g - c * f, b * f - a * g, a * c - b * b
+    scale = 1.0 / max(scale, (abs(along) + abs(across)) / (_FARTHEST_MOVE * size))
+    return scale * along, scale * across
+
+
+@inline
+def _folded(points, tangents, radius, lengths, bends, middles, passed, turned, i, sag, best):
     """The least gap between parts of an arm below `best` and half their width, and both places."""
-    place, other, count, laid = -1.0, -1.0, len(lengths), False
+    place, other, count, first = -1.0, -1.0, len(lengths), 1
+    passed[0], turned[0] = 0.0, 0.0
     for k in range(count):
-        turn = _bend(points, tangents, i, k, lengths[k]) / max(lengths[k], 1e-300)
-        passed = lengths[k]
-        for m in range(k + 1, count):
-            turn += _bend(points, tangents, i, m, lengths[m]) / max(lengths[m], 1e-300)
-            passed += lengths[m]
-            if turn < _TURN:
-                continue
-            square = 0.0
-            for axis in range(3):
-                here = points[i, k, axis] + points[i, k + 1, axis]
-                square += (0.5 * (here - points[i, m, axis] - points[i, m + 1, axis])) ** 2
+        passed[k + 1] = passed[k] + lengths[k]
+        turned[k + 1] = turned[k] + bends[k] / max(lengths[k], 1e-300)
+    if turned[count] < _TURN:
+        return best, place, other
+    for k in range(count):
+        for axis in range(3):
+            middles[k, axis] = 0.5 * (points[i, k, axis] + points[i, k + 1, axis])
+    for k in range(count):
+        while first < count and turned[first + 1] - turned[k] < _TURN:
+            first += 1
+        for m in range(first, count):
             wide = max(radius[i, k], radius[i, k + 1]) + max(radius[i, m], radius[i, m + 1])
-            least = math.sqrt(square) - 0.5 * (lengths[k] + lengths[m])
-            if least > _BACK * passed or least - wide > min(best, 0.5 * wide):
+            reach = min(wide + min(best, 0.5 * wide), _BACK * (passed[m + 1] - passed[k]))
+            ball = max(reach + 0.5 * (lengths[k] + lengths[m]), 0.0)
+            apart = difference(middles, k, m)
+            if dot(apart, apart) >= ball * ball:
                 continue
-            if not laid:
-                laid = True
-                _lay(points, tangents, radius, lengths, i, sag, spots, widths, arc, share, firsts)
-            for a in range(firsts[k], firsts[k + 1] - 1):
-                for b in range(firsts[m], firsts[m + 1] - 1):
-                    s, t, gap = _apart(spots, a, b)
-                    along = arc[b] + t * (arc[b + 1] - arc[b]) - arc[a] - s * (arc[a + 1] - arc[a])
-                    if gap >= _BACK * along:  # where both are nearest; farther apart they may count
-                        s, t, along = 0.0, 1.0, arc[b + 1] - arc[a]
-                        gap = _from_start_to_end(spots, a, b)
-                        if gap >= _BACK * along:
-                            continue
-                    wide = widths[a] + s * (widths[a + 1] - widths[a])
-                    wide += widths[b] + t * (widths[b + 1] - widths[b])
-                    gap -= wide
-                    if gap < min(best, 0.5 * wide):
-                        best = gap
-                        place = share[a] + s * (share[a + 1] - share[a])
-                        other = share[b] + t * (share[b + 1] - share[b])
+            bulge = (bends[k] + bends[m]) / 8.0
+            p, q = spot(points, i, k), spot(points, i, k + 1)
+            near = _chords(p, q, spot(points, i, m), spot(points, i, m + 1))[2]
+            if near - bulge >= reach:
+                continue
+            gap, s, t = _nearest_chords(
+                points, tangents, radius, lengths, bends, passed, i, sag, k, m
+            )
+            if gap - 2.0 * sag >= min(best, 0.5 * wide):
+                continue
+            gap, s, t = _refined(points, tangents, radius, lengths, passed, i, k, s, m, t)
+            if gap < min(best, 0.5 * wide):
+                best, place, other = gap, s, t
     return best, place, other
 
 
-@kernel
+@inline
+def _nearest_chords(points, tangents, radius, lengths, bends, passed, i, sag, k, m):
+    """The least gap between chords of two steps, and the shares of these at which it is."""
+    best, place, other = _FARTHEST, 0.0, 0.0
+    some, many = _parts(bends[k], sag), _parts(bends[m], sag)
+    for a in range(some):
+        p = _at(points, tangents, i, k, lengths[k], a / some)
+        q = _at(points, tangents, i, k, lengths[k], (a + 1) / some)
+        for b in range(many):
+            x = _at(points, tangents, i, m, lengths[m], b / many)
+            y = _at(points, tangents, i, m, lengths[m], (b + 1) / many)
+            s, t, apart = _chords(p, q, x, y)
+            s, t = (a + s) / some, (b + t) / many
+            between = passed[m] - passed[k]
+            if not _is_back(apart, between + t * lengths[m] - s * lengths[k], lengths[k]):
+                # Both are nearest here; the parts that are farther apart along the arm may count.
+                s, t, away = a / some, (b + 1) / many, minus(p, y)
+                apart = math.sqrt(dot(away, away))
+                if not _is_back(apart, between + t * lengths[m] - s * lengths[k], lengths[k]):
+                    continue
+            apart -= _radius(radius, i, k, s) + _radius(radius, i, m, t)
+            if apart < best:
+                best, place, other = apart, s, t
+    return best, place, other
+
+
+@inline
+def _is_back(apart, arc, length):
+    """Whether an arm turns back between two places; not so where rounding alone parts them."""
+    return apart + _SMALL * length < _BACK * arc
+
+
+@inline
+def _parts(bend, sag):
+    """Number of chords from which the cubic of a step bulges by no more than the sag."""
+    return min(max(math.ceil(math.sqrt(bend / (8.0 * sag))), 1), _MOST_PARTS)
+
+
+@lean_kernel
 def nearest(
     points, tangents, radius, disks, tool, kinds, numbers, ends, meshes, tol, room, value, which,
     place
@@ -361,11 +434,11 @@ def nearest(
     that they concern. The last row of each is no solid, and of the side 1 if the arm itself
     counts. Places are edges and shares of the arc to the next; the second is another on the arm.
     """
-    lengths, stack, parts, spots, widths, arc, share, firsts = room
+    lengths, bends, stack, parts, middles, passed, turned = room
     solids, edge = len(kinds) - 1, len(disks) - 1
     for i in range(points.shape[0]):
         for k in range(edge):
-            lengths[k] = _arc(points, tangents, i, k)
+            lengths[k], bends[k] = _measure(points, tangents, i, k)
         best, found, at, other = _FARTHEST, NONE, -1.0, -1.0
         for o in range(solids):
             first, last, wanted = ends[o, 0], ends[o, 1], numbers[o, -1]
@@ -374,28 +447,21 @@ def nearest(
                     points, tangents, radius, disks, lengths, i, numbers[o], first, last,
                     best + wanted,
                 )  # fmt: skip
-                near -= wanted
                 if len(tool) and last == edge:
-                    height = _height(row(tool, i), numbers[o]) - wanted
+                    height = _height(row(tool, i), numbers[o])
                     near, its = (height, edge + 1.0) if height < near else (near, its)
             else:
                 last += len(tool) > 0 and last == edge
-                if kinds[o, 0] == MESH:
-                    near, its = _past_mesh(
-                        kinds[o, 1], wanted, numbers[o], meshes, stack, points, tangents, radius,
-                        disks, tool, lengths, parts, i, first, last, best, tol,
-                    )  # fmt: skip
-                else:
-                    near, its = _past(
-                        kinds[o, 0], kinds[o, 1], wanted, numbers[o], meshes, stack, points,
-                        tangents, radius, disks, tool, lengths, parts, i, first, last, best, tol,
-                        True,
-                    )  # fmt: skip
+                near, its = _past(
+                    kinds[o, 0], kinds[o, 1], numbers[o], meshes, stack, points, tangents, radius,
+                    disks, tool, lengths, bends, parts, i, first, last, best + wanted, tol,
+                )  # fmt: skip
+            near -= wanted
             if its >= 0.0:
                 best, found, at = near, o, its
         if kinds[solids, 1] > 0:
             near, its, there = _folded(
-                points, tangents, radius, lengths, i, tol, spots, widths, arc, share, firsts, best
+                points, tangents, radius, lengths, bends, middles, passed, turned, i, tol, best
             )
             if its >= 0.0:
                 best, found, at, other = near, ITSELF, its, there

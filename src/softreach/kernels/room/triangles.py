@@ -12,6 +12,7 @@ import math
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.vector import dot, minus, plus, spot, times
 
+FIELD_ERROR = 0.87  # over the spacing of a field: √3/2, half a diagonal
 FACE = 0  # Parts of a triangle: itself, its edges from corners 0, 1, 2 on, its corners
 
 
@@ -122,21 +123,25 @@ def nearest_triangles(points, table, stack, enough, distance, gradient, face):
 
 
 @inline
-def in_field(x, grids, shapes, field, first, m):
-    """Distance of x by field m, linear between nodes along each axis, and the node nearest to x.
+def least_in_field(x, side, grids, shapes, field, first, m):
+    """A distance that no point of the solid of field m is nearer to x, and the node nearest to x.
 
-    Grids (m, 4) are first nodes and spacings, shapes (m, 3) numbers of nodes, fields one list.
+    Or of all but the solid where side is -1. Grids (m, 4) are first nodes and spacings, shapes
+    (m, 3) numbers of nodes, fields one list.
     """
     i, a = _cell(x[0], grids[m, 0], grids[m, 3], shapes[m, 0])
     j, b = _cell(x[1], grids[m, 1], grids[m, 3], shapes[m, 1])
     k, c = _cell(x[2], grids[m, 2], grids[m, 3], shapes[m, 2])
     rows, columns = shapes[m, 1], shapes[m, 2]
-    n = first + (i * rows + j) * columns + k
-    up = n + rows * columns
-    low = (1.0 - b) * _line(field, n, c) + b * _line(field, n + columns, c)
-    high = (1.0 - b) * _line(field, up, c) + b * _line(field, up + columns, c)
-    node = n + (rows * columns if a > 0.5 else 0) + (columns if b > 0.5 else 0)
-    return (1.0 - a) * low + a * high, node + (1 if c > 0.5 else 0)
+    n, up = first + (i * rows + j) * columns + k, rows * columns
+    low = _mean(_line(side, field, n, c), _line(side, field, n + columns, c), b)
+    high = _mean(_line(side, field, n + up, c), _line(side, field, n + up + columns, c), b)
+    square = low + a * (high - low)
+    square -= grids[m, 3] ** 2 * (a * (1.0 - a) + b * (1.0 - b) + c * (1.0 - c))
+    n += (up if a > 0.5 else 0) + (columns if b > 0.5 else 0) + (1 if c > 0.5 else 0)
+    if square > 0.0:
+        return math.sqrt(square), n
+    return side * field[n] - FIELD_ERROR * grids[m, 3], n
 
 
 @inline
@@ -146,5 +151,11 @@ def _cell(x, first, spacing, count):
 
 
 @inline
-def _line(field, n, t):
-    return field[n] + t * (field[n + 1] - field[n])
+def _line(side, field, n, t):
+    one, other = max(side * field[n], 0.0), max(side * field[n + 1], 0.0)
+    return _mean(one * one, other * other, t)
+
+
+@inline
+def _mean(a, b, t):
+    return a + t * (b - a)
