@@ -95,7 +95,7 @@ def test_the_gap_of_an_arm_to_itself_is_that_of_dense_sampling():
     found = ClearanceMap(as_tip_map(TRUNK))
     gamma = samples(found, 600)
     value = found.of(gamma).value
-    near = np.flatnonzero(np.isfinite(value))
+    near = np.flatnonzero(value < 0.04)
     assert 3 < len(near) < 100
     np.testing.assert_allclose(value[near], folded(found, gamma[near]), atol=2 * found.error)
     wide = np.flatnonzero(np.isinf(value))[:60]
@@ -127,7 +127,7 @@ def test_no_contact_with_a_mesh_is_missed(inside):
     assert not (sampled[value > found.error] <= 0).any()
     assert not (value[sampled > slack] <= 0).any()
     apart = sampled > slack
-    assert (np.abs(value - sampled)[apart] <= found.contact_error).all()
+    assert (np.abs(value - sampled)[apart] <= slack).all()
 
 
 @pytest.mark.parametrize("name", SCENES)

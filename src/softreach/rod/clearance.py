@@ -40,12 +40,12 @@ _PLACES, _CUBICS, _SEARCH = 1 / 16, 3 / 8, 1 / 2  # shares of the accuracy
 _BLOCK = 1024  # arms at once
 _PILOTS = 64
 _MOST_EDGES = 2048
-_FIELD = 1.25  # half an edge of fields around meshes, over the longest arm
+_FIELD = 1.02  # half an edge of fields around meshes, over the longest arm
 _STRANGE = 300.0  # sizes of meshes over L, or the inverse, at which a wrong unit is likely
 
 _weights: Any = getattr(weights, "py_func", weights)  # of the same cubics, for arrays
 _NOTHING: tuple[Any, ...] = (
-    *(np.empty((0, 6)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
+    *(np.empty((0, 5, 3)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
     *(np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64)),
 )  # trees and fields of no mesh
 
@@ -172,8 +172,8 @@ class ClearanceMap:
         for each in edges[:3]:
             each[lost] = 0.0
         steps = len(disks) - 1
-        room = *np.empty((2, steps)), np.empty(STACK, np.int64), np.empty((STACK + steps, 6))
-        room = *room, np.empty((steps, 3)), *np.empty((2, steps + 1))
+        room = *np.empty((2, steps)), np.empty((STACK, 2)), np.empty((steps + 2, 5))
+        room = *room, np.empty((STACK, 10)), np.empty((steps, 3)), *np.empty((2, steps + 1))
         tol = _SEARCH * self.error
         nearest(*edges[:3], disks, edges.tool, *solids, meshes, tol, room, *out)
         out.value[out.which == NONE] = np.inf

@@ -13,16 +13,18 @@ import math
 from softreach.kernels.compiler import inline, kernel, lean_kernel
 from softreach.kernels.room import HALF_SPACE, MESH
 from softreach.kernels.room.shapes import signed_distance
-from softreach.kernels.room.triangles import least_in_field, nearest_in
+from softreach.kernels.room.triangles import FIELD_ERROR, least_in_field, nearest_in
 from softreach.kernels.vector import difference, dot, minus, plus, row, spot, times
 
 NONE, ITSELF = -1, -2
 """In place of the number of a solid."""
 ARC_SERIES = 1.0, 1 / 6, 3 / 40, 5 / 112, 35 / 1152, 63 / 2816
 """Of asin(√s)/√s: the arc of a circle over its chord, of which tangents differ by 2√s."""
-_FARTHEST = 1e300  # as kernels know no infinity
+_FARTHEST = 1e150  # as kernels know no infinity
 _BACK, _TURN = 2.0 / math.pi, 1.76  # chord over arc of half a circle; twice its arc cosine
+_ROUND, _SHARP = 6.2, 1.02  # below 2π; below 4/3 sin(_TURN/2)
 _MOST_PARTS = 64  # chords of a step
+_SLACK = 0.25  # of the tolerance, in distances from meshes
 _MOST_MOVES = 40  # of two places toward each other
 _FARTHEST_MOVE = 0.25  # over the gap
 _SMALL = 1e-9  # last of these moves, over the gap
@@ -153,27 +155,38 @@ def _over_plane(points, tangents, radius, disks, lengths, i, q, first, last, bes
 def _bound(kind, side, q, meshes, x):
     """As `_distance`, but for meshes no larger, and a node of their field."""
     if kind != MESH:
-        return side * signed_distance(kind, q, x)[0], 0
-    m = int(q[0])  # arrays of a tuple are counted when they have names: they have none here
-    return least_in_field(x, side, meshes[5], meshes[6], meshes[7], meshes[0][m, 2], m)
+        d, u, v, w = signed_distance(kind, q, x)
+        return side * d, minus(x, (d * u, d * v, d * w)), 0
+    # Arrays of a tuple are counted when they have names: they have none here.
+    first, m = meshes[0][int(q[0]), 2], int(q[0])
+    return least_in_field(
+        x, side, meshes[5], meshes[6], meshes[7], meshes[8], meshes[3], first, m
+    )  # fmt: skip
 
 
 @inline
-def _distance(kind, side, q, meshes, stack, x, most):
-    """Distance of a point from a solid, or from all but the solid where side is -1.
+def _distance(kind, side, q, meshes, stack, x, most, tol):
+    """Distance of a point from a solid, one that is no larger, and a place of its surface there.
 
-    Of a mesh, from which it is farther than `most`, some smaller distance that is larger than that.
+    Or from all but the solid where side is -1. That of a mesh may be too large by some of the
+    tolerance, and for one farther than `most` some smaller distance does that is no less than that.
     """
-    near, node = _bound(kind, side, q, meshes, x)
+    near, foot, node = _bound(kind, side, q, meshes, x)
     if kind != MESH or near > most:
-        return near
+        return near, near, foot
     m = int(q[0])
-    root, begin = meshes[0][m, 0], meshes[0][m, 1]
-    found = nearest_in(
-        x, meshes[8][node], meshes[1], root, meshes[2], begin, meshes[0][m + 1, 1] - begin - 1,
-        meshes[3], meshes[4], stack, 1.0,
+    about, error = side * meshes[7][node], FIELD_ERROR * meshes[5][m, 3]
+    root, begin, enough = (
+        meshes[0][m, 0],
+        meshes[0][m, 1],
+        1.0 - _SLACK * tol / (abs(about) + error),
+    )
+    d, u, v, w, _ = nearest_in(
+        x, meshes[8][node], most if about > error else _FARTHEST, meshes[1], root, meshes[2], begin,
+        meshes[0][m + 1, 1] - begin - 1, meshes[3], meshes[4], stack, enough,
     )  # fmt: skip
-    return side * found[0]
+    foot, d = minus(x, (d * u, d * v, d * w)), abs(d) if about > error else side * d
+    return d, min(d, enough * d), foot
 
 
 @inline
@@ -184,9 +197,7 @@ def _least_between(d0, d1, w0, w1, apart, bulge):
     one at just these from both ends. Widths w are linear in between, and the arc bulges.
     """
     slope = (w1 - w0) / max(apart, 1e-300)
-    if (
-        d0 <= 0.0 or d1 <= 0.0 or d0 + d1 <= apart or abs(slope) >= 1.0
-    ):  # as it changes by 1 per arc
+    if min(d0, d1) <= 0.0 or d0 + d1 <= apart or abs(slope) >= 1.0:  # as it changes by 1 per arc
         return 0.5 * (d0 + d1 - apart) - max(w0, w1)
     along = 0.5 * (apart * apart + d0 * d0 - d1 * d1) / apart
     away = math.sqrt(max(d0 * d0 - along * along, 0.0))
@@ -195,6 +206,22 @@ def _least_between(d0, d1, w0, w1, apart, bulge):
     if foot <= 0.0 or foot >= apart * cosine:
         return min(d0 - w0, d1 - w1) - bulge
     return away * cosine - slope * along - w0 - bulge
+
+
+@inline
+def _least_inside(x, y, foot, other):
+    """Least distance on a chord in a solid: none is deeper than it is away from both feet."""
+    here, there = _square(x, foot), _square(y, other)
+    first, second = max(_square(x, other) - here, 0.0), max(_square(y, foot) - there, 0.0)
+    share = first / max(first + second, 1e-300)
+    middle = (1.0 - share) * here + share * (there + second) - share * (1.0 - share) * _square(x, y)
+    return -math.sqrt(max(middle, here, there))
+
+
+@inline
+def _square(x, y):
+    apart = minus(x, y)
+    return dot(apart, apart)
 
 
 @inline
@@ -209,8 +236,8 @@ def _speed(points, tangents, lengths, i, k):
 
 @inline
 def _past(
-    kind, side, q, meshes, stack, points, tangents, radius, disks, tool, lengths, bends, parts, i,
-    first, last, best, tol
+    kind, side, q, meshes, stack, points, tangents, radius, disks, tool, lengths, bends, edges,
+    pieces, i, first, last, best, tol
 ):  # fmt: skip
     """The least gap between two edges that is below `best`, and its place; -1 if none is.
 
@@ -219,55 +246,88 @@ def _past(
     place, steps, near, least = -1.0, len(lengths), first, _FARTHEST
     for e in range(first, last + 1):
         x = spot(points, i, e) if e <= steps else row(tool, i)
-        parts[e, 4] = _bound(kind, side, q, meshes, x)[0]
-        parts[e, 5] = max(radius[i, e], disks[e]) if e <= steps else 0.0
-        if parts[e, 4] - parts[e, 5] < least:
-            least, near = parts[e, 4] - parts[e, 5], e
+        d, foot, _ = _bound(kind, side, q, meshes, x)
+        _keep(edges, e, 0, max(radius[i, e], disks[e]) if e <= steps else 0.0, d, foot)
+        if d - edges[e, 0] < least:
+            least, near = d - edges[e, 0], e
     for j in range(first - 1, last + 1 if kind == MESH else first):
         e = near if j < first else j
-        if parts[e, 4] - parts[e, 5] >= best + tol or j == near:
+        width = edges[e, 0]
+        if edges[e, 1] - width >= best + tol or j == near:
             continue
         x = spot(points, i, e) if e <= steps else row(tool, i)
-        parts[e, 4] = _distance(kind, side, q, meshes, stack, x, _FARTHEST)
-        if parts[e, 4] - parts[e, 5] < best:
-            best, place = parts[e, 4] - parts[e, 5], float(e)
+        d, least, foot = _distance(kind, side, q, meshes, stack, x, best + tol + width, tol)
+        _keep(edges, e, 0, width, least, foot)
+        if d - width < best:
+            best, place = d - width, float(e)
     for k in range(first, last):
-        r, change, bulge = 0.0, 0.0, 0.0
-        if k < steps:
-            r, change, bulge = radius[i, k], radius[i, k + 1] - radius[i, k], bends[k] / 8.0
-            speed = _speed(points, tangents, lengths, i, k)
-        else:
-            apart = minus(row(tool, i), spot(points, i, k))
-            speed = math.sqrt(dot(apart, apart))
-        parts[0, 0], parts[0, 1], size = 0.0, parts[k, 4], 1
-        parts[0, 2], parts[0, 3] = 1.0, parts[k + 1, 4]
-        while size:
-            size -= 1
-            lower, below, upper, above = (
-                parts[size, 0], parts[size, 1], parts[size, 2], parts[size, 3]
-            )  # fmt: skip
-            share, width = upper - lower, r + lower * change
-            bound = _least_between(
-                below, above, width, r + upper * change, share * speed, share * share * bulge
-            )
+        best, place = _past_step(
+            kind, side, q, meshes, stack, points, tangents, radius, tool, lengths, bends, edges,
+            pieces, i, k, best, place, tol,
+        )  # fmt: skip
+    return best, place
+
+
+@inline
+def _past_step(
+    kind, side, q, meshes, stack, points, tangents, radius, tool, lengths, bends, edges, pieces, i,
+    k, best, place, tol
+):  # fmt: skip
+    """The same with what is between the ends of step k."""
+    r, change, bulge, size = 0.0, 0.0, 0.0, 1
+    if k < len(lengths):
+        r, change, bulge = radius[i, k], radius[i, k + 1] - radius[i, k], bends[k] / 8.0
+        speed = _speed(points, tangents, lengths, i, k)
+    else:
+        speed = math.sqrt(_square(row(tool, i), spot(points, i, k)))
+    _keep(pieces, 0, 0, 0.0, edges[k, 1], _kept(edges, k, 2))
+    _keep(pieces, 0, 5, 1.0, edges[k + 1, 1], _kept(edges, k + 1, 2))
+    while size:
+        size -= 1
+        lower, below, upper, above = (
+            pieces[size, 0], pieces[size, 1], pieces[size, 5], pieces[size, 6]
+        )  # fmt: skip
+        share, w0, w1 = upper - lower, r + lower * change, r + upper * change
+        bound = _least_between(below, above, w0, w1, share * speed, share * share * bulge)
+        if bound >= best - tol:
+            continue
+        foot, other = _kept(pieces, size, 2), _kept(pieces, size, 7)
+        if below <= 0.0 and above <= 0.0:
+            x = _place(points, tangents, tool, lengths, i, k, lower)
+            y = _place(points, tangents, tool, lengths, i, k, upper)
+            bound = _least_inside(x, y, foot, other) - max(w0, w1) - share * share * bulge
             if bound >= best - tol:
                 continue
-            t = 0.5 * (lower + upper)
-            if k < steps:
-                x = _at(points, tangents, i, k, lengths[k], t)
-            else:  # on the line to a tool that the tip holds
-                x = plus(spot(points, i, k), times(t, apart))
-            width = r + t * change
-            middle = _distance(kind, side, q, meshes, stack, x, best + tol + width)
-            if middle - width < best:
-                best, place = middle - width, k + t
-            parts[size, 2], parts[size, 3] = t, middle
-            size += 1
-            parts[size, 0], parts[size, 1], parts[size, 2], parts[size, 3] = (
-                t, middle, upper, above
-            )  # fmt: skip
-            size += 1
+        t, width = 0.5 * (lower + upper), 0.5 * (w0 + w1)
+        x = _place(points, tangents, tool, lengths, i, k, t)
+        d, least, foot = _distance(kind, side, q, meshes, stack, x, best + tol + width, tol)
+        if d - width < best:
+            best, place = d - width, k + t
+        _keep(pieces, size + 1, 0, t, least, foot)
+        _keep(pieces, size + 1, 5, upper, above, other)
+        _keep(pieces, size, 5, t, least, foot)
+        size += 2
     return best, place
+
+
+@inline
+def _place(points, tangents, tool, lengths, i, k, t):
+    """A point of step k, or of the line to a tool that the tip holds."""
+    if k < len(lengths):
+        return _at(points, tangents, i, k, lengths[k], t)
+    x = spot(points, i, k)
+    return plus(x, times(t, minus(row(tool, i), x)))
+
+
+@inline
+def _keep(table, n, first, number, distance, foot):
+    table[n, first], table[n, first + 1], table[n, first + 2] = number, distance, foot[0]
+    table[n, first + 3], table[n, first + 4] = foot[1], foot[2]
+
+
+@inline
+def _kept(table, n, first):
+    return table[n, first], table[n, first + 1], table[n, first + 2]
 
 
 @inline
@@ -344,23 +404,20 @@ def _toward(points, tangents, radius, lengths, i, k, s, m, t, apart, size):
 
 
 @inline
-def _folded(points, tangents, radius, lengths, bends, middles, passed, turned, i, sag, best):
+def _folded(points, tangents, radius, lengths, bends, middles, passed, curvature, i, sag, best):
     """The least gap between parts of an arm below `best` and half their width, and both places."""
-    place, other, count, first = -1.0, -1.0, len(lengths), 1
-    passed[0], turned[0] = 0.0, 0.0
+    place, other, count = -1.0, -1.0, len(lengths)
     for k in range(count):
-        passed[k + 1] = passed[k] + lengths[k]
-        turned[k + 1] = turned[k] + bends[k] / max(lengths[k], 1e-300)
-    if turned[count] < _TURN:
-        return best, place, other
-    for k in range(count):
+        curvature[k] = bends[k] / (lengths[k] * lengths[k])
         for axis in range(3):
             middles[k, axis] = 0.5 * (points[i, k, axis] + points[i, k + 1, axis])
     for k in range(count):
-        while first < count and turned[first + 1] - turned[k] < _TURN:
-            first += 1
-        for m in range(first, count):
+        turn, sharp = curvature[k] * lengths[k], curvature[k]
+        for m in range(k + 1, count):
+            turn, sharp = turn + curvature[m] * lengths[m], max(sharp, curvature[m])
             wide = max(radius[i, k], radius[i, k + 1]) + max(radius[i, m], radius[i, m + 1])
+            if turn < _TURN or _is_open(sharp, passed[m + 1] - passed[k], wide):
+                continue
             reach = min(wide + min(best, 0.5 * wide), _BACK * (passed[m + 1] - passed[k]))
             ball = max(reach + 0.5 * (lengths[k] + lengths[m]), 0.0)
             apart = difference(middles, k, m)
@@ -380,6 +437,16 @@ def _folded(points, tangents, radius, lengths, bends, middles, passed, turned, i
             if gap < min(best, 0.5 * wide):
                 best, place, other = gap, s, t
     return best, place, other
+
+
+@inline
+def _is_open(curvature, arc, wide):
+    """Whether a bend is too weak for ends that are apart by 1.5 widths, unless side by side.
+
+    By Schur's theorem they are at least as far apart as on a circle of that curvature, 2/κ
+    sin(κs/2): then κs >= 2π - 2 asin(3/4 κw), whose arc sine is at most 1.145 of its argument.
+    """
+    return curvature * wide < _SHARP and curvature * (arc + 1.72 * wide) < _ROUND
 
 
 @inline
@@ -434,11 +501,13 @@ def nearest(
     that they concern. The last row of each is no solid, and of the side 1 if the arm itself
     counts. Places are edges and shares of the arc to the next; the second is another on the arm.
     """
-    lengths, bends, stack, parts, middles, passed, turned = room
+    lengths, bends, stack, edges, pieces, middles, passed, curvature = room
     solids, edge = len(kinds) - 1, len(disks) - 1
     for i in range(points.shape[0]):
+        passed[0] = 0.0
         for k in range(edge):
             lengths[k], bends[k] = _measure(points, tangents, i, k)
+            passed[k + 1] = passed[k] + lengths[k]
         best, found, at, other = _FARTHEST, NONE, -1.0, -1.0
         for o in range(solids):
             first, last, wanted = ends[o, 0], ends[o, 1], numbers[o, -1]
@@ -454,14 +523,14 @@ def nearest(
                 last += len(tool) > 0 and last == edge
                 near, its = _past(
                     kinds[o, 0], kinds[o, 1], numbers[o], meshes, stack, points, tangents, radius,
-                    disks, tool, lengths, bends, parts, i, first, last, best + wanted, tol,
+                    disks, tool, lengths, bends, edges, pieces, i, first, last, best + wanted, tol,
                 )  # fmt: skip
             near -= wanted
             if its >= 0.0:
                 best, found, at = near, o, its
         if kinds[solids, 1] > 0:
             near, its, there = _folded(
-                points, tangents, radius, lengths, bends, middles, passed, turned, i, tol, best
+                points, tangents, radius, lengths, bends, middles, passed, curvature, i, tol, best
             )
             if its >= 0.0:
                 best, found, at, other = near, ITSELF, its, there

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inline, lean_kernel
 from softreach.kernels.vector import dot, minus, plus, spot, times
 
 FIELD_ERROR = 0.87  # over the spacing of a field: √3/2, half a diagonal
@@ -52,32 +52,37 @@ def _square(a, b):
 
 @inline
 def _beyond_box(x, boxes, n):
-    """Squared distance of a point from a box of some (n, 6): lower and upper corners."""
-    a = max(max(boxes[n, 0] - x[0], x[0] - boxes[n, 3]), 0.0)
-    b = max(max(boxes[n, 1] - x[1], x[1] - boxes[n, 4]), 0.0)
-    c = max(max(boxes[n, 2] - x[2], x[2] - boxes[n, 5]), 0.0)
-    return a * a + b * b + c * c
+    """Squared distance of a point from a box of some (n, 5, 3): axes, and ends along these."""
+    square = 0.0
+    for axis in range(3):
+        along = dot(x, spot(boxes, n, axis))
+        beyond = max(max(boxes[n, 3, axis] - along, along - boxes[n, 4, axis]), 0.0)
+        square += beyond * beyond
+    return square
 
 
 @inline
-def nearest_in(x, guess, boxes, root, starts, begin, leaves, corners, normals, stack, enough):
+def nearest_in(
+    x, guess, most, boxes, root, starts, begin, leaves, corners, normals, stack, enough
+):  # fmt: skip
     """Signed distance of a point from the nearest triangle, its gradient, and the triangle.
 
-    Of a tree of boxes (node, 6), which begins at `root`, children of node i are 2i + 1 and 2i + 2.
-    Its last level, of so many leaves, lists triangles between `starts` from number `begin` on;
-    corners (f, 3, 3) and normals of parts (f, 7, 3) are in that order. A triangle near by, the
-    `guess`, saves most of the search; `stack` has room for it. With `enough` below 1 a triangle
-    does whose distance, times that, is no more than the least.
+    Of a tree of boxes, which begins at `root`, children of node i are 2i + 1 and 2i + 2. Its last
+    level, of so many leaves, lists triangles between `starts` from number `begin` on; corners
+    (f, 3, 3) and normals of parts (f, 7, 3) are in that order. A triangle near by, the `guess`,
+    saves most of the search; `stack` has room for it. With `enough` below 1 a triangle does whose
+    distance, times that, is no more than the least. Farther than `most` none is searched for, and
+    the distance is that.
     """
     face = guess
-    place, part = _on_face(x, corners, face)
-    foot, square = place, _square(x, place)
-    stack[0], size, enough = 0, 1, enough * enough
+    foot, part = _on_face(x, corners, face)
+    square, enough = min(_square(x, foot), most * most), enough * enough
+    stack[0, 0], stack[0, 1], size = 0.0, 0.0, 1
     while size:
         size -= 1
-        node = stack[size]
-        if _beyond_box(x, boxes, root + node) >= enough * square:
+        if stack[size, 0] >= enough * square:
             continue
+        node = int(stack[size, 1])
         if node >= leaves - 1:
             leaf = begin + node - leaves + 1
             for f in range(starts[leaf], starts[leaf + 1]):
@@ -86,9 +91,11 @@ def nearest_in(x, guess, boxes, root, starts, begin, leaves, corners, normals, s
                     square, face, part, foot = _square(x, place), f, its, place
             continue
         first, second = 2 * node + 1, 2 * node + 2
-        if _beyond_box(x, boxes, root + first) < _beyond_box(x, boxes, root + second):
-            first, second = second, first
-        stack[size], stack[size + 1] = first, second  # the nearer one comes next
+        near, far = _beyond_box(x, boxes, root + first), _beyond_box(x, boxes, root + second)
+        if far < near:
+            first, second, near, far = second, first, far, near
+        stack[size, 0], stack[size, 1] = far, second
+        stack[size + 1, 0], stack[size + 1, 1] = near, first  # comes next
         size += 2
     away, normal = minus(x, foot), spot(normals, face, part)
     near = math.sqrt(square)
@@ -105,7 +112,7 @@ def _on_face(x, corners, f):
     return nearest_on_triangle(x, spot(corners, f, 0), spot(corners, f, 1), spot(corners, f, 2))
 
 
-@kernel
+@lean_kernel
 def nearest_triangles(points, table, stack, enough, distance, gradient, face):
     """Signed distances (n,) of points (n, 3), gradients (n, 3), and the nearest triangles (n,).
 
@@ -115,7 +122,7 @@ def nearest_triangles(points, table, stack, enough, distance, gradient, face):
     for i in range(points.shape[0]):
         x = points[i, 0], points[i, 1], points[i, 2]
         found = nearest_in(
-            x, guess, boxes, 0, starts, 0, len(starts) - 1, corners, normals, stack, enough
+            x, guess, 1e150, boxes, 0, starts, 0, len(starts) - 1, corners, normals, stack, enough
         )
         distance[i], face[i] = found[0], found[4]
         gradient[i, 0], gradient[i, 1], gradient[i, 2] = found[1], found[2], found[3]
@@ -123,15 +130,15 @@ def nearest_triangles(points, table, stack, enough, distance, gradient, face):
 
 
 @inline
-def least_in_field(x, side, grids, shapes, field, first, m):
-    """A distance that no point of the solid of field m is nearer to x, and the node nearest to x.
+def least_in_field(x, side, grids, shapes, field, faces, corners, first, m):
+    """A distance that no point of the solid of field m is nearer to x, one near, and a node.
 
     Or of all but the solid where side is -1. Grids (m, 4) are first nodes and spacings, shapes
-    (m, 3) numbers of nodes, fields one list.
+    (m, 3) numbers of nodes, fields and faces near nodes one list.
     """
-    i, a = _cell(x[0], grids[m, 0], grids[m, 3], shapes[m, 0])
-    j, b = _cell(x[1], grids[m, 1], grids[m, 3], shapes[m, 1])
-    k, c = _cell(x[2], grids[m, 2], grids[m, 3], shapes[m, 2])
+    i, a, p = _cell(x[0], grids[m, 0], grids[m, 3], shapes[m, 0])
+    j, b, q = _cell(x[1], grids[m, 1], grids[m, 3], shapes[m, 1])
+    k, c, r = _cell(x[2], grids[m, 2], grids[m, 3], shapes[m, 2])
     rows, columns = shapes[m, 1], shapes[m, 2]
     n, up = first + (i * rows + j) * columns + k, rows * columns
     low = _mean(_line(side, field, n, c), _line(side, field, n + columns, c), b)
@@ -139,15 +146,16 @@ def least_in_field(x, side, grids, shapes, field, first, m):
     square = low + a * (high - low)
     square -= grids[m, 3] ** 2 * (a * (1.0 - a) + b * (1.0 - b) + c * (1.0 - c))
     n += (up if a > 0.5 else 0) + (columns if b > 0.5 else 0) + (1 if c > 0.5 else 0)
-    if square > 0.0:
-        return math.sqrt(square), n
-    return side * field[n] - FIELD_ERROR * grids[m, 3], n
+    foot = _on_face(x, corners, faces[n])[0]
+    near = math.sqrt(max(square, 0.0)) - math.sqrt(p * p + q * q + r * r)
+    return near if near > 0.0 else -math.sqrt(_square(x, foot)), foot, n  # as if it were inside
 
 
 @inline
 def _cell(x, first, spacing, count):
+    """Cell of a coordinate, its share there, and how far it is off the grid."""
     place = min(max((x - first) / spacing, 0.0), count - 1.001)
-    return int(place), place - int(place)
+    return int(place), place - int(place), x - first - place * spacing
 
 
 @inline
