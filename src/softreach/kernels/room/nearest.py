@@ -22,7 +22,6 @@ ARC_SERIES = 1.0, 1 / 6, 3 / 40, 5 / 112, 35 / 1152, 63 / 2816
 """Of asin(√s)/√s: the arc of a circle over its chord, of which tangents differ by 2√s."""
 _FARTHEST = 1e150  # as kernels know no infinity
 _BACK, _TURN = 2.0 / math.pi, 1.76  # chord over arc of half a circle; twice its arc cosine
-_ROUND, _SHARP = 6.2, 1.02  # below 2π; below 4/3 sin(_TURN/2)
 _MOST_PARTS = 64  # chords of a step
 _SLACK = 0.25  # of the tolerance, in distances from meshes
 _MOST_MOVES = 40  # of two places toward each other
@@ -406,11 +405,14 @@ def _toward(points, tangents, radius, lengths, i, k, s, m, t, apart, size):
 @inline
 def _folded(points, tangents, radius, lengths, bends, middles, passed, curvature, i, sag, best):
     """The least gap between parts of an arm below `best` and half their width, and both places."""
-    place, other, count = -1.0, -1.0, len(lengths)
+    place, other, count, most, wide = -1.0, -1.0, len(lengths), 0.0, 0.0
     for k in range(count):
         curvature[k] = bends[k] / (lengths[k] * lengths[k])
+        most, wide = max(most, curvature[k]), max(wide, 2.0 * max(radius[i, k], radius[i, k + 1]))
         for axis in range(3):
             middles[k, axis] = 0.5 * (points[i, k, axis] + points[i, k + 1, axis])
+    if _is_open(most, passed[count], wide):
+        return best, place, other
     for k in range(count):
         turn, sharp = curvature[k] * lengths[k], curvature[k]
         for m in range(k + 1, count):
@@ -429,7 +431,7 @@ def _folded(points, tangents, radius, lengths, bends, middles, passed, curvature
             if near - bulge >= reach:
                 continue
             gap, s, t = _nearest_chords(
-                points, tangents, radius, lengths, bends, passed, i, sag, k, m
+                points, tangents, radius, lengths, bends, passed, i, sag, k, m, reach
             )
             if gap - 2.0 * sag >= min(best, 0.5 * wide):
                 continue
@@ -441,25 +443,29 @@ def _folded(points, tangents, radius, lengths, bends, middles, passed, curvature
 
 @inline
 def _is_open(curvature, arc, wide):
-    """Whether a bend is too weak for ends that are apart by 1.5 widths, unless side by side.
+    """Whether a bend is too weak for ends apart by 1.5 widths and 2/π of the arc at most.
 
     By Schur's theorem they are at least as far apart as on a circle of that curvature, 2/κ
-    sin(κs/2): then κs >= 2π - 2 asin(3/4 κw), whose arc sine is at most 1.145 of its argument.
+    sin(κs/2): then κs >= π, and 2π - 2 asin(3/4 κw), whose arc sine is 1.145 times it at most, or
+    π/2 times. Constants are a little smaller, as curvatures are those of cubics.
     """
-    return curvature * wide < _SHARP and curvature * (arc + 1.72 * wide) < _ROUND
+    sharp = curvature * wide
+    return curvature * arc < max(3.1, 6.2 - (1.72 if sharp < 1.02 else 2.36) * sharp)
 
 
 @inline
-def _nearest_chords(points, tangents, radius, lengths, bends, passed, i, sag, k, m):
+def _nearest_chords(points, tangents, radius, lengths, bends, passed, i, sag, k, m, reach):
     """The least gap between chords of two steps, and the shares of these at which it is."""
     best, place, other = _FARTHEST, 0.0, 0.0
     some, many = _parts(bends[k], sag), _parts(bends[m], sag)
+    first, last, q = spot(points, i, m), spot(points, i, m + 1), spot(points, i, k)
     for a in range(some):
-        p = _at(points, tangents, i, k, lengths[k], a / some)
-        q = _at(points, tangents, i, k, lengths[k], (a + 1) / some)
+        p, q = q, _at(points, tangents, i, k, lengths[k], (a + 1) / some)
+        if _chords(p, q, first, last)[2] - sag - bends[m] / 8.0 >= reach:
+            continue
+        y = first
         for b in range(many):
-            x = _at(points, tangents, i, m, lengths[m], b / many)
-            y = _at(points, tangents, i, m, lengths[m], (b + 1) / many)
+            x, y = y, _at(points, tangents, i, m, lengths[m], (b + 1) / many)
             s, t, apart = _chords(p, q, x, y)
             s, t = (a + s) / some, (b + t) / many
             between = passed[m] - passed[k]
