@@ -172,8 +172,7 @@ def test_slopes_of_the_gap_to_itself_are_differences():
     differences = np.stack([(a.value - b.value) / (2 * step) for a, b in pairs], axis=1)
     off = np.abs(slopes - differences).max(axis=1)
     assert np.median(off) < 1e-8
-    # Places are ends of chords where these bulge toward the other part, and so jump a little.
-    assert off.max() < 0.05 * np.abs(slopes).max()
+    assert off.max() < 1e-6 * np.abs(slopes).max()
 
 
 def test_a_distance_wanted_is_taken_off_and_an_exempt_part_does_not_count():

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.geometry.regions import Region
 from softreach.geometry.surface import enclosed_volume
@@ -150,14 +149,11 @@ class Mesh(Region):
     def bounds(self) -> Array:
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
-    def distance(self, points: ArrayLike) -> Array:
-        """Distance of points (n, 3) to the nearest triangle [m], negative inside, shape (n,).
-
-        The sign is that of the normal of the nearest face, edge or corner, weighted by angles.
-        """
-        return self.nearest(arrays.as_points("points", points))[0]
-
     def nearest(self, points: Array) -> tuple[Array, Array]:
+        """Distances from the nearest triangle [m], with the sign that its normal has there.
+
+        That is the normal of a face, of an edge, or of a corner, weighted by angles.
+        """
         return self.tree.nearest(points)[:2]
 
     @lazy
@@ -276,9 +272,6 @@ class MeshFile(Region):
     @property
     def bounds(self) -> Array:
         return self.mesh.bounds
-
-    def distance(self, points: ArrayLike) -> Array:
-        return self.mesh.distance(points)
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
         return self.mesh.nearest(points)
