@@ -32,8 +32,12 @@ STACK = 128  # Room of a search in a tree: twice its depth
 
 
 class TriangleTree(NamedTuple):
-    """Boxes around triangles, each cut in two across where its triangles lie widest apart."""
+    """Boxes around triangles, each cut in two across where its triangles lie widest apart.
 
+    Or several such trees, one after another.
+    """
+
+    firsts: Index  # First box, start, node of a field and triangle of each, and the end, (m + 1, 4)
     boxes: Array  # Axes, and ends along them [m]; children of i are 2i + 1 and 2i + 2, (n, 5, 3)
     starts: Index  # Of the triangles in each box of the last level, shape (2^level + 1,)
     corners: Array  # Of the triangles, in this order [m], shape (f, 3, 3)
@@ -47,22 +51,21 @@ class TriangleTree(NamedTuple):
         from softreach.kernels.room.triangles import nearest_triangles
 
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        face, table = np.empty(len(points), np.int64), (*self,)
-        points = np.ascontiguousarray(points)
+        face, points = np.empty(len(points), np.int64), np.ascontiguousarray(points)
 
         def fill(b: slice) -> None:
             room = np.empty((STACK, 2))
-            nearest_triangles(points[b], table, room, enough, distance[b], gradient[b], face[b])
+            nearest_triangles(points[b], self, room, enough, distance[b], gradient[b], face[b])
 
         parallel.run(partial(fill, block) for block in parallel.blocks(len(points), _BLOCK))
         return distance, gradient, face
 
 
-class DistanceField(NamedTuple):
-    """Distances from a mesh at the nodes of a grid, and a triangle near to each."""
+class DistanceFields(NamedTuple):
+    """Distances from meshes at the nodes of a grid around each, and a triangle near to each."""
 
-    grid: Array  # First node and spacing [m], shape (4,)
-    shape: Index  # Nodes along each axis, shape (3,)
+    grids: Array  # First node and spacing [m], shape (m, 4)
+    shapes: Index  # Nodes along each axis, shape (m, 3)
     distance: Array  # Signed, no larger than it is [m], shape (node,)
     face: Index  # Numbers of triangles in the tree, shape (node,)
 
@@ -174,7 +177,9 @@ class Mesh(Region):
             middles = along.mean(axis=1)[np.arange(count), longest]
             order = order[np.lexsort((middles, block))]  # within each box
         starts = np.arange(2**depth + 1) * count // 2**depth
-        return TriangleTree(np.concatenate(boxes), starts, corners[order], self._normals[order])
+        firsts = np.array([[0] * 4, [2 * len(starts) - 3, len(starts), 0, count]])
+        parts = np.concatenate(boxes), starts, corners[order], self._normals[order]
+        return TriangleTree(firsts, *parts)
 
     def wireframe(self, around: Array) -> list[Array]:
         edges, beside = self._edges[:2]
@@ -226,13 +231,15 @@ def _axes(corners: Array, starts: Index, block: Index) -> Array:
     return np.linalg.eigh(spread).eigenvectors.swapaxes(1, 2)
 
 
-def field_around(mesh: Mesh, center: Array, half: float, nodes: int = _NODES) -> DistanceField:
+def field_around(mesh: Mesh, center: Array, half: float, nodes: int = _NODES) -> DistanceFields:
     """Distances at so many nodes along each edge of a cube around a center [m], shape (3,)."""
     spacing = 2.0 * half / (nodes - 1)
     steps = np.array(list(np.ndindex(nodes, nodes, nodes)), float)
     low = np.asarray(center, float) - half
     distance, _, face = mesh.tree.nearest(low + spacing * steps, _ENOUGH)
-    return DistanceField(np.append(low, spacing), np.full(3, nodes), _ENOUGH * distance, face)
+    return DistanceFields(
+        np.append(low, spacing)[None], np.full((1, 3), nodes), _ENOUGH * distance, face
+    )
 
 
 @dataclass(frozen=True)

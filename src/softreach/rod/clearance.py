@@ -18,17 +18,25 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.obstacles import Obstacle, obstacle_names
 from softreach.arm.stations import Marker
 from softreach.arm.tables import tables
-from softreach.geometry.meshes import STACK, DistanceField, Mesh, MeshFile, field_around
+from softreach.geometry.meshes import (
+    STACK,
+    DistanceFields,
+    Mesh,
+    MeshFile,
+    TriangleTree,
+    field_around,
+)
 from softreach.kernels.rod.frames import centerlines
 from softreach.kernels.room import HALF_SPACE, MESH, NUMBERS
-from softreach.kernels.room.nearest import ARC_SERIES, ITSELF, NONE, nearest, swollen, weights
+from softreach.kernels.room.cubics import ARC_SERIES, Arms, Steps, swollen, weights
+from softreach.kernels.room.nearest import ITSELF, NONE, Solids, nearest
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import ArmMap, as_tip_map, coarsened, with_unstable
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_number
-from softreach.support.arrays import Array, Index, rows
+from softreach.support.arrays import Array, Index, joined, rows
 from softreach.support.errors import NotPossible, Range, warn
 from softreach.support.lazy import lazy
 
@@ -44,10 +52,13 @@ _FIELD = 1.02  # half an edge of fields around meshes, over the longest arm
 _STRANGE = 300.0  # sizes of meshes over L, or the inverse, at which a wrong unit is likely
 
 _weights: Any = getattr(weights, "py_func", weights)  # of the same cubics, for arrays
-_NOTHING: tuple[Any, ...] = (
+_NO_TREES = TriangleTree(
+    np.zeros((1, 4), np.int64),
     *(np.empty((0, 5, 3)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
-    *(np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64)),
-)  # trees and fields of no mesh
+)
+_NO_FIELDS = DistanceFields(
+    *(np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64))
+)
 
 
 class Clearances(NamedTuple):
@@ -56,15 +67,6 @@ class Clearances(NamedTuple):
     value: Array  # Least gap, beyond the clearance wanted [m]; infinite without anything, (n,)
     which: Index  # Number of the obstacle, `ITSELF`, or `NONE`, shape (n,)
     place: Array  # Edges and shares of the arc from there, on the arm and again, shape (n, 2)
-
-
-class _Edges(NamedTuple):
-    """Arms at the edges of their steps."""
-
-    points: Array  # Centers [m], shape (n, edge, 3)
-    tangents: Array  # d3, shape (n, edge, 3)
-    radius: Array  # Outer radius [m], shape (n, edge)
-    tool: Array  # Point that the tip holds [m], shape (n, 3), or (0, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,19 +169,19 @@ class ClearanceMap:
         return out
 
     def _fill(self, gamma: Array, out: Clearances) -> None:
-        edges, (disks, *solids, meshes) = self._at(gamma), self._prepared
-        lost = np.isnan(edges.points[:, 0, 0])
-        for each in edges[:3]:
+        arms, (disks, solids, meshes) = self._at(gamma), self._prepared
+        lost = np.isnan(arms.points[:, 0, 0])
+        for each in arms[:3]:
             each[lost] = 0.0
-        steps = len(disks) - 1
-        room = *np.empty((2, steps)), np.empty((STACK, 2)), np.empty((steps + 2, 5))
-        room = *room, np.empty((STACK, 10)), np.empty((steps, 3)), *np.empty((2, steps + 1))
-        tol = _SEARCH * self.error
-        nearest(*edges[:3], disks, edges.tool, *solids, meshes, tol, room, *out)
+        count = len(disks) - 1
+        steps = Steps(*np.empty((3, count)), np.empty(count + 1))
+        room = np.empty((STACK, 2)), np.empty((count + 2, 5)), np.empty((STACK, 10))
+        room = (np.empty((count, 3)), np.empty(count)), room
+        nearest(arms, disks, solids, meshes, _SEARCH * self.error, steps, room, *out)
         out.value[out.which == NONE] = np.inf
         out.value[lost], out.which[lost] = np.nan, NONE
 
-    def _at(self, gamma: Array) -> _Edges:
+    def _at(self, gamma: Array) -> Arms:
         """Arms at the edges."""
         tip_map, z = self.tip_map, self.stations
         inner, lost = tip_map.known_activations(tip_map.inputs.activations(gamma))
@@ -193,7 +195,7 @@ class ClearanceMap:
             points, tangents = shapes.position, np.ascontiguousarray(shapes.directors[:, :, 2])
             widths = self._radius * shapes.extension**-power
         points[lost] = np.nan
-        return _Edges(points, tangents, widths, self._tools(gamma))
+        return Arms(points, tangents, widths, self._tools(gamma))
 
     def _tools(self, gamma: Array) -> Array:
         point = self.whole.point
@@ -247,19 +249,19 @@ class ClearanceMap:
             numbers[k, : len(own)], numbers[k, -1] = own, each.clearance
             ends[k] = np.searchsorted(z, each.span(arm.length))
         kinds[count, 1] = self.itself
-        return disks, kinds, numbers, ends, self._trees(meshes)
+        return disks, Solids(kinds, numbers, ends), self._trees(meshes)
 
-    def _trees(self, meshes: list[Mesh]) -> tuple[Any, ...]:
-        """Where trees and fields of all meshes begin, and these one after another."""
+    def _trees(self, meshes: list[Mesh]) -> tuple[TriangleTree, DistanceFields]:
+        """Trees and fields of all meshes, one after another."""
         half = _FIELD * min(self.whole.farthest(), 1.5 * self.arm.length)
-        sizes, parts = [np.zeros(4, np.int64)], [_NOTHING]
+        trees, fields = [_NO_TREES], [_NO_FIELDS]
         for mesh in meshes:
             tree, field = mesh.tree, _field(mesh, tuple(self.arm.base.position), half)
-            first, counts = sizes[-1][3], (tree.boxes, tree.starts, field.distance, tree.corners)
-            grid = field.grid[None], field.shape[None], field.distance, field.face + first
-            parts.append((*tree._replace(starts=tree.starts + first), *grid))
-            sizes.append(sizes[-1] + [len(each) for each in counts])
-        return np.array(sizes), *(np.concatenate(each) for each in zip(*parts, strict=True))
+            first = trees[-1].firsts[-1]
+            firsts = first + tree.firsts[1:] + [0, 0, len(field.face), 0]
+            trees.append(tree._replace(firsts=firsts, starts=tree.starts + first[3]))
+            fields.append(field._replace(face=field.face + first[3]))
+        return joined(trees), joined(fields)
 
     def variables(self, found: Clearances) -> dict[str, Any]:
         """The same as variables of a dataset over `sample`."""
@@ -293,7 +295,7 @@ class ClearanceMap:
         edges = self._at(gamma)
         for which in np.unique(found.which[found.which != NONE]):
             own = np.flatnonzero(found.which == which)
-            part, its = _Edges(*(x[own] if len(x) else x for x in edges)), gamma[own]
+            part, its = Arms(*(x[own] if len(x) else x for x in edges)), gamma[own]
             place, move = self._moved(part, its, found.place[own, 0])
             if which == ITSELF:
                 other, its_move = self._moved(part, its, found.place[own, 1])
@@ -306,7 +308,7 @@ class ClearanceMap:
             slopes[own] = np.einsum("na,nab->nb", normal, move[:, :3]) - move[:, 3]
         return found, slopes
 
-    def _moved(self, edges: _Edges, gamma: Array, place: Array) -> tuple[Array, Array]:
+    def _moved(self, edges: Arms, gamma: Array, place: Array) -> tuple[Array, Array]:
         """Points at places (n,), (n, 3), and derivatives of these and of radii, (n, 4, bundles)."""
         count, rows = len(self.stations) - 1, np.arange(len(gamma))
         k = np.clip(place.astype(int), 0, count - 1)
@@ -335,7 +337,7 @@ class ClearanceMap:
             moves[tool, 3] = 0.0
         return points, moves
 
-    def _turned(self, edges: _Edges, gamma: Array, edge: Index) -> tuple[Array, Array]:
+    def _turned(self, edges: Arms, gamma: Array, edge: Index) -> tuple[Array, Array]:
         """Derivatives of centers and tangents at one edge of each arm, (n, 3, bundles) each."""
         moves = np.zeros((2, len(gamma), 3, gamma.shape[1]))
         for e in np.unique(edge[edge > 0]):
@@ -362,7 +364,7 @@ class ClearanceMap:
                 known[edge] = with_unstable(as_tip_map(arm, self.tip_map.tol))
         return known[edge]
 
-    def _swelling(self, edges: _Edges, gamma: Array, edge: Index) -> Array:
+    def _swelling(self, edges: Arms, gamma: Array, edge: Index) -> Array:
         """Derivatives of radii at an edge of each arm, ∂R = -ν R/ζ ∂ζ, shape (n, bundles)."""
         inputs, rows = self.tip_map.inputs, np.arange(len(gamma))
         inner, of_drives = inputs.with_slopes(gamma)
@@ -424,7 +426,7 @@ def compute_clearance(
 
 
 @lru_cache(maxsize=16)
-def _field(mesh: Mesh, center: tuple[float, float, float], half: float) -> DistanceField:
+def _field(mesh: Mesh, center: tuple[float, float, float], half: float) -> DistanceFields:
     return field_around(mesh, np.array(center), half)
 
 

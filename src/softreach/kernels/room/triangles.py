@@ -62,18 +62,15 @@ def _beyond_box(x, boxes, n):
 
 
 @inline
-def nearest_in(
-    x, guess, most, boxes, root, starts, begin, leaves, corners, normals, stack, enough
-):  # fmt: skip
+def nearest_in(x, m, guess, most, trees, stack, enough):
     """Signed distance of a point from the nearest triangle, its gradient, and the triangle.
 
-    Of a tree of boxes, which begins at `root`, children of node i are 2i + 1 and 2i + 2. Its last
-    level, of so many leaves, lists triangles between `starts` from number `begin` on; corners
-    (f, 3, 3) and normals of parts (f, 7, 3) are in that order. A triangle near by, the `guess`,
-    saves most of the search; `stack` has room for it. With `enough` below 1 a triangle does whose
-    distance, times that, is no more than the least. Farther than `most` none is searched for, and
-    the distance is that.
+    Of mesh m of `TriangleTree`s. A triangle near by, the `guess`, saves most of the search; `stack`
+    has room for it. With `enough` below 1 a triangle does whose distance, times that, is no more
+    than the least. Farther than `most` none is searched for, and the distance is that.
     """
+    corners, root, begin = trees.corners, trees.firsts[m, 0], trees.firsts[m, 1]
+    leaves = trees.firsts[m + 1, 1] - begin - 1
     face = guess
     foot, part = _on_face(x, corners, face)
     square, enough = min(_square(x, foot), most * most), enough * enough
@@ -85,19 +82,20 @@ def nearest_in(
         node = int(stack[size, 1])
         if node >= leaves - 1:
             leaf = begin + node - leaves + 1
-            for f in range(starts[leaf], starts[leaf + 1]):
+            for f in range(trees.starts[leaf], trees.starts[leaf + 1]):
                 place, its = _on_face(x, corners, f)
                 if _square(x, place) < square:
                     square, face, part, foot = _square(x, place), f, its, place
             continue
         first, second = 2 * node + 1, 2 * node + 2
-        near, far = _beyond_box(x, boxes, root + first), _beyond_box(x, boxes, root + second)
+        near = _beyond_box(x, trees.boxes, root + first)
+        far = _beyond_box(x, trees.boxes, root + second)
         if far < near:
             first, second, near, far = second, first, far, near
         stack[size, 0], stack[size, 1] = far, second
         stack[size + 1, 0], stack[size + 1, 1] = near, first  # comes next
         size += 2
-    away, normal = minus(x, foot), spot(normals, face, part)
+    away, normal = minus(x, foot), spot(trees.normals, face, part)
     near = math.sqrt(square)
     sign = -1.0 if dot(away, normal) < 0.0 else 1.0
     if near > 0.0:
@@ -113,40 +111,34 @@ def _on_face(x, corners, f):
 
 
 @lean_kernel
-def nearest_triangles(points, table, stack, enough, distance, gradient, face):
-    """Signed distances (n,) of points (n, 3), gradients (n, 3), and the nearest triangles (n,).
-
-    The table is boxes, starts, corners and normals of a tree; the others are as of `nearest_in`.
-    """
-    guess, (boxes, starts, corners, normals) = 0, table
+def nearest_triangles(points, tree, stack, enough, distance, gradient, face):
+    """Signed distances (n,) of points (n, 3), gradients (n, 3), and the nearest triangles (n,)."""
+    guess = 0
     for i in range(points.shape[0]):
         x = points[i, 0], points[i, 1], points[i, 2]
-        found = nearest_in(
-            x, guess, 1e150, boxes, 0, starts, 0, len(starts) - 1, corners, normals, stack, enough
-        )
-        distance[i], face[i] = found[0], found[4]
-        gradient[i, 0], gradient[i, 1], gradient[i, 2] = found[1], found[2], found[3]
-        guess = found[4]
+        distance[i], u, v, w, guess = nearest_in(x, 0, guess, 1e150, tree, stack, enough)
+        gradient[i, 0], gradient[i, 1], gradient[i, 2], face[i] = u, v, w, guess
 
 
 @inline
-def least_in_field(x, side, grids, shapes, field, faces, corners, first, m):
-    """A distance that no point of the solid of field m is nearer to x, one near, and a node.
+def least_in_field(x, side, m, trees, fields):
+    """A distance that no point of the solid m is nearer to x, one near, and a node.
 
-    Or of all but the solid where side is -1. Grids (m, 4) are first nodes and spacings, shapes
-    (m, 3) numbers of nodes, fields and faces near nodes one list.
+    Or of all but the solid where side is -1. The square of a distance less that of the place is a
+    least value of linear functions: it is no less than the mean of those at the nodes around.
     """
+    grids, shapes, field = fields.grids, fields.shapes, fields.distance
     i, a, p = _cell(x[0], grids[m, 0], grids[m, 3], shapes[m, 0])
     j, b, q = _cell(x[1], grids[m, 1], grids[m, 3], shapes[m, 1])
     k, c, r = _cell(x[2], grids[m, 2], grids[m, 3], shapes[m, 2])
     rows, columns = shapes[m, 1], shapes[m, 2]
-    n, up = first + (i * rows + j) * columns + k, rows * columns
+    n, up = trees.firsts[m, 2] + (i * rows + j) * columns + k, rows * columns
     low = _mean(_line(side, field, n, c), _line(side, field, n + columns, c), b)
     high = _mean(_line(side, field, n + up, c), _line(side, field, n + up + columns, c), b)
     square = low + a * (high - low)
     square -= grids[m, 3] ** 2 * (a * (1.0 - a) + b * (1.0 - b) + c * (1.0 - c))
     n += (up if a > 0.5 else 0) + (columns if b > 0.5 else 0) + (1 if c > 0.5 else 0)
-    foot = _on_face(x, corners, faces[n])[0]
+    foot = _on_face(x, trees.corners, fields.face[n])[0]
     near = math.sqrt(max(square, 0.0)) - math.sqrt(p * p + q * q + r * r)
     return near if near > 0.0 else -math.sqrt(_square(x, foot)), foot, n  # as if it were inside
 
