@@ -28,7 +28,7 @@ from softreach.geometry.meshes import (
 )
 from softreach.kernels.rod.frames import centerlines
 from softreach.kernels.room import HALF_SPACE, MESH, NUMBERS
-from softreach.kernels.room.cubics import ARC_SERIES, Arms, Steps, swollen, weights
+from softreach.kernels.room.cubics import ARC_SERIES, Arms, Steps, weights
 from softreach.kernels.room.nearest import ITSELF, NONE, Solids, nearest
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import ArmMap, as_tip_map, coarsened, with_unstable
@@ -51,7 +51,8 @@ _MOST_EDGES = 2048
 _FIELD = 1.02  # half an edge of fields around meshes, over the longest arm
 _STRANGE = 300.0  # sizes of meshes over L, or the inverse, at which a wrong unit is likely
 
-_weights: Any = getattr(weights, "py_func", weights)  # of the same cubics, for arrays
+_TINY = 1e-30  # imaginary step, whose square is lost: derivatives exact to rounding
+_weights: Any = getattr(weights, "py_func", weights)  # for arrays
 _NO_TREES = TriangleTree(
     np.zeros((1, 4), np.int64),
     *(np.empty((0, 5, 3)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
@@ -152,10 +153,8 @@ class ClearanceMap:
         every = np.sort(np.concatenate([z, 0.5 * (z[1:] + z[:-1])]))
         frames = self.tip_map.frames(gamma, every)
         points, tangents = frames.position, frames.directors[:, :, 2]
-        ends = points[:, ::2], tangents[:, ::2]
-        factors = _weights(arcs(*ends)[..., None], 0.5)
-        terms = (ends[0][:, :-1], ends[0][:, 1:], ends[1][:, :-1], ends[1][:, 1:])
-        apart = sum(w * x for w, x in zip(factors, terms, strict=True)) - points[:, 1::2]
+        ends = (np.stack([x[:, :-2:2], x[:, 2::2]], axis=2) for x in (points, tangents))
+        apart = _on_cubics(*ends, 0.5) - points[:, 1::2]
         along = (apart * tangents[:, 1::2]).sum(axis=-1, keepdims=True) * tangents[:, 1::2]
         return np.nanmax(np.linalg.norm(apart - along, axis=-1), initial=0.0)
 
@@ -183,17 +182,18 @@ class ClearanceMap:
 
     def _at(self, gamma: Array) -> Arms:
         """Arms at the edges."""
-        tip_map, z = self.tip_map, self.stations
+        tip_map, z, base = self.tip_map, self.stations, self.tip_map.pose
         inner, lost = tip_map.known_activations(tip_map.inputs.activations(gamma))
-        shape, power = (len(gamma), len(z)), self._poisson
         if isinstance(tip_map.rod, FreeRod):
-            points, tangents, widths = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape)
-            centerlines(self._table, inner, self._start, points, tangents)
-            swollen(inner, self._rates, self._radius, power, widths)
+            points, tangents = np.empty((2, len(gamma), len(z), 3))
+            start = np.concatenate([base.position, np.array(base.rotation).T.ravel()])
+            centerlines(self._table, inner, start, points, tangents)
+            extension = 1.0 + np.einsum("nb,eb->ne", inner, self._rates)
         else:
             shapes = tip_map.shapes(gamma, z, z)
-            points, tangents = shapes.position, np.ascontiguousarray(shapes.directors[:, :, 2])
-            widths = self._radius * shapes.extension**-power
+            points, extension = shapes.position, shapes.extension
+            tangents = np.ascontiguousarray(shapes.directors[:, :, 2])
+        widths = self._radius / extension**self._poisson
         points[lost] = np.nan
         return Arms(points, tangents, widths, self._tools(gamma))
 
@@ -221,11 +221,6 @@ class ClearanceMap:
     def _table(self) -> Array:
         rod: Any = self.tip_map.rod
         return rod.rule.packed(self.arm.profile.slender_coordinate(self.stations))
-
-    @lazy
-    def _start(self) -> Array:
-        base = self.tip_map.pose
-        return np.concatenate([base.position, np.array(base.rotation).T.ravel()])
 
     @lazy
     def _prepared(self) -> tuple[Any, ...]:
@@ -315,16 +310,10 @@ class ClearanceMap:
         t, moves = place - k, np.zeros((len(gamma), 4, gamma.shape[1]))
         tool = place > count
         t[tool] = 1.0
-        ends = [self._turned(edges, gamma, k + side) for side in (0, 1)]
         p, u = (np.stack([x[rows, k], x[rows, k + 1]], axis=1) for x in edges[:2])
-        arc, rates = arcs(p, u), _arc_slopes(p, u, ends)
-        h = _weights(arc[:, 0], t)
-        terms = (p[:, 0], p[:, 1], u[:, 0], u[:, 1])
-        points: Array = np.sum([w[:, None] * x for w, x in zip(h, terms, strict=True)], axis=0)
-        each = (ends[0][0], ends[1][0], ends[0][1], ends[1][1])
-        moves[:, :3] = np.sum([w[:, None, None] * x for w, x in zip(h, each, strict=True)], axis=0)
-        bow = (h[2][:, None] * u[:, 0] + h[3][:, None] * u[:, 1]) / arc
-        moves[:, :3] += bow[:, :, None] * rates[:, None]
+        points, (dp, du) = _on_cubics(p, u, t), self._turned(edges, gamma, k)
+        moved = _on_cubics(p + 1j * _TINY * dp, u + 1j * _TINY * du, t).imag / _TINY
+        moves[:, :3] = np.moveaxis(moved, 0, 2)
         shrink = [self._swelling(edges, gamma, k + side) for side in (0, 1)]
         moves[:, 3] = (1.0 - t)[:, None] * shrink[0] + t[:, None] * shrink[1]
         disks = self._prepared[0][k + (t == 1.0)]
@@ -337,17 +326,17 @@ class ClearanceMap:
             moves[tool, 3] = 0.0
         return points, moves
 
-    def _turned(self, edges: Arms, gamma: Array, edge: Index) -> tuple[Array, Array]:
-        """Derivatives of centers and tangents at one edge of each arm, (n, 3, bundles) each."""
-        moves = np.zeros((2, len(gamma), 3, gamma.shape[1]))
-        for e in np.unique(edge[edge > 0]):
-            own = np.flatnonzero(edge == e)
-            part = self._up_to(int(e))
-            tips, twists = part.tip_twists(gamma[own])
-            v, w = twists[:, :3], twists[:, 3:]
-            moves[0, own] = v + np.cross(w, tips[:, :, None], axis=1)
-            moves[1, own] = np.cross(w, edges.tangents[own, e][:, :, None], axis=1)
-        return moves[0], moves[1]
+    def _turned(self, edges: Arms, gamma: Array, first: Index) -> Array:
+        """Derivatives of centers and of tangents at two edges, (2, bundles, n, edge, 3)."""
+        moves = np.zeros((2, gamma.shape[1], len(gamma), 2, 3))
+        beside = first[:, None] + [0, 1]
+        for e in np.unique(beside[beside > 0]):
+            own, side = np.nonzero(beside == e)
+            tips, twists = self._up_to(int(e)).tip_twists(gamma[own])
+            v, w = np.moveaxis(twists.reshape(len(own), 2, 3, -1), (1, 3), (0, 1))
+            moves[0][:, own, side] = v + np.cross(w, tips)
+            moves[1][:, own, side] = np.cross(w, edges.tangents[own, e])
+        return moves
 
     def _up_to(self, edge: int) -> TipMap:
         """The tip map of the arm up to an edge."""
@@ -438,26 +427,9 @@ def _check_size(obstacle: Obstacle, name: str, length: float) -> None:
         warn(f"{name} is {size:.3g} times as large as the arm is long: is its unit right?")
 
 
-def arcs(points: Array, tangents: Array) -> Array:
-    """Lengths of arcs between edges [m], (n, edge - 1), from centers and tangents (n, edge, 3)."""
-    chord = np.linalg.norm(np.diff(points, axis=1), axis=2)
-    return chord * np.polynomial.polynomial.polyval(_turn(tangents), _SERIES)
-
-
-def _turn(tangents: Array) -> Array:
-    return 0.25 * (np.diff(tangents, axis=1) ** 2).sum(axis=2)
-
-
-_SERIES = np.array(ARC_SERIES)
-
-
-def _arc_slopes(p: Array, u: Array, ends: list[tuple[Array, Array]]) -> Array:
-    """Derivatives of the arcs of single steps, shape (n, bundles)."""
-    chord = np.diff(p, axis=1)[:, 0]
-    size, s = np.linalg.norm(chord, axis=1), _turn(u)[:, 0]
-    grown = np.einsum("na,nab->nb", chord, ends[1][0] - ends[0][0]) / size[:, None]
-    turned = 0.5 * np.einsum("na,nab->nb", u[:, 1] - u[:, 0], ends[1][1] - ends[0][1])
-    polynomial = np.polynomial.polynomial
-    series = polynomial.polyval(s, _SERIES)[:, None]
-    slope = polynomial.polyval(s, polynomial.polyder(_SERIES))[:, None]
-    return series * grown + size[:, None] * slope * turned
+def _on_cubics(points: Array, tangents: Array, t: ArrayLike) -> Array:
+    """Points at shares t of arcs between centers and tangents (..., 2, 3), as kernels have them."""
+    chord, turn = (((x[..., 1, :] - x[..., 0, :]) ** 2).sum(axis=-1) for x in (points, tangents))
+    arc = np.sqrt(chord) * np.polynomial.polynomial.polyval(0.25 * turn, ARC_SERIES)
+    terms = (x[..., k, :] for x in (points, tangents) for k in (0, 1))
+    return sum(np.asarray(w)[..., None] * x for w, x in zip(_weights(arc, t), terms, strict=True))

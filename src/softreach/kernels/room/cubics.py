@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from softreach.kernels.compiler import inline, lean_kernel
+from softreach.kernels.compiler import inline
 from softreach.kernels.vector import plus, spot, times
 from softreach.support.arrays import Array
 
@@ -32,23 +32,6 @@ class Steps(NamedTuple):
     bends: Array  # Largest second derivatives by the share of the arc [m]
     speeds: Array  # Largest first derivatives [m]
     passed: Array  # Arcs from the base to edges [m], shape (step + 1,)
-
-
-@lean_kernel
-def swollen(gamma, rates, radius, power, out):
-    """Radii R (1 + z·γ)^-power (n, edge) of activations (n, bundle) and z (edge, bundle)."""
-    for i in range(gamma.shape[0]):
-        for e in range(len(radius)):
-            extension = 1.0
-            for j in range(gamma.shape[1]):
-                extension += rates[e, j] * gamma[i, j]
-            out[i, e] = extension
-        if power == 0.5:
-            for e in range(len(radius)):
-                out[i, e] = radius[e] / math.sqrt(out[i, e])
-        else:
-            for e in range(len(radius)):
-                out[i, e] = radius[e] * out[i, e] ** -power
 
 
 @inline

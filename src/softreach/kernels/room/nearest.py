@@ -142,7 +142,7 @@ def _past(solid, meshes, arms, disks, steps, room, i, first, last, best, tol):
 
     Gaps at the edges come first, as the nearest of them spares most of the others.
     """
-    (kind, side, q), (stack, edges, pieces) = solid, room
+    (kind, side, q), (stack, edges, _) = solid, room
     place, count, near, least = -1.0, len(steps.lengths), first, _FARTHEST
     for e in range(first, last + 1):
         x = spot(arms.points, i, e) if e <= count else row(arms.tool, i)
