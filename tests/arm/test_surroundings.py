@@ -87,7 +87,7 @@ def test_a_mesh_in_mm_is_the_box_that_it_is(tmp_path, cube):
         compute_clearance(a, gamma, itself=False) for a in (arm, arm.replace(surroundings=(box,)))
     ]
     mesh, solid = (found.clearance.values for found in each)
-    bound = each[0].clearance.attrs["error_apart"]
+    bound = each[0].clearance.attrs["error"]
     assert (np.sign(mesh) == np.sign(solid))[np.abs(solid) > 1e-3].all()
     assert np.abs(mesh - solid).max() < bound
     assert mesh == pytest.approx(solid, abs=1e-2)

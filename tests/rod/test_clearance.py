@@ -95,7 +95,7 @@ def test_the_gap_of_an_arm_to_itself_is_that_of_dense_sampling():
     found = ClearanceMap(as_tip_map(TRUNK))
     gamma = samples(found, 600)
     value = found.of(gamma).value
-    near = np.flatnonzero(np.isfinite(value))
+    near = np.flatnonzero(value < 0.04)
     assert 3 < len(near) < 100
     np.testing.assert_allclose(value[near], folded(found, gamma[near]), atol=2 * found.error)
     wide = np.flatnonzero(np.isinf(value))[:60]
@@ -127,7 +127,7 @@ def test_no_contact_with_a_mesh_is_missed(inside):
     assert not (sampled[value > found.error] <= 0).any()
     assert not (value[sampled > slack] <= 0).any()
     apart = sampled > slack
-    assert (np.abs(value - sampled)[apart] <= found.contact_error).all()
+    assert (np.abs(value - sampled)[apart] <= slack).all()
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -172,8 +172,7 @@ def test_slopes_of_the_gap_to_itself_are_differences():
     differences = np.stack([(a.value - b.value) / (2 * step) for a, b in pairs], axis=1)
     off = np.abs(slopes - differences).max(axis=1)
     assert np.median(off) < 1e-8
-    # Places are ends of chords where these bulge toward the other part, and so jump a little.
-    assert off.max() < 0.05 * np.abs(slopes).max()
+    assert off.max() < 1e-6 * np.abs(slopes).max()
 
 
 def test_a_distance_wanted_is_taken_off_and_an_exempt_part_does_not_count():

@@ -48,7 +48,7 @@ def reach(
 
     arm = design_from(design, changes, output.unit)
     if free:
-        options.refuse("with --free, which prints volumes alone", out=out, at=at)
+        options.refuse("with --free, which prints volumes alone", out=out)
         found = sr.workspace.free_set(arm).drop_vars(["state", *"xyz"])
         console.rows(f"free set of {design}", rows_of(found), output.json, arm)
         return

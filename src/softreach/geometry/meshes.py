@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from softreach.geometry.regions import Region
 from softreach.geometry.surface import enclosed_volume
@@ -25,17 +24,21 @@ _MOST_BYTES = 256_000_000
 _FILES = (".stl", ".ply", ".obj", ".off", ".glb")
 _PACKED = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ")  # starts of archives
 _CREASE = np.cos(np.radians(20.0))  # of normals beside an edge that is drawn
-_FEW = 4  # triangles of the smallest box around some
+_FEW = 8  # triangles of the smallest box around some
 _ENDS = np.minimum, np.maximum
-_ENOUGH = 0.97  # of a distance in a field, which is exact near by
+_ENOUGH = 0.99  # of a distance, in a field
 _NODES = 65  # along each edge of a field
 STACK = 128  # Room of a search in a tree: twice its depth
 
 
 class TriangleTree(NamedTuple):
-    """Boxes around triangles, each cut in two across where its triangles lie widest apart."""
+    """Boxes around triangles, each cut in two across where its triangles lie widest apart.
 
-    boxes: Array  # Lower and upper corner of each [m]; children of i are 2i + 1 and 2i + 2, (n, 6)
+    Or several such trees, one after another.
+    """
+
+    firsts: Index  # First box, start, node of a field and triangle of each, and the end, (m + 1, 4)
+    boxes: Array  # Axes, and ends along them [m]; children of i are 2i + 1 and 2i + 2, (n, 5, 3)
     starts: Index  # Of the triangles in each box of the last level, shape (2^level + 1,)
     corners: Array  # Of the triangles, in this order [m], shape (f, 3, 3)
     normals: Array  # Of each face, of its edges, and of its corners by their angles, (f, 7, 3)
@@ -43,20 +46,22 @@ class TriangleTree(NamedTuple):
     @classmethod
     def of(cls, corners: Array, normals: Array) -> Self:
         """The tree of triangles (f, 3, 3) [m] with normals of their parts (f, 7, 3)."""
-        count, order = len(corners), np.arange(len(corners))
-        middles, boxes = corners.mean(axis=1), list[Array]()
+        count, order, boxes = len(corners), np.arange(len(corners)), list[Array]()
         depth = max(0, int(np.ceil(np.log2(count / _FEW))))
         for level in range(depth + 1):
             starts = np.arange(2**level + 1) * count // 2**level
-            own = corners[order]
-            ends = own.min(axis=1), own.max(axis=1)
-            low, high = (f.reduceat(x, starts[:-1]) for f, x in zip(_ENDS, ends, strict=True))
-            boxes.append(np.concatenate([low, high], axis=1))
             block = np.repeat(np.arange(2**level), np.diff(starts))
-            along = middles[order, (high - low).argmax(axis=1)[block]]
-            order = order[np.lexsort((along, block))]  # within each box
+            axes = _axes(corners[order], starts, block)
+            along = corners[order] @ axes.swapaxes(1, 2)[block]
+            ends = along.min(axis=1), along.max(axis=1)
+            low, high = (f.reduceat(x, starts[:-1]) for f, x in zip(_ENDS, ends, strict=True))
+            boxes.append(np.concatenate([axes, np.stack([low, high], axis=1)], axis=1))
+            longest = (high - low).argmax(axis=1)[block]
+            middles = along.mean(axis=1)[np.arange(count), longest]
+            order = order[np.lexsort((middles, block))]  # within each box
         starts = np.arange(2**depth + 1) * count // 2**depth
-        return cls(np.concatenate(boxes), starts, corners[order], normals[order])
+        firsts = np.array([[0] * 4, [2 * len(starts) - 3, len(starts), 0, count]])
+        return cls(firsts, np.concatenate(boxes), starts, corners[order], normals[order])
 
     def nearest(self, points: Array, enough: float = 1.0) -> tuple[Array, Array, Index]:
         """Signed distances of points (n, 3) [m], gradients (n, 3), and the nearest triangles.
@@ -66,23 +71,22 @@ class TriangleTree(NamedTuple):
         from softreach.kernels.room.triangles import nearest_triangles
 
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        face, table = np.empty(len(points), np.int64), (*self,)
-        points = np.ascontiguousarray(points)
+        face, points = np.empty(len(points), np.int64), np.ascontiguousarray(points)
 
         def fill(b: slice) -> None:
-            room = np.empty(STACK, np.int64)
-            nearest_triangles(points[b], table, room, enough, distance[b], gradient[b], face[b])
+            room = np.empty((STACK, 2))
+            nearest_triangles(points[b], self, room, enough, distance[b], gradient[b], face[b])
 
         parallel.run(partial(fill, block) for block in parallel.blocks(len(points), _BLOCK))
         return distance, gradient, face
 
 
-class DistanceField(NamedTuple):
-    """Distances from a mesh at the nodes of a grid, and a triangle near to each."""
+class DistanceFields(NamedTuple):
+    """Distances from meshes at the nodes of a grid around each, and a triangle near to each."""
 
-    grid: Array  # First node and spacing [m], shape (4,)
-    shape: Index  # Nodes along each axis, shape (3,)
-    distance: Array  # Signed [m], shape (node,)
+    grids: Array  # First node and spacing [m], shape (m, 4)
+    shapes: Index  # Nodes along each axis, shape (m, 3)
+    distance: Array  # Signed, no larger than it is [m], shape (node,)
     face: Index  # Numbers of triangles in the tree, shape (node,)
 
 
@@ -168,14 +172,11 @@ class Mesh(Region):
     def bounds(self) -> Array:
         return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
-    def distance(self, points: ArrayLike) -> Array:
-        """Distance of points (n, 3) to the nearest triangle [m], negative inside, shape (n,).
-
-        The sign is that of the normal of the nearest face, edge or corner, weighted by angles.
-        """
-        return self.nearest(arrays.as_points("points", points))[0]
-
     def nearest(self, points: Array) -> tuple[Array, Array]:
+        """Distances from the nearest triangle [m], with the sign that its normal has there.
+
+        That is the normal of a face, of an edge, or of a corner, weighted by angles.
+        """
         return self.tree.nearest(points)[:2]
 
     @lazy
@@ -224,13 +225,24 @@ class Mesh(Region):
         return np.concatenate([own, at_edges, at_vertices[self.faces]], axis=1)
 
 
-def field_around(mesh: Mesh, center: Array, half: float, nodes: int = _NODES) -> DistanceField:
+def _axes(corners: Array, starts: Index, block: Index) -> Array:
+    """Principal axes of triangles (f, 3, 3) in blocks between starts, (n, 3, 3)."""
+    middles = corners.mean(axis=1)
+    mean = np.add.reduceat(middles, starts[:-1]) / np.diff(starts)[:, None]
+    apart = (corners - mean[block, None]).swapaxes(1, 2)
+    spread = np.add.reduceat(apart @ apart.swapaxes(1, 2), starts[:-1])
+    return np.linalg.eigh(spread).eigenvectors.swapaxes(1, 2)
+
+
+def field_around(mesh: Mesh, center: Array, half: float, nodes: int = _NODES) -> DistanceFields:
     """Distances at so many nodes along each edge of a cube around a center [m], shape (3,)."""
     spacing = 2.0 * half / (nodes - 1)
     steps = np.array(list(np.ndindex(nodes, nodes, nodes)), float)
     low = np.asarray(center, float) - half
     distance, _, face = mesh.tree.nearest(low + spacing * steps, _ENOUGH)
-    return DistanceField(np.append(low, spacing), np.full(3, nodes), distance, face)
+    return DistanceFields(
+        np.append(low, spacing)[None], np.full((1, 3), nodes), _ENOUGH * distance, face
+    )
 
 
 @dataclass(frozen=True)
@@ -270,9 +282,6 @@ class MeshFile(Region):
     @property
     def bounds(self) -> Array:
         return self.mesh.bounds
-
-    def distance(self, points: ArrayLike) -> Array:
-        return self.mesh.distance(points)
 
     def nearest(self, points: Array) -> tuple[Array, Array]:
         return self.mesh.nearest(points)

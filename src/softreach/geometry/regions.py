@@ -30,9 +30,9 @@ class Region(ABC):
     convex: ClassVar[bool] = True
     """True if it holds all between any two of its points."""
 
-    @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points (n, 3) to its boundary [m], negative inside, shape (n,)."""
+        return self.nearest(np.ascontiguousarray(arrays.as_points("points", points)))[0]
 
     @property
     @abstractmethod
@@ -144,11 +144,6 @@ class Box(Region):
     def bounds(self) -> Array:
         return np.array([self.low, self.high])
 
-    def distance(self, points: ArrayLike) -> Array:
-        x = arrays.as_points("points", points)
-        beyond = np.maximum(self.low - x, x - self.high)
-        return np.linalg.norm(np.maximum(beyond, 0.0), axis=1) + np.minimum(beyond.max(axis=1), 0.0)
-
     def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         reach = radius[..., None] * np.sqrt(np.maximum(1.0 - tangent**2, 0.0))
         beyond = np.maximum(self.low - center, center - self.high)
@@ -191,10 +186,6 @@ class Sphere(Region):
     @property
     def bounds(self) -> Array:
         return np.array(self.center) + self.radius * np.array([[-1.0], [1.0]])
-
-    def distance(self, points: ArrayLike) -> Array:
-        apart = arrays.as_points("points", points) - self.center
-        return np.linalg.norm(apart, axis=1) - self.radius
 
     def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         apart = center - self.center
@@ -239,9 +230,6 @@ class HalfSpace(Region):
     @property
     def bounds(self) -> Array:
         return np.array([[-np.inf] * 3, [np.inf] * 3])
-
-    def distance(self, points: ArrayLike) -> Array:
-        return (arrays.as_points("points", points) - self.point) @ np.array(self.normal)
 
     def section_distances(self, center: Array, tangent: Array, radius: Array) -> Ends:
         distance, along = self._distances(center), tangent @ np.array(self.normal)
@@ -304,9 +292,6 @@ class Cylinder(Region):
         across = self.radius * np.sqrt(np.maximum(1.0 - self.axis**2, 0.0))
         ends = np.array([self.start, self.end])
         return np.stack([ends.min(axis=0) - across, ends.max(axis=0) + across])
-
-    def distance(self, points: ArrayLike) -> Array:
-        return self.nearest(np.ascontiguousarray(arrays.as_points("points", points)))[0]
 
     def wireframe(self, around: Array) -> list[Array]:
         return self._rings(self.radius)

@@ -40,6 +40,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     return _cached(_dispatcher(function, fastmath=FAST))
 
 
+def lean_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `kernel`, for one that makes no arrays: then Numba need not count who holds which."""
+    return _cached(_dispatcher(function, fastmath=FAST, _nrt=False))
+
+
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorization."""
     return _dispatcher(function, part=True, forceinline=True, fastmath=FAST)

@@ -18,17 +18,25 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.obstacles import Obstacle, obstacle_names
 from softreach.arm.stations import Marker
 from softreach.arm.tables import tables
-from softreach.geometry.meshes import STACK, DistanceField, Mesh, MeshFile, field_around
+from softreach.geometry.meshes import (
+    STACK,
+    DistanceFields,
+    Mesh,
+    MeshFile,
+    TriangleTree,
+    field_around,
+)
 from softreach.kernels.rod.frames import centerlines
 from softreach.kernels.room import HALF_SPACE, MESH, NUMBERS
-from softreach.kernels.room.nearest import FIELD_ERROR, ITSELF, MOST_PARTS, NONE, nearest, swollen
+from softreach.kernels.room.cubics import ARC_SERIES, Arms, Steps, weights
+from softreach.kernels.room.nearest import ITSELF, NONE, Solids, nearest
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import ArmMap, as_tip_map, coarsened, with_unstable
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_number
-from softreach.support.arrays import Array, Index, rows
+from softreach.support.arrays import Array, Index, joined, rows
 from softreach.support.errors import NotPossible, Range, warn
 from softreach.support.lazy import lazy
 
@@ -36,18 +44,22 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ACCURACY = 1e-3  # over L: largest error of a clearance
-_PLACES, _CUBICS, _SEARCH = 1 / 16, 1 / 8, 3 / 4  # shares of the accuracy
+_PLACES, _CUBICS, _SEARCH = 1 / 16, 3 / 8, 1 / 2  # shares of the accuracy
 _BLOCK = 1024  # arms at once
 _PILOTS = 64
 _MOST_EDGES = 2048
-_FIELD = 1.25  # half an edge of fields around meshes, over the longest arm
+_FIELD = 1.02  # half an edge of fields around meshes, over the longest arm
 _STRANGE = 300.0  # sizes of meshes over L, or the inverse, at which a wrong unit is likely
 
-
-_NOTHING: tuple[Any, ...] = (
-    *(np.empty((0, 6)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
-    *(np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64)),
-)  # trees and fields of no mesh
+_TINY = 1e-30  # imaginary step, whose square is lost: derivatives exact to rounding
+_weights: Any = getattr(weights, "py_func", weights)  # for arrays
+_NO_TREES = TriangleTree(
+    np.zeros((1, 4), np.int64),
+    *(np.empty((0, 5, 3)), np.empty(0, np.int64), np.empty((0, 3, 3)), np.empty((0, 7, 3))),
+)
+_NO_FIELDS = DistanceFields(
+    *(np.empty((0, 4)), np.empty((0, 3), np.int64), np.empty(0), np.empty(0, np.int64))
+)
 
 
 class Clearances(NamedTuple):
@@ -56,15 +68,6 @@ class Clearances(NamedTuple):
     value: Array  # Least gap, beyond the clearance wanted [m]; infinite without anything, (n,)
     which: Index  # Number of the obstacle, `ITSELF`, or `NONE`, shape (n,)
     place: Array  # Edges and shares of the arc from there, on the arm and again, shape (n, 2)
-
-
-class _Edges(NamedTuple):
-    """Arms at the edges of their steps."""
-
-    points: Array  # Centers [m], shape (n, edge, 3)
-    tangents: Array  # d3, shape (n, edge, 3)
-    radius: Array  # Outer radius [m], shape (n, edge)
-    tool: Array  # Point that the tip holds [m], shape (n, 3), or (0, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,10 +153,8 @@ class ClearanceMap:
         every = np.sort(np.concatenate([z, 0.5 * (z[1:] + z[:-1])]))
         frames = self.tip_map.frames(gamma, every)
         points, tangents = frames.position, frames.directors[:, :, 2]
-        ends = points[:, ::2], tangents[:, ::2]
-        weights = hermite(arcs(*ends), np.full(len(z) - 1, 0.5))
-        terms = (ends[0][:, :-1], ends[0][:, 1:], ends[1][:, :-1], ends[1][:, 1:])
-        apart = sum(w[..., None] * x for w, x in zip(weights, terms, strict=True)) - points[:, 1::2]
+        ends = (np.stack([x[:, :-2:2], x[:, 2::2]], axis=2) for x in (points, tangents))
+        apart = _on_cubics(*ends, 0.5) - points[:, 1::2]
         along = (apart * tangents[:, 1::2]).sum(axis=-1, keepdims=True) * tangents[:, 1::2]
         return np.nanmax(np.linalg.norm(apart - along, axis=-1), initial=0.0)
 
@@ -167,35 +168,34 @@ class ClearanceMap:
         return out
 
     def _fill(self, gamma: Array, out: Clearances) -> None:
-        edges, (disks, *solids, meshes) = self._at(gamma), self._prepared
-        lost = np.isnan(edges.points[:, 0, 0])
-        for each in edges[:3]:
+        arms, (disks, solids, meshes) = self._at(gamma), self._prepared
+        lost = np.isnan(arms.points[:, 0, 0])
+        for each in arms[:3]:
             each[lost] = 0.0
-        steps = len(disks) - 1
-        most = steps * (MOST_PARTS + 1)
-        line = np.empty((most, 3)), *np.empty((3, most)), np.empty(steps + 1, np.int64)
-        room = np.empty(steps), np.empty(STACK, np.int64), np.empty((STACK + steps, 5)), *line
-        tol = _SEARCH * self.error
-        nearest(*edges[:3], disks, edges.tool, *solids, meshes, tol, room, *out)
+        count = len(disks) - 1
+        steps = Steps(*np.empty((3, count)), np.empty(count + 1))
+        room = np.empty((STACK, 2)), np.empty((count + 2, 5)), np.empty((STACK, 10))
+        room = (np.empty((count, 3)), np.empty(count)), room
+        nearest(arms, disks, solids, meshes, _SEARCH * self.error, steps, room, *out)
         out.value[out.which == NONE] = np.inf
         out.value[lost], out.which[lost] = np.nan, NONE
 
-    def _at(self, gamma: Array) -> _Edges:
+    def _at(self, gamma: Array) -> Arms:
         """Arms at the edges."""
-        tip_map, z = self.tip_map, self.stations
+        tip_map, z, base = self.tip_map, self.stations, self.tip_map.pose
         inner, lost = tip_map.known_activations(tip_map.inputs.activations(gamma))
-        shape, power = (len(gamma), len(z)), self._poisson
-        radius, rates = self.arm.widest(z), self._rates
         if isinstance(tip_map.rod, FreeRod):
-            points, tangents, widths = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape)
-            centerlines(self._table, inner, self._start, points, tangents)
-            swollen(inner, rates, radius, power, widths)
+            points, tangents = np.empty((2, len(gamma), len(z), 3))
+            start = np.concatenate([base.position, np.array(base.rotation).T.ravel()])
+            centerlines(self._table, inner, start, points, tangents)
+            extension = 1.0 + np.einsum("nb,eb->ne", inner, self._rates)
         else:
             shapes = tip_map.shapes(gamma, z, z)
-            points, tangents = shapes.position, np.ascontiguousarray(shapes.directors[:, :, 2])
-            widths = radius * shapes.extension**-power
+            points, extension = shapes.position, shapes.extension
+            tangents = np.ascontiguousarray(shapes.directors[:, :, 2])
+        widths = self._radius / extension**self._poisson
         points[lost] = np.nan
-        return _Edges(points, tangents, widths, self._tools(gamma))
+        return Arms(points, tangents, widths, self._tools(gamma))
 
     def _tools(self, gamma: Array) -> Array:
         point = self.whole.point
@@ -204,16 +204,13 @@ class ClearanceMap:
         return np.nan_to_num(self.tip_map.tips(gamma))
 
     @lazy
-    def contact_error(self) -> float:
-        """How much smaller a clearance may be where the field of a mesh decides [m]."""
-        meshes = self._prepared[-1]
-        spacing = max(meshes[5][:, 3], default=0.0)
-        return self.error + FIELD_ERROR * spacing
-
-    @lazy
     def _poisson(self) -> float:
         rings = self.arm.section.rings
         return max(rings, key=lambda ring: ring.outer_ratio).material.poisson_ratio
+
+    @lazy
+    def _radius(self) -> Array:
+        return self.arm.widest(self.stations)
 
     @lazy
     def _rates(self) -> Array:
@@ -224,11 +221,6 @@ class ClearanceMap:
     def _table(self) -> Array:
         rod: Any = self.tip_map.rod
         return rod.rule.packed(self.arm.profile.slender_coordinate(self.stations))
-
-    @lazy
-    def _start(self) -> Array:
-        base = self.tip_map.pose
-        return np.concatenate([base.position, np.array(base.rotation).T.ravel()])
 
     @lazy
     def _prepared(self) -> tuple[Any, ...]:
@@ -252,26 +244,26 @@ class ClearanceMap:
             numbers[k, : len(own)], numbers[k, -1] = own, each.clearance
             ends[k] = np.searchsorted(z, each.span(arm.length))
         kinds[count, 1] = self.itself
-        return disks, kinds, numbers, ends, self._trees(meshes)
+        return disks, Solids(kinds, numbers, ends), self._trees(meshes)
 
-    def _trees(self, meshes: list[Mesh]) -> tuple[Any, ...]:
-        """Where trees and fields of all meshes begin, and these one after another."""
+    def _trees(self, meshes: list[Mesh]) -> tuple[TriangleTree, DistanceFields]:
+        """Trees and fields of all meshes, one after another."""
         half = _FIELD * min(self.whole.farthest(), 1.5 * self.arm.length)
-        sizes, parts = [np.zeros(4, np.int64)], [_NOTHING]
+        trees, fields = [_NO_TREES], [_NO_FIELDS]
         for mesh in meshes:
             tree, field = mesh.tree, _field(mesh, tuple(self.arm.base.position), half)
-            first, counts = sizes[-1][3], (tree.boxes, tree.starts, field.distance, tree.corners)
-            grid = field.grid[None], field.shape[None], field.distance, field.face + first
-            parts.append((*tree._replace(starts=tree.starts + first), *grid))
-            sizes.append(sizes[-1] + [len(each) for each in counts])
-        return np.array(sizes), *(np.concatenate(each) for each in zip(*parts, strict=True))
+            first = trees[-1].firsts[-1]
+            firsts = first + tree.firsts[1:] + [0, 0, len(field.face), 0]
+            trees.append(tree._replace(firsts=firsts, starts=tree.starts + first[3]))
+            fields.append(field._replace(face=field.face + first[3]))
+        return joined(trees), joined(fields)
 
     def variables(self, found: Clearances) -> dict[str, Any]:
         """The same as variables of a dataset over `sample`."""
         number = np.where(found.which == ITSELF, len(self.obstacles), found.which)
         edges = np.arange(len(self.stations) + 1.0)
         z = np.interp(found.place[:, 0], edges, np.append(self.stations, self.arm.length))
-        error = {"error": self.error, "error_apart": self.contact_error}
+        error = {"error": self.error}
         return {
             "clearance": ("sample", found.value, {"units": "m", "names": self.names, **error}),
             "obstacle": ("sample", np.maximum(number, -1), {}),
@@ -298,7 +290,7 @@ class ClearanceMap:
         edges = self._at(gamma)
         for which in np.unique(found.which[found.which != NONE]):
             own = np.flatnonzero(found.which == which)
-            part, its = _Edges(*(x[own] if len(x) else x for x in edges)), gamma[own]
+            part, its = Arms(*(x[own] if len(x) else x for x in edges)), gamma[own]
             place, move = self._moved(part, its, found.place[own, 0])
             if which == ITSELF:
                 other, its_move = self._moved(part, its, found.place[own, 1])
@@ -311,28 +303,17 @@ class ClearanceMap:
             slopes[own] = np.einsum("na,nab->nb", normal, move[:, :3]) - move[:, 3]
         return found, slopes
 
-    def _moved(self, edges: _Edges, gamma: Array, place: Array) -> tuple[Array, Array]:
+    def _moved(self, edges: Arms, gamma: Array, place: Array) -> tuple[Array, Array]:
         """Points at places (n,), (n, 3), and derivatives of these and of radii, (n, 4, bundles)."""
         count, rows = len(self.stations) - 1, np.arange(len(gamma))
         k = np.clip(place.astype(int), 0, count - 1)
         t, moves = place - k, np.zeros((len(gamma), 4, gamma.shape[1]))
         tool = place > count
         t[tool] = 1.0
-        ends = [self._turned(edges, gamma, k + side) for side in (0, 1)]
         p, u = (np.stack([x[rows, k], x[rows, k + 1]], axis=1) for x in edges[:2])
-        arc, rates = arcs(p, u), _arc_slopes(p, u, ends)
-        h = hermite(arc, t[:, None])
-        weights = [w[:, 0] for w in h]
-        terms = (p[:, 0], p[:, 1], u[:, 0], u[:, 1])
-        points: Array = np.sum(
-            [w[:, None] * x for w, x in zip(weights, terms, strict=True)], axis=0
-        )
-        each = (ends[0][0], ends[1][0], ends[0][1], ends[1][1])
-        moves[:, :3] = np.sum(
-            [w[:, None, None] * x for w, x in zip(weights, each, strict=True)], axis=0
-        )
-        bow = (weights[2][:, None] * u[:, 0] + weights[3][:, None] * u[:, 1]) / arc
-        moves[:, :3] += bow[:, :, None] * rates[:, None]
+        points, (dp, du) = _on_cubics(p, u, t), self._turned(edges, gamma, k)
+        moved = _on_cubics(p + 1j * _TINY * dp, u + 1j * _TINY * du, t).imag / _TINY
+        moves[:, :3] = np.moveaxis(moved, 0, 2)
         shrink = [self._swelling(edges, gamma, k + side) for side in (0, 1)]
         moves[:, 3] = (1.0 - t)[:, None] * shrink[0] + t[:, None] * shrink[1]
         disks = self._prepared[0][k + (t == 1.0)]
@@ -345,17 +326,17 @@ class ClearanceMap:
             moves[tool, 3] = 0.0
         return points, moves
 
-    def _turned(self, edges: _Edges, gamma: Array, edge: Index) -> tuple[Array, Array]:
-        """Derivatives of centers and tangents at one edge of each arm, (n, 3, bundles) each."""
-        moves = np.zeros((2, len(gamma), 3, gamma.shape[1]))
-        for e in np.unique(edge[edge > 0]):
-            own = np.flatnonzero(edge == e)
-            part = self._up_to(int(e))
-            tips, twists = part.tip_twists(gamma[own])
-            v, w = twists[:, :3], twists[:, 3:]
-            moves[0, own] = v + np.cross(w, tips[:, :, None], axis=1)
-            moves[1, own] = np.cross(w, edges.tangents[own, e][:, :, None], axis=1)
-        return moves[0], moves[1]
+    def _turned(self, edges: Arms, gamma: Array, first: Index) -> Array:
+        """Derivatives of centers and of tangents at two edges, (2, bundles, n, edge, 3)."""
+        moves = np.zeros((2, gamma.shape[1], len(gamma), 2, 3))
+        beside = first[:, None] + [0, 1]
+        for e in np.unique(beside[beside > 0]):
+            own, side = np.nonzero(beside == e)
+            tips, twists = self._up_to(int(e)).tip_twists(gamma[own])
+            v, w = np.moveaxis(twists.reshape(len(own), 2, 3, -1), (1, 3), (0, 1))
+            moves[0][:, own, side] = v + np.cross(w, tips)
+            moves[1][:, own, side] = np.cross(w, edges.tangents[own, e])
+        return moves
 
     def _up_to(self, edge: int) -> TipMap:
         """The tip map of the arm up to an edge."""
@@ -372,7 +353,7 @@ class ClearanceMap:
                 known[edge] = with_unstable(as_tip_map(arm, self.tip_map.tol))
         return known[edge]
 
-    def _swelling(self, edges: _Edges, gamma: Array, edge: Index) -> Array:
+    def _swelling(self, edges: Arms, gamma: Array, edge: Index) -> Array:
         """Derivatives of radii at an edge of each arm, ∂R = -ν R/ζ ∂ζ, shape (n, bundles)."""
         inputs, rows = self.tip_map.inputs, np.arange(len(gamma))
         inner, of_drives = inputs.with_slopes(gamma)
@@ -412,7 +393,7 @@ def compute_clearance(
         near, NaN without an equilibrium. `obstacle`, its number among the `names` in the attributes
         of `clearance`, -1 for none; `station`, Z of the place [m]. With `slopes`, also
         `clearance_slope` (sample, bundle) [m per unit]. The attribute `error` says how much smaller
-        a clearance may be [m], `error_apart` that near a mesh, unless the arm just touches it.
+        a clearance may be [m].
 
     Raises:
         InvalidInput: As for `tip_positions`, or an accuracy out of range.
@@ -434,7 +415,7 @@ def compute_clearance(
 
 
 @lru_cache(maxsize=16)
-def _field(mesh: Mesh, center: tuple[float, float, float], half: float) -> DistanceField:
+def _field(mesh: Mesh, center: tuple[float, float, float], half: float) -> DistanceFields:
     return field_around(mesh, np.array(center), half)
 
 
@@ -446,33 +427,9 @@ def _check_size(obstacle: Obstacle, name: str, length: float) -> None:
         warn(f"{name} is {size:.3g} times as large as the arm is long: is its unit right?")
 
 
-def arcs(points: Array, tangents: Array) -> Array:
-    """Lengths of arcs between edges [m], (n, edge - 1), from centers and tangents (n, edge, 3)."""
-    chord = np.linalg.norm(np.diff(points, axis=1), axis=2)
-    return chord * np.polynomial.polynomial.polyval(_turn(tangents), _SERIES)
-
-
-def _turn(tangents: Array) -> Array:
-    return 0.25 * (np.diff(tangents, axis=1) ** 2).sum(axis=2)
-
-
-_SERIES = np.array([1.0, 1 / 6, 3 / 40, 5 / 112, 35 / 1152, 63 / 2816])  # of asin(√s)/√s
-
-
-def _arc_slopes(p: Array, u: Array, ends: list[tuple[Array, Array]]) -> Array:
-    """Derivatives of the arcs of single steps, shape (n, bundles)."""
-    chord = np.diff(p, axis=1)[:, 0]
-    size, s = np.linalg.norm(chord, axis=1), _turn(u)[:, 0]
-    grown = np.einsum("na,nab->nb", chord, ends[1][0] - ends[0][0]) / size[:, None]
-    turned = 0.5 * np.einsum("na,nab->nb", u[:, 1] - u[:, 0], ends[1][1] - ends[0][1])
-    polynomial = np.polynomial.polynomial
-    series = polynomial.polyval(s, _SERIES)[:, None]
-    slope = polynomial.polyval(s, polynomial.polyder(_SERIES))[:, None]
-    return series * grown + size[:, None] * slope * turned
-
-
-def hermite(arc: Array, t: Array) -> tuple[Array, Array, Array, Array]:
-    """Weights of both centers and of both tangents at shares t of arcs (n, step)."""
-    a, b = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-    ones = np.ones_like(arc)
-    return a * ones, b * ones, arc * t * (1.0 - t) ** 2, arc * t * t * (t - 1.0)
+def _on_cubics(points: Array, tangents: Array, t: ArrayLike) -> Array:
+    """Points at shares t of arcs between centers and tangents (..., 2, 3), as kernels have them."""
+    chord, turn = (((x[..., 1, :] - x[..., 0, :]) ** 2).sum(axis=-1) for x in (points, tangents))
+    arc = np.sqrt(chord) * np.polynomial.polynomial.polyval(0.25 * turn, ARC_SERIES)
+    terms = (x[..., k, :] for x in (points, tangents) for k in (0, 1))
+    return sum(np.asarray(w)[..., None] * x for w, x in zip(_weights(arc, t), terms, strict=True))

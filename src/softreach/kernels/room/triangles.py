@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inline, lean_kernel
 from softreach.kernels.vector import dot, minus, plus, spot, times
 
+FIELD_ERROR = 0.87  # over the spacing of a field: √3/2, half a diagonal
 FACE = 0  # Parts of a triangle: itself, its edges from corners 0, 1, 2 on, its corners
 
 
@@ -51,45 +52,50 @@ def _square(a, b):
 
 @inline
 def _beyond_box(x, boxes, n):
-    """Squared distance of a point from a box of some (n, 6): lower and upper corners."""
-    a = max(max(boxes[n, 0] - x[0], x[0] - boxes[n, 3]), 0.0)
-    b = max(max(boxes[n, 1] - x[1], x[1] - boxes[n, 4]), 0.0)
-    c = max(max(boxes[n, 2] - x[2], x[2] - boxes[n, 5]), 0.0)
-    return a * a + b * b + c * c
+    """Squared distance of a point from a box of some (n, 5, 3): axes, and ends along these."""
+    square = 0.0
+    for axis in range(3):
+        along = dot(x, spot(boxes, n, axis))
+        beyond = max(max(boxes[n, 3, axis] - along, along - boxes[n, 4, axis]), 0.0)
+        square += beyond * beyond
+    return square
 
 
 @inline
-def nearest_in(x, guess, boxes, root, starts, begin, leaves, corners, normals, stack, enough):
+def nearest_in(x, m, guess, most, trees, stack, enough):
     """Signed distance of a point from the nearest triangle, its gradient, and the triangle.
 
-    Of a tree of boxes (node, 6), which begins at `root`, children of node i are 2i + 1 and 2i + 2.
-    Its last level, of so many leaves, lists triangles between `starts` from number `begin` on;
-    corners (f, 3, 3) and normals of parts (f, 7, 3) are in that order. A triangle near by, the
-    `guess`, saves most of the search; `stack` has room for it. With `enough` below 1 a triangle
-    does whose distance, times that, is no more than the least.
+    Of mesh m of `TriangleTree`s. A triangle near by, the `guess`, saves most of the search; `stack`
+    has room for it. With `enough` below 1 a triangle does whose distance, times that, is no more
+    than the least. Farther than `most` none is searched for, and the distance is that.
     """
+    corners, root, begin = trees.corners, trees.firsts[m, 0], trees.firsts[m, 1]
+    leaves = trees.firsts[m + 1, 1] - begin - 1
     face = guess
-    place, part = _on_face(x, corners, face)
-    foot, square = place, _square(x, place)
-    stack[0], size, enough = 0, 1, enough * enough
+    foot, part = _on_face(x, corners, face)
+    square, enough = min(_square(x, foot), most * most), enough * enough
+    stack[0, 0], stack[0, 1], size = 0.0, 0.0, 1
     while size:
         size -= 1
-        node = stack[size]
-        if _beyond_box(x, boxes, root + node) >= enough * square:
+        if stack[size, 0] >= enough * square:
             continue
+        node = int(stack[size, 1])
         if node >= leaves - 1:
             leaf = begin + node - leaves + 1
-            for f in range(starts[leaf], starts[leaf + 1]):
+            for f in range(trees.starts[leaf], trees.starts[leaf + 1]):
                 place, its = _on_face(x, corners, f)
                 if _square(x, place) < square:
                     square, face, part, foot = _square(x, place), f, its, place
             continue
         first, second = 2 * node + 1, 2 * node + 2
-        if _beyond_box(x, boxes, root + first) < _beyond_box(x, boxes, root + second):
-            first, second = second, first
-        stack[size], stack[size + 1] = first, second  # the nearer one comes next
+        near = _beyond_box(x, trees.boxes, root + first)
+        far = _beyond_box(x, trees.boxes, root + second)
+        if far < near:
+            first, second, near, far = second, first, far, near
+        stack[size, 0], stack[size, 1] = far, second
+        stack[size + 1, 0], stack[size + 1, 1] = near, first  # comes next
         size += 2
-    away, normal = minus(x, foot), spot(normals, face, part)
+    away, normal = minus(x, foot), spot(trees.normals, face, part)
     near = math.sqrt(square)
     sign = -1.0 if dot(away, normal) < 0.0 else 1.0
     if near > 0.0:
@@ -104,47 +110,52 @@ def _on_face(x, corners, f):
     return nearest_on_triangle(x, spot(corners, f, 0), spot(corners, f, 1), spot(corners, f, 2))
 
 
-@kernel
-def nearest_triangles(points, table, stack, enough, distance, gradient, face):
-    """Signed distances (n,) of points (n, 3), gradients (n, 3), and the nearest triangles (n,).
-
-    The table is boxes, starts, corners and normals of a tree; the others are as of `nearest_in`.
-    """
-    guess, (boxes, starts, corners, normals) = 0, table
+@lean_kernel
+def nearest_triangles(points, tree, stack, enough, distance, gradient, face):
+    """Signed distances (n,) of points (n, 3), gradients (n, 3), and the nearest triangles (n,)."""
+    guess = 0
     for i in range(points.shape[0]):
         x = points[i, 0], points[i, 1], points[i, 2]
-        found = nearest_in(
-            x, guess, boxes, 0, starts, 0, len(starts) - 1, corners, normals, stack, enough
-        )
-        distance[i], face[i] = found[0], found[4]
-        gradient[i, 0], gradient[i, 1], gradient[i, 2] = found[1], found[2], found[3]
-        guess = found[4]
+        distance[i], u, v, w, guess = nearest_in(x, 0, guess, 1e150, tree, stack, enough)
+        gradient[i, 0], gradient[i, 1], gradient[i, 2], face[i] = u, v, w, guess
 
 
 @inline
-def in_field(x, grids, shapes, field, first, m):
-    """Distance of x by field m, linear between nodes along each axis, and the node nearest to x.
+def least_in_field(x, side, m, trees, fields):
+    """A distance that no point of the solid m is nearer to x, one near, and a node.
 
-    Grids (m, 4) are first nodes and spacings, shapes (m, 3) numbers of nodes, fields one list.
+    Or of all but the solid where side is -1. The square of a distance less that of the place is a
+    least value of linear functions: it is no less than the mean of those at the nodes around.
     """
-    i, a = _cell(x[0], grids[m, 0], grids[m, 3], shapes[m, 0])
-    j, b = _cell(x[1], grids[m, 1], grids[m, 3], shapes[m, 1])
-    k, c = _cell(x[2], grids[m, 2], grids[m, 3], shapes[m, 2])
+    grids, shapes, field = fields.grids, fields.shapes, fields.distance
+    i, a, p = _cell(x[0], grids[m, 0], grids[m, 3], shapes[m, 0])
+    j, b, q = _cell(x[1], grids[m, 1], grids[m, 3], shapes[m, 1])
+    k, c, r = _cell(x[2], grids[m, 2], grids[m, 3], shapes[m, 2])
     rows, columns = shapes[m, 1], shapes[m, 2]
-    n = first + (i * rows + j) * columns + k
-    up = n + rows * columns
-    low = (1.0 - b) * _line(field, n, c) + b * _line(field, n + columns, c)
-    high = (1.0 - b) * _line(field, up, c) + b * _line(field, up + columns, c)
-    node = n + (rows * columns if a > 0.5 else 0) + (columns if b > 0.5 else 0)
-    return (1.0 - a) * low + a * high, node + (1 if c > 0.5 else 0)
+    n, up = trees.firsts[m, 2] + (i * rows + j) * columns + k, rows * columns
+    low = _mean(_line(side, field, n, c), _line(side, field, n + columns, c), b)
+    high = _mean(_line(side, field, n + up, c), _line(side, field, n + up + columns, c), b)
+    square = low + a * (high - low)
+    square -= grids[m, 3] ** 2 * (a * (1.0 - a) + b * (1.0 - b) + c * (1.0 - c))
+    n += (up if a > 0.5 else 0) + (columns if b > 0.5 else 0) + (1 if c > 0.5 else 0)
+    foot = _on_face(x, trees.corners, fields.face[n])[0]
+    near = math.sqrt(max(square, 0.0)) - math.sqrt(p * p + q * q + r * r)
+    return near if near > 0.0 else -math.sqrt(_square(x, foot)), foot, n  # as if it were inside
 
 
 @inline
 def _cell(x, first, spacing, count):
+    """Cell of a coordinate, its share there, and how far it is off the grid."""
     place = min(max((x - first) / spacing, 0.0), count - 1.001)
-    return int(place), place - int(place)
+    return int(place), place - int(place), x - first - place * spacing
 
 
 @inline
-def _line(field, n, t):
-    return field[n] + t * (field[n + 1] - field[n])
+def _line(side, field, n, t):
+    one, other = max(side * field[n], 0.0), max(side * field[n + 1], 0.0)
+    return _mean(one * one, other * other, t)
+
+
+@inline
+def _mean(a, b, t):
+    return a + t * (b - a)
