@@ -1,4 +1,4 @@
-"""Arms as models of other programs, which simulate them or run on controllers; control steps."""
+"""Arms for simulators, controllers and makers: models, kinematics, control steps, parts."""
 
 from softreach.models.c_source import c
 from softreach.models.inverse_table import InverseTable, inverse_table
