@@ -15,13 +15,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_one_of, as_text
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, NotPossible, counted, did_you_mean, warn
-from softreach.support.files.columns import (
-    MOST,
-    numbers_of,
-    place_columns,
-    read_table,
-    split_unit,
-)
+from softreach.support.files.columns import MOST, numbers_of, place_columns, read_table, split_unit
 from softreach.support.files.text import read_bytes
 from softreach.support.lazy import DataFrame
 
