@@ -193,7 +193,7 @@ class TestVolume:
         assert "warning: alpha = 0.08 m is" in streams.err
         assert "use more points or a larger alpha" in streams.err
         assert "Traceback" not in streams.err
-        assert streams.out.splitlines()[6].endswith("(estimate)  -")
+        assert streams.out.splitlines()[7].endswith("(estimate)  -")
 
 
 class TestReach:

@@ -15,13 +15,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.support.arguments import as_given, as_mapping, as_one_of, as_text
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, NotPossible, counted, did_you_mean, warn
-from softreach.support.files.columns import (
-    MOST,
-    numbers_of,
-    place_columns,
-    read_table,
-    split_unit,
-)
+from softreach.support.files.columns import MOST, numbers_of, place_columns, read_table, split_unit
 from softreach.support.files.text import read_bytes
 from softreach.support.lazy import DataFrame
 
@@ -181,10 +175,8 @@ def _inputs(table: DataFrame, sources: Sequence[str], units: Sequence[str]) -> A
 
 
 def _table(data: Any) -> tuple[DataFrame, str]:
-    """A table of one row at least, no two columns of which have one name, and its own name."""
+    """A table, no two columns of which have one name, and its own name."""
     table, source = _opened(data)
-    if not len(table):
-        raise InvalidInput("data", source, "a table with at least one row")
     if len(table) > _MOST_ROWS:
         raise InvalidInput("data", f"{len(table):,} rows", f"at most {_MOST_ROWS:,}")
     columns = [str(name) for name in table.columns]

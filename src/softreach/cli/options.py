@@ -20,7 +20,7 @@ from softreach.support.arguments import POSITIVE, as_one_of
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible, Range
 from softreach.support.files.atomic import check_place
 from softreach.support.files.formats import PAGES, PICTURES, FileFormat, Formats, format_of
-from softreach.support.files.text import MEGABYTE, read_bytes
+from softreach.support.files.text import read_bytes
 from softreach.support.lazy import Dataset
 from softreach.support.units import METER, TYPED, LengthUnit, as_unit, read_length
 
@@ -69,7 +69,6 @@ def pairs_in(name: str, texts: Sequence[str] | None, allowed: str) -> dict[str, 
 OUTPUT = Group("Output options", sort_key=3)
 OUT = Parameter(name=("--out", "-o"), group=OUTPUT)  # the file or folder that is written
 
-_MOST_TARGETS = 64 * MEGABYTE  # a million targets
 STORED = "on a stored cloud: give the design instead"  # no changes, no sampling there
 
 
@@ -363,8 +362,9 @@ def shape_of(text: str | None, arm: sr.Manipulator) -> Dataset:
 def points_in(name: str, file: Path, arm: sr.Manipulator) -> list[list[float]]:
     """Positions [m] from a CSV file with columns x, y, z; a header says no more than units."""
     from softreach.inverse.request import positions_in
+    from softreach.support.files.columns import MOST
 
-    return positions_in(read_bytes(name, file, _MOST_TARGETS), str(file), arm.length)
+    return positions_in(read_bytes(name, file, MOST), str(file), arm.length)
 
 
 def radius_of(text: str, length: float | None) -> float | str:

@@ -315,7 +315,8 @@ def volume(
         if options.is_points(compare):
             other = sr.exchange.read_points(compare, unit=in_points)
         else:
-            other, _ = options.cloud_of(compare, sampling, changes, output.unit)
+            own = options.SAMPLING if options.is_stored(compare) else sampling
+            other, _ = options.cloud_of(compare, own, UNCHANGED, None)
         rows |= rows_of(sr.volume.compare(concave, sr.concave_hull(other.tip, radius)))
     console.rows(f"volume of {source}", rows, output.json, arm, unit)
     if out is not None:

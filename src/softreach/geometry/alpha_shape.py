@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.geometry.hull import Hull
-from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area, unit_scale
+from softreach.geometry.surface import compact_surface, surface_area, unit_scale
 from softreach.kernels.points import alpha as kernels
 from softreach.kernels.points.bowyer_watson import insertion_order, triangulate
 from softreach.kernels.points.predicates import scratch
@@ -327,7 +327,8 @@ def _near(points: Points, alpha: float, box: Array) -> Mask:
 def _hull(points: Points, faces: Faces, sets: Index, volume: float, alpha: float) -> Hull:
     """A shape, its faces in an order that does not depend on where they come from."""
     regions, region = np.unique(sets, return_inverse=True)
-    parts = [enclosed_volume(points, faces[region == k]) for k in range(len(regions))]
+    a, b, c = np.moveaxis(points[faces] - points[faces[:1, :1]], 1, 0)
+    parts = np.bincount(region, np.einsum("fi,fi->f", a, np.cross(b, c)) / 6.0)
     vertices, faces = compact_surface(points, faces)
     first = faces.argmin(axis=1)[:, None] if len(faces) else faces[:, :1]
     faces = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
@@ -339,7 +340,7 @@ def _hull(points: Points, faces: Faces, sets: Index, volume: float, alpha: float
         area=surface_area(vertices, faces),
         alpha=float(alpha),
         regions=len(regions),
-        largest_region=max(parts, default=0.0),
+        largest_region=float(parts.max(initial=0.0)),
         n=len(points),
     )
 

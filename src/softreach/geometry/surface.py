@@ -4,21 +4,83 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from functools import partial
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.zbuffer import vertex_normals
+from softreach.support import parallel
 from softreach.support.arrays import Array, Faces, Index, Points
 from softreach.support.errors import InvalidInput, check_installed
 from softreach.support.lazy import lazy
 
-if TYPE_CHECKING:
-    from softreach.geometry.meshes import TriangleTree
-
 FINEST = 200  # bits below the largest coordinate that `kernels.points.predicates` may see
+STACK = 128  # room of a search in a tree of triangles: twice its depth
+_BLOCK = 4_096  # points at once
+_FEW = 8  # triangles of the smallest box around some
+_ENDS = np.minimum, np.maximum
 _ASIDE = 1e-3  # of the length of an edge, by which a wedge is drawn back
+
+
+class TriangleTree(NamedTuple):
+    """Boxes around triangles, each cut in two across where its triangles lie widest apart.
+
+    Or several such trees, one after another.
+    """
+
+    firsts: Index  # First box, start, node of a field and triangle of each, and the end, (m + 1, 4)
+    boxes: Array  # Axes, and ends along them [m]; children of i are 2i + 1 and 2i + 2, (n, 5, 3)
+    starts: Index  # Of the triangles in each box of the last level, shape (2^level + 1,)
+    corners: Array  # Of the triangles, in this order [m], shape (f, 3, 3)
+    normals: Array  # Of each face, of its edges, and of its corners by their angles, (f, 7, 3)
+
+    @classmethod
+    def of(cls, corners: Array, normals: Array) -> Self:
+        """The tree of triangles (f, 3, 3) [m] with normals of their parts (f, 7, 3)."""
+        count, order, boxes = len(corners), np.arange(len(corners)), list[Array]()
+        depth = max(0, int(np.ceil(np.log2(count / _FEW))))
+        for level in range(depth + 1):
+            starts = np.arange(2**level + 1) * count // 2**level
+            block = np.repeat(np.arange(2**level), np.diff(starts))
+            axes = _axes(corners[order], starts, block)
+            along = corners[order] @ axes.swapaxes(1, 2)[block]
+            ends = along.min(axis=1), along.max(axis=1)
+            low, high = (f.reduceat(x, starts[:-1]) for f, x in zip(_ENDS, ends, strict=True))
+            boxes.append(np.concatenate([axes, np.stack([low, high], axis=1)], axis=1))
+            longest = (high - low).argmax(axis=1)[block]
+            middles = along.mean(axis=1)[np.arange(count), longest]
+            order = order[np.lexsort((middles, block))]  # within each box
+        starts = np.arange(2**depth + 1) * count // 2**depth
+        firsts = np.array([[0] * 4, [2 * len(starts) - 3, len(starts), 0, count]])
+        return cls(firsts, np.concatenate(boxes), starts, corners[order], normals[order])
+
+    def nearest(self, points: Array, enough: float = 1.0) -> tuple[Array, Array, Index]:
+        """Signed distances of points (n, 3) [m], gradients (n, 3), and the nearest triangles.
+
+        With `enough` below 1 distances may be too large, but not so if they are multiplied by it.
+        """
+        from softreach.kernels.room.triangles import nearest_triangles
+
+        distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
+        face, points = np.empty(len(points), np.int64), np.ascontiguousarray(points)
+
+        def fill(b: slice) -> None:
+            room = np.empty((STACK, 2))
+            nearest_triangles(points[b], self, room, enough, distance[b], gradient[b], face[b])
+
+        parallel.run(partial(fill, block) for block in parallel.blocks(len(points), _BLOCK))
+        return distance, gradient, face
+
+
+def _axes(corners: Array, starts: Index, block: Index) -> Array:
+    """Principal axes of triangles (f, 3, 3) in blocks between starts, (n, 3, 3)."""
+    middles = corners.mean(axis=1)
+    mean = np.add.reduceat(middles, starts[:-1]) / np.diff(starts)[:, None]
+    apart = (corners - mean[block, None]).swapaxes(1, 2)
+    spread = np.add.reduceat(apart @ apart.swapaxes(1, 2), starts[:-1])
+    return np.linalg.eigh(spread).eigenvectors.swapaxes(1, 2)
 
 
 class SurfaceMesh(Protocol):
@@ -64,8 +126,6 @@ class Surface:
 
     @lazy
     def _tree(self) -> TriangleTree:
-        from softreach.geometry.meshes import TriangleTree
-
         corners = self.vertices[np.asarray(self.faces)]
         return TriangleTree.of(corners, np.zeros((len(corners), 7, 3)))  # no side is inside
 

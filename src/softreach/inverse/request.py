@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from softreach.rod.inputs import ActivationBox
 from softreach.rod.rods import at_marker
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_mapping, as_number, as_one_of
-from softreach.support.arrays import Array, Index, as_floats, as_points, check_finite
+from softreach.support.arrays import Array, Index, as_floats, repeated
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.files.columns import read_table, split_unit, tip_columns
 from softreach.support.units import TYPED, lengths_in
@@ -65,11 +66,8 @@ class Request:
 
 def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
     """Activations (bundles,) or (t, bundles) of all bundles as those of free ones, (t, free)."""
-    m, rows = box.bundles, as_floats(name, activations)
-    if rows.shape not in ((m,), (count, m)):
-        raise InvalidInput(f"{name}.shape", rows.shape, f"of shape ({m},), or ({count}, {m})")
-    check_finite(name, rows)
-    return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
+    rows = repeated(name, activations, (box.bundles,), count)
+    return np.ascontiguousarray(rows[:, box.free])
 
 
 def as_rates(rate: ArrayLike | None, count: int) -> Array | None:
@@ -82,12 +80,9 @@ def as_rates(rate: ArrayLike | None, count: int) -> Array | None:
     return np.broadcast_to(rates, count)
 
 
-def as_orientations(orientation: ArrayLike, count: int) -> Array:
+def as_frames(orientation: ArrayLike, count: int) -> Array:
     """Rotation matrices (3, 3) or (t, 3, 3) as (t, 3, 3)."""
-    frames = as_floats("orientation", orientation)
-    if frames.shape not in ((3, 3), (count, 3, 3)):
-        raise InvalidInput("orientation.shape", frames.shape, f"(3, 3) or ({count}, 3, 3)")
-    frames = np.broadcast_to(frames, (count, 3, 3))
+    frames = repeated("orientation", orientation, (3, 3), count)
     square = frames @ frames.transpose(0, 2, 1) - np.eye(3)
     if not (np.abs(square) < 1e-6).all() or not (np.linalg.det(frames) > 0.0).all():
         raise InvalidInput("orientation", frames, "rotation matrices: orthonormal, determinant 1")
@@ -98,13 +93,10 @@ def as_markers(
     tip_map: TipMap, markers: Any, within: float | Mapping[str, float], count: int
 ) -> dict[str, dict[str, Any]]:
     """Positions (3,) or (t, 3) of markers as (t, 3), and distances that do [m], of a `Request`."""
-    places = as_mapping("markers", markers, as_points)
-    for name, points in places.items():
-        at_marker(tip_map, name)  # refuses one that the arm does not have
-        if len(points) not in (1, count):
-            raise InvalidInput(f"markers[{name!r}].shape", points.shape, f"(3,) or ({count}, 3)")
-        places[name] = np.broadcast_to(points, (count, 3))
+    places = as_mapping("markers", markers, partial(repeated, shape=(3,), count=count))
     each = within if isinstance(within, Mapping) else dict.fromkeys(places, within)
+    for name in places:
+        at_marker(tip_map, name)  # refuses one that the arm does not have
     for name in each:
         as_one_of("marker_within", name, tuple(places))
         as_number("marker_within", each[name], Range(0.0, unit="m"))

@@ -13,13 +13,7 @@ from softreach.inverse.direction import compromises, direction_errors, marker_er
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import gap_bounds
-from softreach.inverse.request import (
-    RESIDUALS,
-    Request,
-    as_activations,
-    as_markers,
-    as_orientations,
-)
+from softreach.inverse.request import RESIDUALS, Request, as_activations, as_frames, as_markers
 from softreach.inverse.roots import (
     Roots,
     conditions,
@@ -145,7 +139,7 @@ def solve_inverse(
     if direction is not None and orientation is not None:
         raise InvalidInput("direction", direction, "left out, as d3 of the orientation is one")
     unit = None if direction is None else as_directions("direction", direction, len(points))
-    frames = None if orientation is None else as_orientations(orientation, len(points))
+    frames = None if orientation is None else as_frames(orientation, len(points))
     residual = as_number("residual_over_length", residual_over_length, RESIDUALS) * length
     most, free = as_integer("family", family, 1, 10_000), as_flag("free", free)
     within = as_number("within", within, Range(0.0, unit="m"))

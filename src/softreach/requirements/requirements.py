@@ -21,6 +21,7 @@ from softreach.support.arguments import POSITIVE, as_given, as_instance, as_numb
 from softreach.support.arrays import Array, as_floats, joined
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files import toml
+from softreach.support.files.columns import MOST
 from softreach.support.files.text import MEGABYTE, read_bytes, read_text, write_text
 
 LONGEST = 64 * MEGABYTE  # Bytes that a file of requirements may have
@@ -302,7 +303,7 @@ class _Reader(RegionReader):
         if file is not None:
             try:
                 place = self._beside(as_text("file", file), "places_m")
-                content = read_bytes("file", place, LONGEST)
+                content = read_bytes("file", place, MOST)
                 values["places"] = np.array(positions_in(content, file, self.length))
             except InvalidInput as error:
                 allowed = f"must be {error.allowed} ({error.name} = {error.value})"

@@ -18,14 +18,8 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.obstacles import Obstacle, obstacle_names
 from softreach.arm.stations import Marker
 from softreach.arm.tables import tables
-from softreach.geometry.meshes import (
-    STACK,
-    DistanceFields,
-    Mesh,
-    MeshFile,
-    TriangleTree,
-    field_around,
-)
+from softreach.geometry.meshes import DistanceFields, Mesh, MeshFile, field_around
+from softreach.geometry.surface import STACK, TriangleTree
 from softreach.kernels.rod.frames import centerlines
 from softreach.kernels.room import HALF_SPACE, MESH, NUMBERS
 from softreach.kernels.room.cubics import ARC_SERIES, Arms, Steps, weights

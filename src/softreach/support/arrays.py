@@ -119,21 +119,26 @@ def as_stations(name: str, values: object) -> Array:
     return check_finite(name, stations)
 
 
+def repeated(name: str, values: object, shape: tuple[int, ...], count: int) -> Array:
+    """Finite numbers of a shape, or of (count, *shape), as those of the second."""
+    array = as_floats(name, values)
+    if array.shape not in (shape, (count, *shape)):
+        raise InvalidInput(f"{name}.shape", array.shape, f"{shape} or {(count, *shape)}")
+    return np.broadcast_to(check_finite(name, array), (count, *shape))
+
+
 def as_directions(name: str, values: object, count: int | None = None) -> Array:
     """Unit vectors along vectors of shape (3,) or (n, 3) and any length but 0.
 
     With a count, shape (count, 3): one vector may stand for all. Else that of the values.
     """
-    vectors = as_floats(name, values)
-    rows = "n" if count is None else count
-    many = vectors.ndim == 2 and vectors.shape[1] == 3 and count in (None, len(vectors))
-    if vectors.shape != (3,) and not many:
-        raise InvalidInput(f"{name}.shape", vectors.shape, f"(3,) or ({rows}, 3)")
+    vectors = as_floats(name, values) if count is None else repeated(name, values, (3,), count)
+    if vectors.ndim not in (1, 2) or vectors.shape[-1] != 3:
+        raise InvalidInput(f"{name}.shape", vectors.shape, "(3,) or (n, 3)")
     size = np.linalg.norm(vectors, axis=-1, keepdims=True)
     if not (np.isfinite(size).all() and (size > 0).all()):
         raise InvalidInput(name, vectors, "finite vectors longer than 0")
-    units = vectors / size
-    return units if count is None else np.ascontiguousarray(np.broadcast_to(units, (count, 3)))
+    return vectors / size
 
 
 def as_indices(name: str, values: object, count: int, what: str) -> Index:

@@ -1,6 +1,5 @@
 """Clouds of ActiveFilaments.jl: NAME.csv and NAME_gamma.csv, without headers, a row a sample."""
 
-import re
 from io import BufferedWriter
 from os import PathLike, fspath
 from pathlib import Path
@@ -17,15 +16,14 @@ from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
+from softreach.support.files.columns import MOST, numbers_of, read_table
 from softreach.support.files.formats import FileFormat, Formats
-from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.files.text import read_bytes
 from softreach.support.lazy import Dataset
 
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
-_LARGEST = 500 * MEGABYTE  # eight million samples
 _ENDING = "_gamma"
-_NO_NUMBER = re.compile(r"could not convert string (.*) to float64 at row (\d+), column (\d+)")
 
 
 def gamma_path(path: str | PathLike[str]) -> Path:
@@ -114,20 +112,8 @@ CLOUD_PAIR: Formats = {".csv": FileFormat()}  # Format of `write_cloud`
 
 
 def _table(path: str, columns: int, meaning: str) -> Array:
-    text, allowed = read_text("file", path, _LARGEST), "rows of comma-separated numbers"
-    if not text.strip():
-        raise InvalidInput(path, "no rows", allowed)  # of which NumPy would warn
-    try:
-        table = np.loadtxt(text.split("\n"), delimiter=",", comments=None, ndmin=2)
-    except ValueError as error:
-        cause = str(error).partition(";")[0]
-        if match := _NO_NUMBER.search(cause):
-            cause = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
-        raise InvalidInput(path, cause, allowed) from None
+    table = read_table(read_bytes("file", path, MOST), path)
     if table.shape[1] != columns:
         size = counted(table.shape[1], "column")
         raise InvalidInput(path, size, f"{columns}: {meaning}")
-    if not (good := np.isfinite(table).all(axis=1)).all():
-        row = int(np.argmin(good)) + 1
-        raise InvalidInput(f"{path}, row {row}", table[row - 1].tolist(), "finite numbers")
-    return table
+    return np.stack([numbers_of(table, name) for name in table.columns], axis=1)

@@ -13,6 +13,7 @@ from softreach.kernels.compiler import inline, lean_kernel
 from softreach.kernels.vector import dot, minus, plus, spot, times
 
 FIELD_ERROR = 0.87  # over the spacing of a field: √3/2, half a diagonal
+_FLAT = 1e-15  # sin² of an angle between sides, below which a triangle is its edges
 FACE = 0  # Parts of a triangle: itself, its edges from corners 0, 1, 2 on, its corners
 
 
@@ -22,7 +23,7 @@ def nearest_on_triangle(x, a, b, c):
     u, v, w = minus(b, a), minus(c, a), minus(x, a)
     uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     scale, s, t = uu * vv - uv * uv, vv * uw - uv * vw, uu * vw - uv * uw
-    if scale > 0.0 and s > 0.0 and t > 0.0 and s + t < scale:
+    if scale > _FLAT * uu * vv and s > 0.0 and t > 0.0 and s + t < scale:
         return plus(a, plus(times(s / scale, u), times(t / scale, v))), FACE
     best, part = _on_edge(x, a, b, 0)
     for k in range(1, 3):

@@ -43,7 +43,8 @@ def split_unit(column: str) -> tuple[str, str, float, str]:
     """
     match = _UNIT.fullmatch(column)
     name, written = (x for x in match.groups() if x is not None) if match else ("", "")
-    unit = _SIZES.get("over_length" if written == "L" else written.lower())
+    written = "over_length" if match and match[2] == "L" else written
+    unit = _SIZES.get(written.lower())
     return (column, "", 1.0, "") if unit is None else (name, *unit, written)
 
 

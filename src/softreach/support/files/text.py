@@ -19,13 +19,13 @@ def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
 
 
 def read_bytes(name: str, path: str | os.PathLike[str], most: int) -> bytes:
-    """The content of a file of at most so many bytes."""
+    """The content of a file, or so many bytes of it and one more, which `text_of` refuses."""
     shown = os.fspath(path)
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):  # some never end
             raise InvalidInput(name, shown, "a file, not a folder, a pipe or a device")
         with Path(path).open("rb") as stream:
-            return _checked(name, shown, stream.read(most + 1), most)
+            return stream.read(most + 1)
     except FileNotFoundError:
         raise InvalidInput(name, shown, "a file that exists") from None
     except OSError as error:
@@ -34,8 +34,10 @@ def read_bytes(name: str, path: str | os.PathLike[str], most: int) -> bytes:
 
 def text_of(name: str, shown: str, content: bytes, most: int) -> str:
     """The text that `read_text` makes of the content of a file, which errors show so."""
+    if len(content) > most:
+        raise InvalidInput(name, shown, f"at most {most / MEGABYTE:,.3g} MB large")
     try:
-        text = _checked(name, shown, content, most).decode("utf-8-sig")
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         allowed = f"text in UTF-8, which byte {error.start} is not: save it in that encoding"
         raise InvalidInput(name, shown, allowed) from None
@@ -43,12 +45,6 @@ def text_of(name: str, shown: str, content: bytes, most: int) -> str:
         allowed = f"text, but character {place} is NUL: save it as text in UTF-8"
         raise InvalidInput(name, shown, allowed)
     return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def _checked(name: str, shown: str, content: bytes, most: int) -> bytes:
-    if len(content) > most:
-        raise InvalidInput(name, shown, f"at most {most / MEGABYTE:,.3g} MB large")
-    return content
 
 
 def write_text(path: str | os.PathLike[str], text: str, *, overwrite: bool) -> None:
