@@ -21,7 +21,7 @@ from softreach.support.arrays import Array, Index
 NONE, ITSELF = -1, -2
 """In place of the number of a solid."""
 _FARTHEST = 1e150  # as kernels know no infinity
-_SLACK = 0.25  # of the tolerance, in distances from meshes
+_SLACK = 0.5  # of the tolerance, in distances from meshes
 
 
 class Solids(NamedTuple):
@@ -186,7 +186,7 @@ def _past_step(solid, meshes, arms, steps, room, i, k, best, place, tol):
         if bound < best - tol and below <= 0.0 and above <= 0.0:
             x, y = _place(arms, steps, i, k, lower), _place(arms, steps, i, k, upper)
             bound = _least_inside(x, y, foot, other) - max(w0, w1) - share * share * bulge
-        if bound >= best - tol:
+        if bound >= best - tol or share * speed <= tol:  # nor where rounding hides the bound
             continue
         t, width = 0.5 * (lower + upper), 0.5 * (w0 + w1)
         x = _place(arms, steps, i, k, t)
