@@ -294,8 +294,8 @@ def test_a_planet_is_a_plane_and_one_beyond_all_numbers_is_far():
     gamma = samples(ClearanceMap(as_tip_map(TRUNK)), 50)
     planet, plane = Sphere((0, 0, -1e7 - 0.05), 1e7), HalfSpace((0, 0, -0.05), (0, 0, 1))
     each = [TRUNK.replace(surroundings=(Obstacle(region=x),)) for x in (planet, plane)]
-    near = [ClearanceMap(as_tip_map(arm), itself=False).of(gamma).value for arm in each]
-    np.testing.assert_allclose(*near, atol=1e-3)
+    near, far = (ClearanceMap(as_tip_map(arm), itself=False).of(gamma).value for arm in each)
+    np.testing.assert_allclose(near, far, atol=1e-3)
     arm = TRUNK.replace(surroundings=(Obstacle(region=Sphere((0, 0, 1e200), 1)),))
     assert (ClearanceMap(as_tip_map(arm)).of(gamma[:1]).value > 1.0).all()
 
