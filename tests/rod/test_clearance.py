@@ -126,9 +126,7 @@ def solid(kind, *numbers, at=(0.0, 0.0, 0.0), **options):
 ROOMS = {
     "table": lambda: [Obstacle(region=Box((-2, -2, -1), (2, 2, -0.05)), start_over_length=0.2)],
     "box": lambda: [Obstacle(region=Box((0.2, -0.3, 0.1), (0.5, 0.3, 0.4)))],
-    "in a tank": lambda: [
-        Obstacle(region=solid("icosphere", 1, at=(0, 0, 0.35), radius=0.75), inside=True)
-    ],
+    "tank": lambda: [Obstacle(region=solid("icosphere", 1, 0.75, at=(0, 0, 0.35)), inside=True)],
     "tube": lambda: [Obstacle(region=solid("annulus", 0.25, 0.5, 0.4, sections=12), end=0.9)],
     "bumps": lambda: [Obstacle(region=bumpy(0.3, (0.4, 0.1, 0.4), 1))],
     "two bodies": lambda: [
@@ -158,8 +156,6 @@ def test_no_contact_is_missed(name, n):
     gamma = samples(found, n)
     value, sampled = found.of(gamma).value, dense(found, gamma, 80, by_trimesh)
     assert 0.02 < (sampled < 0).mean() < 0.98
-    assert not (sampled[value > found.error] <= 0).any()
-    # A sampled gap is too large by up to half a spacing, where the arm runs toward the solid.
     assert (value <= sampled + found.error).all()
     assert (value >= sampled - found.error - 0.5 * 1.2 / 80).all()
 
