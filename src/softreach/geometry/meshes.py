@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from softreach.geometry.regions import Region
+from softreach.geometry.regions import Region, Triple
 from softreach.geometry.surface import TriangleTree, enclosed_volume
 from softreach.support import arrays
 from softreach.support.arguments import as_path
@@ -170,11 +171,12 @@ class Mesh(Region):
         return np.concatenate([own, at_edges, at_vertices[self.faces]], axis=1)
 
 
-def field_around(mesh: Mesh, center: Array, half: float, nodes: int = _NODES) -> DistanceFields:
-    """Distances at so many nodes along each edge of a cube around a center [m], shape (3,)."""
+@lru_cache(maxsize=16)
+def field_around(mesh: Mesh, center: Triple, half: float, nodes: int = _NODES) -> DistanceFields:
+    """Distances at so many nodes along each edge of a cube around a center [m]."""
     spacing = 2.0 * half / (nodes - 1)
     steps = np.array(list(np.ndindex(nodes, nodes, nodes)), float)
-    low = np.asarray(center, float) - half
+    low = np.array(center) - half
     distance, _, face = mesh.tree.nearest(low + spacing * steps, _ENOUGH)
     return DistanceFields(
         np.append(low, spacing)[None], np.full((1, 3), nodes), _ENOUGH * distance, face

@@ -58,6 +58,13 @@ def dot(a, b):
 
 
 @inline
+def squared(a, b):
+    """|a - b|²."""
+    apart = minus(a, b)
+    return dot(apart, apart)
+
+
+@inline
 def matrix(matrices, n):
     """Matrix n of an array (n, 3, 3), row by row."""
     return (

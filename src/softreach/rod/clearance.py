@@ -8,7 +8,7 @@ of which there are so many that tips, cubics and the search together err by at m
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -147,8 +147,8 @@ class ClearanceMap:
         every = np.sort(np.concatenate([z, 0.5 * (z[1:] + z[:-1])]))
         frames = self.tip_map.frames(gamma, every)
         points, tangents = frames.position, frames.directors[:, :, 2]
-        ends = (np.stack([x[:, :-2:2], x[:, 2::2]], axis=2) for x in (points, tangents))
-        apart = _on_cubics(*ends, 0.5) - points[:, 1::2]
+        p, u = (np.stack([x[:, :-2:2], x[:, 2::2]], axis=2) for x in (points, tangents))
+        apart = _on_cubics(p, u, 0.5) - points[:, 1::2]
         along = (apart * tangents[:, 1::2]).sum(axis=-1, keepdims=True) * tangents[:, 1::2]
         return np.nanmax(np.linalg.norm(apart - along, axis=-1), initial=0.0)
 
@@ -167,9 +167,10 @@ class ClearanceMap:
         for each in arms[:3]:
             each[lost] = 0.0
         count = len(disks) - 1
-        steps = Steps(*np.empty((3, count)), np.empty(count + 1))
+        lengths, bends, speeds, curvature = np.empty((4, count))
+        steps = Steps(lengths, bends, speeds, np.empty(count + 1))
         room = np.empty((STACK, 2)), np.empty((count + 2, 5)), np.empty((STACK, 10))
-        room = (np.empty((count, 3)), np.empty(count)), room
+        room = (np.empty((count, 3)), curvature), room
         nearest(arms, disks, solids, meshes, _SEARCH * self.error, steps, room, *out)
         out.value[out.which == NONE] = np.inf
         out.value[lost], out.which[lost] = np.nan, NONE
@@ -245,7 +246,7 @@ class ClearanceMap:
         half = _FIELD * min(self.whole.farthest(), 1.5 * self.arm.length)
         trees, fields = [_NO_TREES], [_NO_FIELDS]
         for mesh in meshes:
-            tree, field = mesh.tree, _field(mesh, tuple(self.arm.base.position), half)
+            tree, field = mesh.tree, field_around(mesh, tuple(self.arm.base.position), half)
             first = trees[-1].firsts[-1]
             firsts = first + tree.firsts[1:] + [0, 0, len(field.face), 0]
             trees.append(tree._replace(firsts=firsts, starts=tree.starts + first[3]))
@@ -408,11 +409,6 @@ def compute_clearance(
     return xr.Dataset(variables, names)
 
 
-@lru_cache(maxsize=16)
-def _field(mesh: Mesh, center: tuple[float, float, float], half: float) -> DistanceFields:
-    return field_around(mesh, np.array(center), half)
-
-
 def _check_size(obstacle: Obstacle, name: str, length: float) -> None:
     if not isinstance(obstacle.region, Mesh | MeshFile):
         return
@@ -426,4 +422,5 @@ def _on_cubics(points: Array, tangents: Array, t: ArrayLike) -> Array:
     chord, turn = (((x[..., 1, :] - x[..., 0, :]) ** 2).sum(axis=-1) for x in (points, tangents))
     arc = np.sqrt(chord) * np.polynomial.polynomial.polyval(0.25 * turn, ARC_SERIES)
     terms = (x[..., k, :] for x in (points, tangents) for k in (0, 1))
-    return sum(np.asarray(w)[..., None] * x for w, x in zip(_weights(arc, t), terms, strict=True))
+    each = zip(_weights(arc, t), terms, strict=True)
+    return np.sum([np.asarray(w)[..., None] * x for w, x in each], axis=0)

@@ -35,10 +35,8 @@ def folded(arms, steps, middles, curvature, i, sag, best):
         turn, sharp = curvature[k] * steps.lengths[k], curvature[k]
         for m in range(k + 1, count):
             turn, sharp = turn + curvature[m] * steps.lengths[m], max(sharp, curvature[m])
-            wide, arc = (
-                _widest(arms, i, k) + _widest(arms, i, m),
-                steps.passed[m + 1] - steps.passed[k],
-            )
+            wide = _widest(arms, i, k) + _widest(arms, i, m)
+            arc = steps.passed[m + 1] - steps.passed[k]
             if turn < _TURN or _is_open(sharp, arc, wide):
                 continue
             reach = min(wide + min(best, 0.5 * wide), _BACK * arc)

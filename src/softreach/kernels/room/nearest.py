@@ -15,13 +15,13 @@ from softreach.kernels.room.cubics import at, measure
 from softreach.kernels.room.folded import folded
 from softreach.kernels.room.shapes import signed_distance
 from softreach.kernels.room.triangles import FIELD_ERROR, least_in_field, nearest_in
-from softreach.kernels.vector import dot, minus, plus, row, spot, times
+from softreach.kernels.vector import minus, plus, row, spot, squared, times
 from softreach.support.arrays import Array, Index
 
 NONE, ITSELF = -1, -2
 """In place of the number of a solid."""
 _FARTHEST = 1e150  # as kernels know no infinity
-_SLACK = 0.25  # of the tolerance, in distances from meshes
+_SLACK = 0.5  # of the tolerance, in distances from meshes
 
 
 class Solids(NamedTuple):
@@ -123,17 +123,14 @@ def _least_between(d0, d1, w0, w1, apart, bulge):
 @inline
 def _least_inside(x, y, foot, other):
     """Least distance on a chord in a solid: none is deeper than it is away from both feet."""
-    here, there = _square(x, foot), _square(y, other)
-    first, second = max(_square(x, other) - here, 0.0), max(_square(y, foot) - there, 0.0)
+    here, there = squared(x, foot), squared(y, other)
+    first, second = (
+        max(squared(x, other) - here, 0.0),
+        max(squared(y, foot) - there, 0.0),
+    )
     share = first / max(first + second, 1e-300)
-    middle = (1.0 - share) * here + share * (there + second) - share * (1.0 - share) * _square(x, y)
+    middle = (1.0 - share) * here + share * (there + second) - share * (1.0 - share) * squared(x, y)
     return -math.sqrt(max(middle, here, there))
-
-
-@inline
-def _square(x, y):
-    apart = minus(x, y)
-    return dot(apart, apart)
 
 
 @inline
@@ -174,7 +171,7 @@ def _past_step(solid, meshes, arms, steps, room, i, k, best, place, tol):
         r, change = arms.radius[i, k], arms.radius[i, k + 1] - arms.radius[i, k]
         speed, bulge = steps.speeds[k], steps.bends[k] / 8.0
     else:
-        speed = math.sqrt(_square(row(arms.tool, i), spot(arms.points, i, k)))
+        speed = math.sqrt(squared(row(arms.tool, i), spot(arms.points, i, k)))
     _keep(pieces, 0, 0, 0.0, edges[k, 1], _kept(edges, k, 2))
     _keep(pieces, 0, 5, 1.0, edges[k + 1, 1], _kept(edges, k + 1, 2))
     while size:
@@ -186,7 +183,7 @@ def _past_step(solid, meshes, arms, steps, room, i, k, best, place, tol):
         if bound < best - tol and below <= 0.0 and above <= 0.0:
             x, y = _place(arms, steps, i, k, lower), _place(arms, steps, i, k, upper)
             bound = _least_inside(x, y, foot, other) - max(w0, w1) - share * share * bulge
-        if bound >= best - tol:
+        if bound >= best - tol or share * speed <= tol:  # nor where rounding hides the bound
             continue
         t, width = 0.5 * (lower + upper), 0.5 * (w0 + w1)
         x = _place(arms, steps, i, k, t)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inline, lean_kernel
 from softreach.kernels.room import BOX, HALF_SPACE, SPHERE, TUBE
 from softreach.kernels.vector import dot, minus, times
 
@@ -74,7 +74,7 @@ def _beyond(q, x, k):
     return (below, -1.0) if below > above else (above, 1.0)
 
 
-@kernel
+@lean_kernel
 def signed_distances(kind, q, points, distance, gradient):
     """Distances (n,) of points (n, 3) and their gradients (n, 3) into place."""
     for i in range(points.shape[0]):

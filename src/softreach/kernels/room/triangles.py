@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline, lean_kernel
-from softreach.kernels.vector import dot, minus, plus, spot, times
+from softreach.kernels.vector import dot, minus, plus, spot, squared, times
 
 FIELD_ERROR = 0.87  # over the spacing of a field: √3/2, half a diagonal
 _FLAT = 1e-15  # sin² of an angle between sides, below which a triangle is its edges
@@ -28,7 +28,7 @@ def nearest_on_triangle(x, a, b, c):
     best, part = _on_edge(x, a, b, 0)
     for k in range(1, 3):
         other, its = _on_edge(x, b, c, 1) if k == 1 else _on_edge(x, c, a, 2)
-        if _square(x, other) < _square(x, best):
+        if squared(x, other) < squared(x, best):
             best, part = other, its
     return best, part
 
@@ -43,12 +43,6 @@ def _on_edge(x, a, b, edge):
     if t >= 1.0:
         return b, 4 + (edge + 1) % 3
     return plus(a, times(t, u)), 1 + edge
-
-
-@inline
-def _square(a, b):
-    apart = minus(a, b)
-    return dot(apart, apart)
 
 
 @inline
@@ -74,7 +68,7 @@ def nearest_in(x, m, guess, most, trees, stack, enough):
     leaves = trees.firsts[m + 1, 1] - begin - 1
     face = guess
     foot, part = _on_face(x, corners, face)
-    square, enough = min(_square(x, foot), most * most), enough * enough
+    square, enough = min(squared(x, foot), most * most), enough * enough
     stack[0, 0], stack[0, 1], size = 0.0, 0.0, 1
     while size:
         size -= 1
@@ -85,8 +79,8 @@ def nearest_in(x, m, guess, most, trees, stack, enough):
             leaf = begin + node - leaves + 1
             for f in range(trees.starts[leaf], trees.starts[leaf + 1]):
                 place, its = _on_face(x, corners, f)
-                if _square(x, place) < square:
-                    square, face, part, foot = _square(x, place), f, its, place
+                if squared(x, place) < square:
+                    square, face, part, foot = squared(x, place), f, its, place
             continue
         first, second = 2 * node + 1, 2 * node + 2
         near = _beyond_box(x, trees.boxes, root + first)
@@ -141,7 +135,11 @@ def least_in_field(x, side, m, trees, fields):
     n += (up if a > 0.5 else 0) + (columns if b > 0.5 else 0) + (1 if c > 0.5 else 0)
     foot = _on_face(x, trees.corners, fields.face[n])[0]
     near = math.sqrt(max(square, 0.0)) - math.sqrt(p * p + q * q + r * r)
-    return near if near > 0.0 else -math.sqrt(_square(x, foot)), foot, n  # as if it were inside
+    return (
+        near if near > 0.0 else -math.sqrt(squared(x, foot)),
+        foot,
+        n,
+    )  # as if it were inside
 
 
 @inline
