@@ -32,7 +32,7 @@ from softreach.workspace.free import CLEAR, FreeGraph, FreeMotions, free_grid, f
 if TYPE_CHECKING:
     import xarray as xr
 
-_CELLS = {1: (1024,), 2: (64, 256), 3: (24, 48, 72)}  # along each free bundle, until a path is
+_CELLS = {1: (1024,), 2: (64, 256), 3: (24, 48)}  # along each free bundle, until a path is
 _RANDOM, _NEIGHBORS = (1000, 4000, 16_000), 16  # activations with more bundles
 _SHORTEST = 2.0**-11  # share that a motion is cut into
 _ROUNDS, _TOGETHER = 40, 16  # of shortening, and motions tried in each
@@ -111,8 +111,8 @@ def _planned(
 
 def _goals(motions: FreeMotions, first: Array, position: ArrayLike, seed: int) -> Array:
     """Free activations that put the tip at a place, the nearest first, shape (k, bundles)."""
-    place, options = as_points("goal_position", position), {"family": _FAMILY, "seed": seed}
-    (solution,) = solve_inverse(motions.clearance.whole, place, near=first, free=True, **options)
+    whole, place = motions.clearance.whole, as_points("goal_position", position)
+    (solution,) = solve_inverse(whole, place, near=first, family=_FAMILY, seed=seed, free=True)
     if not len(solution):
         why = solution.status.name.lower().replace("_", " ")
         raise NotPossible(f"no free activation puts the tip at goal_position, which is {why}")
@@ -149,9 +149,9 @@ def _are_parted(grid: FreeGraph, cells: int, first: Array, last: Array) -> bool:
     box, m = grid.motions.box, grid.motions.box.dimension
     (depth,), _ = grid.motions.largest(box.widths[None] / (2.0 * cells))
     touches = (grid.clearance < -depth) & (grid.which >= 0)
-    number, _ = label(~touches.reshape((cells,) * m), np.ones((3,) * m))
+    number: Any = label(~touches.reshape((cells,) * m), np.ones((3,) * m))
     places = box.to_cube(np.stack([first, last]))[:, box.free] * cells
-    a, b = number[tuple(np.clip(places.astype(int), 0, cells - 1).T)]
+    a, b = number[0][tuple(np.clip(places.astype(int), 0, cells - 1).T)]
     return bool(a != b)
 
 
