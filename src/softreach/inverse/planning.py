@@ -35,8 +35,7 @@ if TYPE_CHECKING:
 _CELLS = {1: (1024,), 2: (64, 256), 3: (24, 48)}  # along each free bundle, until a path is
 _RANDOM, _NEIGHBORS = (1000, 4000, 16_000), 16  # activations with more bundles
 _SHORTEST = 2.0**-11  # share that a motion is cut into
-_ROUNDS, _TOGETHER = 40, 16  # of shortening, and motions tried in each
-_GAIN = 1e-3  # of the length of a path, that a shortcut must spare
+_ROUNDS, _TOGETHER, _GAIN = 40, 16, 1e-3  # shortcuts: rounds, trials in each, least that they spare
 _FAMILY = 16  # solutions for a goal that are looked at, with four free bundles or more
 
 
@@ -52,9 +51,8 @@ def plan(
 ) -> xr.Dataset:
     """A path of activation that keeps the whole arm clear of its surroundings and of itself.
 
-    Up to three free bundles finer and finer cells of the activation box are searched until free
-    ones connect start and goal; where cells that touch a solid everywhere part them, there is no
-    path. With more bundles random activations are linked, which proves nothing.
+    Up to three free bundles a grid of free activations is searched; where cells that touch a solid
+    everywhere part start and goal, there is no path. With more bundles activations are random.
 
     Args:
         arm: The design with its `surroundings`, or its tip map; without loads.
@@ -120,7 +118,6 @@ def _goals(motions: FreeMotions, first: Array, position: ArrayLike, seed: int) -
 
 
 def _corners(motions: FreeMotions, first: Array, last: Array, seed: int) -> Array:
-    """Corners of a free path, shape (k, bundles)."""
     ends, rng = np.stack([first, last]), np.random.default_rng(seed)
     if motions.check(ends[:1], ends[1:], _SHORTEST)[0] == CLEAR:
         return ends
@@ -173,7 +170,6 @@ def _on_links(graph: FreeGraph, first: Array, last: Array) -> Array | None:
 
 
 def _shortened(motions: FreeMotions, path: Array, rng: np.random.Generator) -> Array:
-    """The path with shortcuts between random places on it."""
     scales = motions.box.scales
     for _ in range(_ROUNDS):
         lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0) / scales, axis=1)))
