@@ -150,7 +150,7 @@ def test_a_place_behind_a_hole_is_reached_only_through_the_wall(monkeypatch):
     found = free_set(MAZE, cells=20)
     assert found.walled_off > 3.0 * found.walled_off_error
     parts = sum(float(found[name]) for name in ("reached", "walled_off", "blocked"))
-    assert parts == pytest.approx(reachable_set(TRUNK).volume, rel=0.01)
+    assert parts == pytest.approx(reachable_set(TRUNK).volume, rel=0.02)
     tip = sr.tip_positions(MAZE, THREADED + [0.08, -0.04, -0.04])[0]
     assert int(found.state.sel(dict(zip("xyz", tip, strict=True)), method="nearest")) == 2
     cells = [float((found.state == k).sum()) * found.attrs["cell"] ** 3 for k in (1, 2)]
