@@ -1,8 +1,8 @@
 """Free paths of activation: from one configuration to another without touching anything.
 
-Links between activations that are free (`workspace.free`) hold the path: neighbors on a grid up to
-three free bundles, random ones with more [Kavraki1996]. It is then shortened. Every piece is
-certified by `workspace.free`: between two rows no point of the arm moves as far as it is clear.
+Links between free activations (`workspace.free`) hold the path: neighbors on a grid, or with more
+than three free bundles random ones [Kavraki1996]. Shortcuts shorten it. Between two of its rows no
+point of the arm moves as far as it is clear.
 """
 
 from __future__ import annotations
@@ -32,11 +32,10 @@ from softreach.workspace.free import CLEAR, FreeGraph, FreeMotions, free_grid, f
 if TYPE_CHECKING:
     import xarray as xr
 
-_CELLS = {1: (1024,), 2: (64, 256), 3: (24, 48, 72)}  # along each free bundle, until a path is
+_CELLS = {1: (1024,), 2: (64, 256), 3: (24, 48)}  # along each free bundle, until a path is
 _RANDOM, _NEIGHBORS = (1000, 4000, 16_000), 16  # activations with more bundles
 _SHORTEST = 2.0**-11  # share that a motion is cut into
-_ROUNDS, _TOGETHER = 40, 16  # of shortening, and motions tried in each
-_GAIN = 1e-3  # of the length of a path, that a shortcut must spare
+_ROUNDS, _TOGETHER, _GAIN = 40, 16, 1e-3  # shortcuts: rounds, trials in each, least that they spare
 _FAMILY = 16  # solutions for a goal that are looked at, with four free bundles or more
 
 
@@ -52,9 +51,8 @@ def plan(
 ) -> xr.Dataset:
     """A path of activation that keeps the whole arm clear of its surroundings and of itself.
 
-    Up to three free bundles finer and finer cells of the activation box are searched until free
-    ones connect start and goal; where cells that touch a solid everywhere part them, there is no
-    path. With more bundles random activations are linked, which proves nothing.
+    Up to three free bundles a grid of free activations is searched; where cells that touch a solid
+    everywhere part start and goal, there is no path. With more bundles activations are random.
 
     Args:
         arm: The design with its `surroundings`, or its tip map; without loads.
@@ -80,7 +78,7 @@ def plan(
     if (goal is None) == (goal_position is None):
         raise InvalidInput("goal", goal, "either activations, or a goal_position")
     first = motions.free_at("start", start)
-    goals = [goal] if goal_position is None else _goals(motions, first, goal_position, seed)
+    goals: Any = [goal] if goal_position is None else _goals(motions, first, goal_position, seed)
     for each in goals[:-1]:
         with suppress(NotPossible):
             return _planned(motions, first, each, rates, seed)
@@ -93,7 +91,7 @@ def _planned(
     import xarray as xr
 
     corners = _corners(motions, first, motions.free_at("goal", goal), seed)
-    _, k, share, clearance = motions.check(corners[:-1], corners[1:], _SHORTEST)
+    _, k, share, clearance = motions.check(corners[:-1], corners[1:], shortest=_SHORTEST)
     rows = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     once = np.append(share[:-1] < 1.0, True)  # each corner
     rows, clearance, tip_map = rows[once], clearance[once], motions.clearance.whole
@@ -111,8 +109,8 @@ def _planned(
 
 def _goals(motions: FreeMotions, first: Array, position: ArrayLike, seed: int) -> Array:
     """Free activations that put the tip at a place, the nearest first, shape (k, bundles)."""
-    place, options = as_points("goal_position", position), {"family": _FAMILY, "seed": seed}
-    (solution,) = solve_inverse(motions.clearance.whole, place, near=first, free=True, **options)
+    whole, place = motions.clearance.whole, as_points("goal_position", position)
+    (solution,) = solve_inverse(whole, place, near=first, family=_FAMILY, seed=seed, free=True)
     if not len(solution):
         why = solution.status.name.lower().replace("_", " ")
         raise NotPossible(f"no free activation puts the tip at goal_position, which is {why}")
@@ -120,9 +118,8 @@ def _goals(motions: FreeMotions, first: Array, position: ArrayLike, seed: int) -
 
 
 def _corners(motions: FreeMotions, first: Array, last: Array, seed: int) -> Array:
-    """Corners of a free path, shape (k, bundles)."""
     ends, rng = np.stack([first, last]), np.random.default_rng(seed)
-    if motions.check(ends[:1], ends[1:], _SHORTEST)[0] == CLEAR:
+    if motions.check(ends[:1], ends[1:], shortest=_SHORTEST)[0] == CLEAR:
         return ends
     for graph, cells in _graphs(motions, rng):
         if cells and _are_parted(graph, cells, first, last):
@@ -149,9 +146,9 @@ def _are_parted(grid: FreeGraph, cells: int, first: Array, last: Array) -> bool:
     box, m = grid.motions.box, grid.motions.box.dimension
     (depth,), _ = grid.motions.largest(box.widths[None] / (2.0 * cells))
     touches = (grid.clearance < -depth) & (grid.which >= 0)
-    number, _ = label(~touches.reshape((cells,) * m), np.ones((3,) * m))
+    number: Any = label(~touches.reshape((cells,) * m), np.ones((3,) * m))
     places = box.to_cube(np.stack([first, last]))[:, box.free] * cells
-    a, b = number[tuple(np.clip(places.astype(int), 0, cells - 1).T)]
+    a, b = number[0][tuple(np.clip(places.astype(int), 0, cells - 1).T)]
     return bool(a != b)
 
 
@@ -173,7 +170,6 @@ def _on_links(graph: FreeGraph, first: Array, last: Array) -> Array | None:
 
 
 def _shortened(motions: FreeMotions, path: Array, rng: np.random.Generator) -> Array:
-    """The path with shortcuts between random places on it."""
     scales = motions.box.scales
     for _ in range(_ROUNDS):
         lengths = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path, axis=0) / scales, axis=1)))
@@ -181,7 +177,7 @@ def _shortened(motions: FreeMotions, path: Array, rng: np.random.Generator) -> A
         ends = np.stack([np.interp(cuts, lengths, x) for x in path.T], axis=-1)
         gain = np.diff(cuts, axis=1)[:, 0]
         gain -= np.linalg.norm(np.diff(ends, axis=1)[:, 0] / scales, axis=1)
-        gain[motions.check(ends[:, 0], ends[:, 1], _SHORTEST)[0] != CLEAR] = 0.0
+        gain[motions.check(ends[:, 0], ends[:, 1], shortest=_SHORTEST)[0] != CLEAR] = 0.0
         best = gain.argmax()
         if gain[best] > _GAIN * lengths[-1]:
             before, after = path[lengths < cuts[best, 0]], path[lengths > cuts[best, 1]]

@@ -7,8 +7,7 @@ length, and carries what lies beyond it. No point of the arm therefore moves far
 
 with the longest arc ℓ from there to the tip, or to the point of a tool. Two configurations clear
 the straight motion between them where their clearances add up to more; other motions are halved.
-Neighbors in the activation box are linked by such motions alone, so that no wall is passed, however
-thin it is. A way that is narrower than a cell of the box may be missed.
+Neighbors in the activation box are linked by such motions alone: no wall is passed, however thin.
 """
 
 from __future__ import annotations
@@ -53,9 +52,8 @@ _ALONG = 48  # cells of space along the mean side of the set
 class FreeMotions:
     """Which straight motions between activations keep an arm clear of everything.
 
-    Clearances count parts of the arm as near each other once their gap is below half of their
-    width, so that no step closes so much. Only where an arm bends to a radius below 1.5 of its own
-    may they begin to count nearer, between two configurations.
+    Clearances count parts of the arm once their gap is below half of their width, so that no step
+    closes so much. Only of an arm bent to a radius below 1.5 of its own may they begin to nearer.
     """
 
     def __init__(self, tip_map: TipMap, margin: float = 0.0) -> None:
@@ -128,7 +126,7 @@ class FreeMotions:
         return inner @ self._rates[0], inner @ self._rates[1]
 
     def check(
-        self, begin: Array, end: Array, shortest: float, known: Any = None
+        self, begin: Array, end: Array, *, shortest: float, known: Any = None
     ) -> tuple[Index, Index, Array, Array]:
         """Check straight motions between activations (n, bundles), down to the shortest share.
 
@@ -189,7 +187,8 @@ class FreeGraph:
         self.links, self._maybe = left[:0], left[:0]
         while len(left):
             chosen, left = np.split(left, [some])
-            found = motions.check(*gamma[chosen.T], _SHORTEST, self.clearance[chosen.T])[0]
+            (a, b), known = gamma[chosen.T], self.clearance[chosen.T]
+            found = motions.check(a, b, shortest=_SHORTEST, known=known)[0]
             self.links = np.concatenate([self.links, chosen[found == CLEAR]])
             self._maybe = np.concatenate([self._maybe, chosen[found == UNDECIDED]])
             part = components(self.links, len(gamma))
@@ -201,9 +200,8 @@ class FreeGraph:
         apart = self.motions.box.to_cube(self.gamma) - self.motions.box.to_cube(gamma)
         away = np.where(self.is_free, (apart**2).sum(axis=1), np.inf)
         nodes = np.argsort(away)[:_NEAR]
-        begin = np.tile(gamma, (len(nodes), 1))
-        outcome = self.motions.check(begin, self.gamma[nodes], _SHORTEST_TO_NODES)[0]
-        return nodes[outcome == CLEAR]
+        ends = np.tile(gamma, (len(nodes), 1)), self.gamma[nodes]
+        return nodes[self.motions.check(*ends, shortest=_SHORTEST_TO_NODES)[0] == CLEAR]
 
     def connected(self, gamma: Array) -> tuple[Mask, Mask]:
         """Masks of nodes that are connected with an activation, and of free ones that may be."""
@@ -213,7 +211,7 @@ class FreeGraph:
         return sure, maybe & self.is_free
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def free_grid(motions: FreeMotions, cells: int) -> FreeGraph:
     """The middles of so many cells along each free bundle, the last of which varies fastest."""
     sizes = (cells,) * motions.box.dimension
@@ -226,20 +224,19 @@ def free_grid(motions: FreeMotions, cells: int) -> FreeGraph:
 def free_set(arm: Manipulator | TipMap, *, cells: int = 64) -> xr.Dataset:
     """The parts of the reachable set that an arm gets to with and without touching anything.
 
-    The activation box of three free bundles is cut into n³ cells. A cell is free where the arm
-    touches nothing at its middle. Free neighbors are connected where the motion between their
-    middles is certified (`FreeMotions`), and what is connected with rest is reached. Errors
-    are what half as many cells along each bundle change, and what comes too near to be certified.
+    The activation box of three free bundles is cut into n³ cells, which are free where the arm
+    touches nothing at their middles. Free neighbors are connected where the motion between them is
+    certified, and what is connected with rest is reached. Errors are what half as many cells along
+    each bundle change, and what comes too near to be certified.
 
     Args:
         arm: The design with its `surroundings`, or its tip map; without loads.
         cells: Cells n along each bundle, rounded to an even number. The work grows as n³.
 
     Returns:
-        Dataset with volumes [m³] that add up to that of the reachable set, and their errors:
-        `reached` by free motions from rest; `walled_off`, where the arm is free, but to which it
-        gets through a wall alone; `blocked`, which the tip reaches only in contact. `state` says
-        the same of cells of space, over x, y and z [m]: 1, 2, 3; 0 out of reach.
+        Dataset of volumes [m³] that add up to that of the reachable set, with errors: `reached` by
+        free motions; `walled_off`, where the arm is free but gets through a wall alone; `blocked`,
+        which it reaches in contact. `state` (x, y, z) has them as 1, 2, 3; 0 is out of reach.
 
     Raises:
         InvalidInput: A number of cells out of range.
@@ -252,13 +249,12 @@ def free_set(arm: Manipulator | TipMap, *, cells: int = 64) -> xr.Dataset:
     rest = motions.free_at("rest", None)
     grid = LiftedGrid.of(motions.clearance.whole, 2 * half)
     lattice = Lattice.around(grid.tips, float(np.cbrt(np.ptp(grid.tips, axis=0).prod())) / _ALONG)
-    fine = _images(free_grid(motions, 2 * half), rest, grid, lattice)
-    coarse = _images(free_grid(motions, half), rest, grid.coarser(), lattice)
-    return _dataset(fine, coarse)
+    return _dataset(*(_images(motions, rest, each, lattice) for each in (grid, grid.coarser())))
 
 
-def _images(graph: FreeGraph, rest: Array, grid: LiftedGrid, lattice: Lattice) -> list[Image]:
+def _images(motions: FreeMotions, rest: Array, grid: LiftedGrid, lattice: Lattice) -> list[Image]:
     """Images of the cells that are reached, that may be, that are free, and of all."""
+    graph = free_grid(motions, grid.n)
     masks = (each.reshape((grid.n,) * 3) for each in (*graph.connected(rest), graph.is_free))
     some = [replace(grid, is_lifted=~mask, finer=None) for mask in masks]
     return [image_of(each, lattice) for each in (*some, grid)]
