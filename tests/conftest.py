@@ -71,12 +71,6 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(7)
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests in the browser begin the share of one worker, so that there is one page."""
-    items.sort(key=lambda item: not item.path.stem.endswith("in_browser"))
-
-
 def pytest_collection_finish() -> None:
     """Thousands of tests and all modules stay to the end: no search for garbage looks at them."""
     gc.collect()
