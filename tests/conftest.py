@@ -20,7 +20,7 @@ from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 pytest_plugins = ["tests.durations"]
 
-for profile, examples in {"usual": 8, "large": 25}.items():
+for profile, examples in {"usual": 5, "large": 25}.items():
     settings.register_profile(
         profile,
         derandomize=True,
