@@ -7,7 +7,7 @@ READY := .venv/.ready
 # Bytecode is kept whatever the environment says, or every process would compile all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo test test-all test-lowest test-newest tests all-tests ready free-kernels loaded-kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all test-lowest test-newest tests all-tests ready free-kernels loaded-kernels flat-kernels collected browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -38,7 +38,7 @@ demo: setup
 	$(BIN)/softreach demo --out out --overwrite
 
 # Tests side by side, up to four on as many cores.
-TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
+TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 # The checks run beside the compilers of the kernels, which have a core each, and so does what every
 # process of the tests would else do anew: turn their assertions into ones that tell values.
@@ -55,7 +55,7 @@ all-tests:
 	$(TESTS) -m "large or not large"
 
 ready: setup
-	$(MAKE) --no-print-directory -j2 --output-sync=target free-kernels loaded-kernels check browser collected
+	$(MAKE) --no-print-directory -j2 --output-sync=target free-kernels loaded-kernels flat-kernels check browser collected
 
 # Compiled once here, and not by every process of the tests.
 free-kernels: setup
@@ -63,6 +63,9 @@ free-kernels: setup
 
 loaded-kernels: setup
 	$(BIN)/softreach warmup --only loaded
+
+flat-kernels: setup
+	$(BIN)/softreach warmup --only flat
 
 collected: setup
 	@$(BIN)/python -m pytest -q -q --collect-only >/dev/null || true  # the tests say why

@@ -20,7 +20,7 @@ from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 pytest_plugins = ["tests.durations"]
 
-for profile, examples in {"usual": 8, "large": 25}.items():
+for profile, examples in {"usual": 5, "large": 25}.items():
     settings.register_profile(
         profile,
         derandomize=True,
@@ -69,12 +69,6 @@ def closed_figures() -> Iterator[None]:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(7)
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests in the browser begin the share of one worker, so that there is one page."""
-    items.sort(key=lambda item: not item.path.stem.endswith("in_browser"))
 
 
 def pytest_collection_finish() -> None:

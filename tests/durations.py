@@ -1,4 +1,6 @@
-"""How long each test takes, for `make quick`: it leaves out what took over a twentieth of a second.
+"""How long each test takes: workers begin with slow files, and `make quick` leaves slow tests out.
+
+A test is slow that takes over a twentieth of a second.
 
 `pytest --record` writes `durations.json` after a run of all tests: the seconds of each such test
 function with its slowest fixture; the slowest of its cases counts. `pytest --record --quick` adds
@@ -6,11 +8,13 @@ what is slow only where those before it are left out, as it is the first to use 
 """
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
 
 import pytest
+from xdist.scheduler import LoadFileScheduling
 
 FILE = Path(__file__).with_suffix(".json")
 SLOW = 0.05  # [s]
@@ -23,6 +27,32 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(Durations(), "durations")
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadFileScheduling:
+    return ByFile(config, log)
+
+
+class ByFile(LoadFileScheduling):
+    """A worker has whole files, whose fixtures are made once, and one has all that share a page."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = super()._split_scope(nodeid)
+        return "browser" if file.endswith("in_browser.py") else file
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Slow files first, so that all workers end at about the same time."""
+    seconds: Counter[str] = Counter()
+    for name, slow in json.loads(FILE.read_text("utf-8")).items():
+        seconds[file_of(name)] += slow
+    items.sort(key=lambda item: seconds[file_of(item.nodeid)], reverse=True)
+    items.sort(key=lambda item: not file_of(item.nodeid).endswith("in_browser.py"))
+
+
+def file_of(nodeid: str) -> str:
+    return nodeid.partition("::")[0]
 
 
 def function_of(nodeid: str) -> str:

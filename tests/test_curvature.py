@@ -22,7 +22,7 @@ from tests.laws import arms, in_box
 
 @pytest.fixture(scope="module")
 def cloud():
-    return sr.compute_cloud(sr.designs.minimal_trunk(), n=30_000, seed=3)
+    return sr.compute_cloud(sr.designs.minimal_trunk(), n=10_000, seed=3)
 
 
 @pytest.fixture(scope="module")

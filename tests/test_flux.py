@@ -160,7 +160,7 @@ def test_a_fold_at_one_corner_is_found():
 def test_folds_thinner_than_a_cell_of_the_grid_are_found_at_its_vertices(accuracy):
     # det J = 1 + 2 cos(2 π k x - phase)
     for turns in (3, 7):
-        for phase in np.linspace(0.0, 2 * np.pi, 5):
+        for phase in (0.0, 1.0, 4.0):
 
             def waved(x, rate=2 * np.pi * turns, phase=phase):
                 return columns(x[:, 0] + 2.0 * np.sin(rate * x[:, 0] - phase) / rate, *x.T[1:])

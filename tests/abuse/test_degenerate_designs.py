@@ -90,7 +90,7 @@ def test_results_over_l_do_not_depend_on_l(length, taper):
 @pytest.mark.parametrize("arm", [frozen(0, 1), frozen(1, 2), frozen(0, 2), many(1)])
 @pytest.mark.parametrize("sampler", ["uniform", "boundary"])
 def test_the_tips_of_one_bundle_lie_on_a_curve_that_has_no_volume(arm, sampler):
-    tip = sr.compute_cloud(arm, 5_000, sampler=sampler).tip
+    tip = sr.compute_cloud(arm, 2_000, sampler=sampler).tip
     hull = sr.concave_hull(tip)
     assert (hull.volume, len(hull.faces), hull.regions) == (0.0, 0, 0)
 
@@ -120,7 +120,7 @@ def test_a_cloud_fills_as_many_dimensions_as_it_has_free_bundles(arm, dimension)
 @pytest.mark.parametrize("jitter", [0.0, pytest.param(1e-15, marks=pytest.mark.large), 1e-9])
 @pytest.mark.parametrize("curve", ["circle", "helix", "moment curve"])
 def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(curve, jitter):
-    t = np.random.default_rng(0).random(5_000)
+    t = np.random.default_rng(0).random(2_000)
     angle = 12.0 * t if curve == "helix" else 2 * np.pi * t
     points = {
         "circle": np.stack([np.cos(angle), np.sin(angle), 0.3 * np.cos(angle)], axis=1),

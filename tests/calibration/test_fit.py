@@ -152,7 +152,7 @@ def test_bands_are_those_of_the_arms_that_are_as_likely():
     inputs = random_inputs(arm, 3, seed=9)
     places, sigma = result.predict(inputs, numbers_only=True)
     np.testing.assert_allclose(places, marker_positions(result.arm, inputs, 1e-9), atol=1e-7)
-    best, spread = result.band(lambda other: marker_positions(other, inputs), count=200)
+    best, spread = result.band(lambda other: marker_positions(other, inputs), count=100)
     np.testing.assert_allclose(best, places, atol=1e-6)
     np.testing.assert_allclose(spread, sigma, rtol=0.3, atol=1e-6)
 
@@ -244,7 +244,7 @@ ARMS = [hanging_tentacle(), hanging_tentacle(HEAVY), pulled_wire(), pulled_wire(
 
 @pytest.mark.parametrize("arm", ARMS)
 def test_places_are_those_of_the_markers_or_of_the_tip(arm):
-    inputs = (1.0 if arm.markers else 0.3) * random_inputs(arm, 5)
+    inputs = (1.0 if arm.markers else 0.3) * random_inputs(arm, 2)
     places = model_of(arm, ["pose"], inputs).of_arm(arm).places
     if arm.markers:
         np.testing.assert_allclose(places, marker_positions(arm, inputs, 1e-9), atol=1e-8)

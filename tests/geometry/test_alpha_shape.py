@@ -220,7 +220,7 @@ def test_box_by_box_the_shape_is_that_of_the_whole_triangulation(name, monkeypat
     monkeypatch.setattr(alpha_shape, "WORTHWHILE", np.inf)
     shape = alpha_complex(BOXED[name])
     radii = np.unique(shape.radii[np.isfinite(shape.radii)]) if len(shape.radii) else [1.0]
-    for alpha in (*np.quantile(radii, [0.0, 0.2, 0.6, 0.95], method="nearest"), 2 * radii[-1]):
+    for alpha in (*np.quantile(radii, [0.2, 0.6], method="nearest"), 2 * radii[-1]):
         for boxes in (1, 2, 5):
             hull, _ = alpha_hull(BOXED[name], alpha, boxes=boxes)
             assert_equal_hulls(hull, shape.hull(alpha))

@@ -57,7 +57,7 @@ def test_tips_of_arms_under_payload_on_their_bounds_are_reached(bundles):
 )
 def test_exact_tips_on_bounds_are_reached_by_maps_of_any_tolerance(bundles, tol):
     arm = bounded_design(bundles, bundles, loaded=False)
-    check_reached(arm, boundary_tips(arm, 24, tol)[1], tol)
+    check_reached(arm, boundary_tips(arm, 10, tol)[1], tol)
 
 
 @pytest.mark.parametrize("place", ["corners", "edges", "faces"])

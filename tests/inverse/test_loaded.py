@@ -42,7 +42,7 @@ def heavy() -> Manipulator:
 @pytest.fixture(scope="module")
 def stable(heavy):
     """Stable activations, the tips that they are solved for, and the answers."""
-    gamma = np.random.default_rng(0).uniform(*heavy.bounds.T, (20_000, 3))
+    gamma = np.random.default_rng(0).uniform(*heavy.bounds.T, (200, 3))
     gamma = gamma[loaded(heavy).status(gamma) == TipStatus.STABLE][40:60]
     targets = as_tip_map(heavy).tips_and_slopes(gamma)[0]
     return gamma, targets, solve_inverse(heavy, targets)
@@ -207,10 +207,15 @@ def test_a_path_ends_by_name_where_its_posture_loses_its_stability(start, ahead)
 
 
 @pytest.fixture(scope="module")
-def two_postures():
-    """An arm that holds two postures at some activations: tips of those straight from rest and of
-    others, activations, and the answers."""
-    arm = hanging(0.030)
+def prepared():
+    """An arm that holds two postures at some activations."""
+    return prepared_map(hanging(0.030), cells=12)
+
+
+@pytest.fixture(scope="module")
+def two_postures(prepared):
+    """That arm, tips of postures straight from rest and of others, activations, and the answers."""
+    arm = prepared.tip_map.arm
     tip_map, n = as_tip_map(arm), 9
     nodes = tip_map.box.from_free_cube(np.indices((n + 1,) * 3).reshape(3, -1).T / n)
     held = tip_map.held(nodes, (n + 1,) * 3)
@@ -222,7 +227,6 @@ def two_postures():
     maps = [tip_map.continued_from(gamma[[k]], held.frames[[k]]) for k in chosen]
     pairs = zip(maps, chosen, strict=True)
     tips = np.array([each.tips_and_slopes(gamma[[k]])[0][0] for each, k in pairs])
-    prepared = prepared_map(arm, cells=12)
     return arm, gamma[chosen], tips, np.isin(chosen, others), solve_inverse(prepared, tips)
 
 
@@ -256,10 +260,10 @@ def test_paths_and_drags_begin_in_the_posture_of_a_solution(two_postures):
     assert np.allclose(dragged.activation, inside, atol=1e-6)
 
 
-def test_only_postures_from_rest_are_given_where_no_others_are_asked_for(two_postures):
-    arm, gamma, tips, is_other, _ = two_postures
+def test_only_postures_from_rest_are_given_where_no_others_are_asked_for(prepared, two_postures):
+    _, gamma, tips, is_other, _ = two_postures
     k = np.flatnonzero(is_other)[:1]
-    solutions = solve_inverse(prepared_map(arm, cells=12), tips[k], from_rest=True)
+    solutions = solve_inverse(prepared, tips[k], from_rest=True)
     assert not (np.abs(solutions.activations - gamma[k]).max(axis=1) < 1e-3).any()
 
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm
 from scipy.optimize import least_squares, minimize
 
 Array = np.ndarray
@@ -15,6 +14,16 @@ class Tendon:
 
     disks: tuple[int, ...]
     holes: tuple[tuple[float, float], ...]
+
+
+def arcs(strains: Array) -> tuple[Array, Array]:
+    """Ends and turns of arcs with (λ, ω), shape (arc, 4), by Rodrigues' formula."""
+    x = np.linalg.norm(strains[:, 1:], axis=1)[:, None, None]
+    w = np.cross(np.eye(3), strains[:, None, 1:])
+    sine, cosine = np.sinc(x / np.pi), 0.5 * np.sinc(0.5 * x / np.pi) ** 2
+    cubic = np.where(x > 1e-3, (1.0 - sine) / np.maximum(x, 1e-3) ** 2, 1.0 / 6.0)
+    moved = np.eye(3) + cosine * w + cubic * w @ w
+    return moved[:, :, 2] * strains[:, :1], np.eye(3) + sine * w + cosine * w @ w
 
 
 @dataclass(frozen=True)
@@ -29,11 +38,10 @@ class ArcChain:
     def disks(self, strains: Array) -> tuple[Array, Array]:
         """Places and rotations of the disks at (λ - h, ω) of the arcs, shape (arc, 4)."""
         places, turns = [np.zeros(3)], [np.eye(3)]
-        for h, (rise, x, y, z) in zip(self.lengths, strains, strict=True):
-            twist = np.array([[0, -z, y, 0], [z, 0, -x, 0], [-y, x, 0, h + rise], [0, 0, 0, 0]])
-            moved = expm(twist)
-            places.append(places[-1] + turns[-1] @ moved[:3, 3])
-            turns.append(turns[-1] @ moved[:3, :3])
+        ways, turned = arcs(strains + np.outer(self.lengths, [1.0, 0.0, 0.0, 0.0]))
+        for way, turn in zip(ways, turned, strict=True):
+            places.append(places[-1] + turns[-1] @ way)
+            turns.append(turns[-1] @ turn)
         return np.array(places), np.array(turns)
 
     def tendon_lengths(self, strains: Array) -> Array:

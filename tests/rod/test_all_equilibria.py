@@ -56,7 +56,7 @@ def test_their_number_is_odd_and_one_is_the_branch_of_the_unloaded_arm(gravity, 
 
 
 @pytest.mark.parametrize(
-    ("load", "starts"), [(12.0, 30), pytest.param(25.0, 60, marks=pytest.mark.large)]
+    ("load", "starts"), [(12.0, 20), pytest.param(25.0, 60, marks=pytest.mark.large)]
 )
 def test_no_random_start_of_a_chain_of_links_comes_to_another(load, starts):
     """Newton's method on the energy of a chain, from shapes with random bending."""
@@ -324,8 +324,8 @@ def held(arm):
 @pytest.mark.parametrize(
     ("arm", "follower", "numbers"),
     [
-        (CYLINDER, 0.0, (4.0, 8.0, 12.0, 15.0, 20.0, 30.0, 45.0, 60.0)),
-        (STIFF_TRUNK, 0.0, (4.0, 8.0, 12.0, 15.0, 20.0, 30.0, 45.0, 60.0)),
+        (CYLINDER, 0.0, (4.0, 12.0, 20.0, 60.0)),
+        (STIFF_TRUNK, 0.0, (4.0, 12.0, 20.0, 60.0)),
         (CYLINDER, 1e-9, (4.0, 12.0, 20.0, 45.0)),
     ],
     ids=["cylinder", "trunk", "in space"],

@@ -30,6 +30,12 @@ ANGLES = (0.0, 120.0, 240.0, 60.0, 180.0, 300.0)
 TENSIONS = 8.0 * 0.6 * np.random.default_rng(0).random((4, 6))
 
 
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    """Inputs from which the range of strains is found: no law here depends on their number."""
+    monkeypatch.setattr("softreach.arm.driving._INSIDE", 20)
+
+
 def arm_of(guides: int, kind: type[Tendon] = Tendon, **changes) -> Manipulator:
     """Two segments of three tendons; disks at the same places for all."""
     own = {"bundles": 3, "distance": AWAY, "activation_bounds": (0.0, 8.0)}
@@ -79,7 +85,7 @@ def test_tips_by_tension_are_those_of_a_chain_of_arcs():
 
 
 def test_tips_by_length_are_those_of_a_chain_of_arcs():
-    arm, chain, pulled = arm_of(4, LengthTendon), chain_of(4), pulled_in(4)
+    arm, chain, pulled = arm_of(4, LengthTendon), chain_of(4), pulled_in(2)
     tips = sr.tip_positions(arm, pulled, tol=1e-9)
     for displacement, tip in zip(pulled, tips, strict=True):
         places, _ = chain.disks(chain.at_pulled(displacement, 1e4))
@@ -114,20 +120,19 @@ def test_a_rest_shape_is_spanned_by_chords():
 
 @pytest.mark.parametrize("loads", [None, sr.Loads(payload=0.02)], ids=["free", "loaded"])
 def test_more_guides_lead_to_a_tendon_that_follows_the_arm_at_second_order(loads):
-    limit = sr.tip_positions(arm_of(0, loads=loads), TENSIONS, tol=1e-9)
-    off = [
-        np.linalg.norm(sr.tip_positions(arm_of(n, loads=loads), TENSIONS, tol=1e-9) - limit)
-        for n in (4, 8, 16)
-    ]
+    limit, *tips = (
+        sr.tip_positions(arm_of(n, loads=loads), TENSIONS[:2], tol=1e-9) for n in (0, 4, 8, 16)
+    )
+    off = [np.linalg.norm(one - limit) for one in tips]
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.08)
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.04)
 
 
 LOADED = sr.Loads(payload=0.02)
 CASES = {
-    "by tension": (arm_of(6), TENSIONS),
-    "by length": (arm_of(6, LengthTendon), pulled_in(4)),
-    "loaded": (arm_of(6, loads=LOADED), TENSIONS[:2]),
+    "by tension": (arm_of(6), TENSIONS[:2]),
+    "by length": (arm_of(6, LengthTendon), pulled_in(1)),
+    "loaded": (arm_of(6, loads=LOADED), TENSIONS[:1]),
     "loaded by length": (arm_of(2, LengthTendon, loads=LOADED), pulled_in(2)),
 }
 

@@ -203,7 +203,7 @@ def test_slopes_under_loads_are_those_of_differences(loads):
     arm = heavy(arm_of(tendons(3)))
     arm = arm.replace(loads=arm.loads.replace(**loads))
     rod, step = as_tip_map(arm, 1e-10), 1e-6
-    pulled = np.array([[0.004, 0.006, 0.005], [0.01, -0.01, 0.002]])
+    pulled = np.array([[0.01, -0.01, 0.002]])
     slopes = rod.tips_and_slopes(pulled)[1]
     for k, unit in enumerate(np.eye(3)):
         change = rod.tips(pulled + step * unit) - rod.tips(pulled - step * unit)

@@ -256,7 +256,7 @@ def errors(found, gamma):
     return np.linalg.norm(apart, axis=1), settled.mean()
 
 
-def samples(box, inside=300):
+def samples(box, inside=100):
     random = np.random.default_rng(0).random((inside, box.dimension))
     return np.concatenate([box.corners(), box.from_cube(random)])
 

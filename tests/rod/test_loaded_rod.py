@@ -63,7 +63,7 @@ def loaded(loads, tol=1e-9, arm=TRUNK, **material):
 def test_a_shooting_from_the_base_finds_the_same_rod(loads):
     found = loaded(loads)
     stations = np.array([0.0, 0.3, 0.5, 0.9, 1.0])
-    gamma = GAMMA[:2]
+    gamma = GAMMA[:1]
     shapes = posture_shapes(Solver(found.tables, found.steps, 1e-9), gamma, stations)
     tips = found.tips(gamma)
     for k, one in enumerate(gamma):

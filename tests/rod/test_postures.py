@@ -57,7 +57,7 @@ def test_strict_steps_along_lines_lead_to_the_same_postures(name, monkeypatch):
     """At least 99.9 % of all, with a tenth of the correction that is allowed otherwise."""
     make, share = ARMS[name]
     rod = LoadedRod(make())
-    gamma = random_activations(rod, 170)
+    gamma = random_activations(rod, 100)
     found = rod.equilibria(gamma)
     assert (found.status == TipStatus.STABLE).mean() >= share
     for limit in ("_CORRECTION", "_CORRECTION_OF_NODES"):

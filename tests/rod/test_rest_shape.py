@@ -94,7 +94,7 @@ def test_every_answer_speaks_of_the_bundles_of_the_arm_alone(tmp_path):
     cloud = sr.compute_cloud(arm, 200)
     sr.save_cloud(cloud, tmp_path / "cloud.zarr")
     assert sr.open_cloud(tmp_path / "cloud.zarr").sizes["bundle"] == 3
-    assert sr.reachable_set(arm).volume > 0
+    assert sr.reachable_set(arm, accuracy=0.2).volume > 0
 
 
 def test_the_range_of_bending_holds_the_bend_at_rest():
