@@ -1,12 +1,14 @@
 """Arms as models of other programs, which simulate them or run on controllers; control steps."""
 
 from softreach.models.c_source import c
+from softreach.models.elastica import ElasticaArm, pyelastica
 from softreach.models.inverse_table import InverseTable, inverse_table
 from softreach.models.local_model import LocalModel, local_model
 from softreach.models.mjcf import mujoco, write_mujoco
 from softreach.models.tracker import Tracker, TrackingStep
 
 __all__ = [
+    "ElasticaArm",
     "InverseTable",
     "LocalModel",
     "Tracker",
@@ -15,5 +17,6 @@ __all__ = [
     "inverse_table",
     "local_model",
     "mujoco",
+    "pyelastica",
     "write_mujoco",
 ]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.models.chain import chain_of
+from softreach.models.chain import elements_of
 from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.rod.rods import ArmMap, as_tip_map
 from softreach.stiffness import tip_compliance, yielding_rod
@@ -146,7 +146,10 @@ def _moves(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Ar
 
 def _masses(arm: Manipulator, nodes: int) -> tuple[Array, Array]:
     """Z of Gauss nodes of elements and of the tip [m], and the masses there [kg]."""
-    edges, (at, weights) = chain_of(arm, 12).edges[:, None], np.polynomial.legendre.leggauss(nodes)
+    edges, (at, weights) = (
+        elements_of(arm, 12).edges[:, None],
+        np.polynomial.legendre.leggauss(nodes),
+    )
     width = np.diff(edges, axis=0) / 2.0
     z = (edges[:-1] + width * (1.0 + at)).ravel()
     masses = (width * weights).ravel() * arm.section.mass_per_length_at(arm.profile, z)
