@@ -1,7 +1,5 @@
 """Arms whose models are simulated, and how a model is brought to rest."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -48,57 +46,17 @@ def at_rest(text, activations, site="tip"):
     return np.array(tips)
 
 
-def elastica_at_rest(arm, activations, elements):
-    """Tips of rods of PyElastica whose nodes and elements are in balance, shape (n, 3)."""
-    pytest.importorskip("elastica")
-    gravity, tips = np.zeros(3) if arm.loads is None else np.array(arm.loads.gravity), []
-    for activation in activations:
-        model = sr.models.pyelastica(arm, elements=elements)
-        for share in np.arange(1, 11) / 10:
-            model.activate(share * activation)
-            step = np.ones(1)
-            while np.abs(step).max() > (1e-6 if share == 1.0 else 0.03):
-                step = _newton_step(model.rod, gravity)
-                _move(model.rod, step)
-        tips.append(model.rod.position_collection[:, -1].copy())
-    return np.array(tips)
-
-
-def _unbalanced(rod, gravity):
-    """Forces and moments of PyElastica that move nodes and turn elements, (element, 6)."""
-    rod.compute_internal_forces_and_torques(0.0)
-    forces = rod.internal_forces + np.multiply.outer(gravity, rod.mass)
-    return np.concatenate([forces[:, 2:], rod.internal_torques[:, 1:]]).T
-
-
-def _newton_step(rod, gravity, small=1e-5):
-    """By central differences; an element acts on no other than its two neighbors either way."""
-    count = rod.n_elems - 1
-    kept = rod.position_collection.copy(), rod.director_collection.copy()
-    slopes = np.zeros((count, 6, count, 6))
-    for first, k in product(range(5), range(6)):
-        moved, ends = np.zeros((count, 6)), []
-        moved[first::5, k] = small
-        for step in (moved, -moved):
-            _move(rod, step)
-            ends.append(_unbalanced(rod, gravity))
-            rod.position_collection[:], rod.director_collection[:] = kept
-        for element in range(first, count, 5):
-            near = slice(max(0, element - 2), element + 3)
-            slopes[near, :, element, k] = (ends[0] - ends[1])[near] / (2.0 * small)
-    whole = slopes.reshape(6 * count, 6 * count)
-    return np.linalg.solve(whole, -_unbalanced(rod, gravity).ravel()).reshape(count, 6)
-
-
-def _move(rod, step):
-    """Move nodes and turn elements by (element, 6), so that strains change linearly."""
-    from scipy.spatial.transform import Rotation
-
-    directors, nodes = rod.director_collection[..., 1:], rod.position_collection[:, 1:]
-    gaps = np.diff(step[:, :3], axis=0, prepend=0.0).T
-    before, by_moves = (np.einsum("abe,be->ea", directors, x) for x in (np.diff(nodes), gaps))
-    strains = before + by_moves - np.cross(step[:, 3:], before)
-    turns = Rotation.from_rotvec(-step[:, 3:]).as_matrix()
-    directors[:] = np.einsum("eab,bce->ace", turns, directors)
-    ahead = np.einsum("abe,ea->be", directors, strains)
-    nodes[:, 1:] = nodes[:, :1] + np.cumsum(ahead, axis=1)
+def simulated(model, activation, frequency, seconds):
+    """The tip of a rod of PyElastica after so long under critical damping of a frequency [Hz]."""
+    elastica = pytest.importorskip("elastica")
+    parts = elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing, elastica.Damping
+    simulator, rate = type("Simulator", parts, {})(), 4.0 * np.pi * frequency
+    model.add_to(simulator)
+    step = {"uniform_damping_constant": rate, "time_step": model.time_step}
+    simulator.dampen(model.rod).using(elastica.AnalyticalLinearDamper, **step)
+    simulator.finalize()
+    model.activate(activation)
+    time, stepper = 0.0, elastica.PositionVerlet()
+    while time < seconds:
+        time = stepper.step(simulator, time, model.time_step)
+    return model.rod.position_collection[:, -1].copy()

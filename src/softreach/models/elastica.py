@@ -35,6 +35,17 @@ class ElasticaArm:
     _elements: Elements
     _table: Tables
 
+    @property
+    def time_step(self) -> float:
+        """A step of time [s], a third of what PyElastica's steppers bear at this activation."""
+        rod = self.rod
+        lengths, gaps = rod.rest_lengths[1:], rod.rest_voronoi_lengths
+        moving = 4.0 * rod.shear_matrix[2, 2, 1:] / lengths / rod.mass[1:-1].min()
+        bending = np.einsum("aae->ae", rod.bend_matrix) / gaps
+        inertia = np.einsum("aae->ae", rod.mass_second_moment_of_inertia)[:, 1:]
+        turning = (4.0 * bending + rod.shear_matrix[0, 0, 1:] * lengths) / inertia
+        return float(2.0 / 3.0 / np.sqrt(max(moving.max(), turning.max())))
+
     def add_to(self, simulator: Any) -> None:
         """Append the rod to a simulator, clamp it at its base, and let gravity act on it.
 
