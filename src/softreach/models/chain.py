@@ -9,11 +9,9 @@ it, so that an arm without loads turns as the rod does; tips converge with the s
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.actuators import LengthTendon, Tendon
 from softreach.arm.body import load_number, load_number_faults
@@ -44,14 +42,14 @@ class Elements:
 
     def inside(self, values: Array) -> Array:
         """∫ dZ over each element of values at the stations, shape (element, ...)."""
-        return self._sums(values, np.arange(0, len(self.weights), 2 * len(_NODES)))
+        return self._sums(values, 0)
 
     def between(self, values: Array) -> Array:
         """∫ dZ from base to tip, cut at the middles of the elements, shape (element + 1, ...)."""
-        middles = np.arange(len(_NODES), len(self.weights), 2 * len(_NODES))
-        return self._sums(values, np.append(0, middles))
+        return self._sums(values, len(_NODES))
 
-    def _sums(self, values: Array, starts: NDArray[np.intp]) -> Array:
+    def _sums(self, values: Array, second: int) -> Array:
+        starts = np.union1d(0, np.arange(second, len(self.weights), 2 * len(_NODES)))
         return np.add.reduceat((self.weights * np.asarray(values).T).T, starts)
 
 
@@ -68,16 +66,14 @@ class Chain(Elements):
     stretch: Array  # ∫ z dZ of slides, per activation [m], (element + 1, bundle)
 
 
-def check_simulated(
-    arm: Manipulator, model: str, forces: str, others: Mapping[str, object]
-) -> None:
-    """Refuse what no simulation of an arm has, nor others; `forces` is how it gets forces."""
+def check_simulated(arm: Manipulator, model: str) -> None:
+    """Refuse what no simulation of an arm has."""
     why = "for a model that moves"
     if faults := arm.section.modulus_faults(why) + arm.section.density_faults(why):
         raise InvalidDesign(faults)
     check_extension(arm)
     loads = arm.loads or Loads()
-    names = ("tip_force", "tip_moment", "follower_force", "follower_moment", "force_per_length")
+    weight = {name: getattr(loads, name) for name in ("gravity", "payload", "payload_arm")}
     tendons = [each for each in arm.actuators if isinstance(each, Tendon)]
     refused = {
         "drives: export the design without them, and let the controller apply their gains": (
@@ -89,11 +85,14 @@ def check_simulated(
         "tendons that guides hold: make their `guides` 0": (
             any(each.has_guides for each in tendons)
         ),
-        f"forces and moments of the loads: {forces}": (
-            loads.point_loads or any(any(getattr(loads, name)) for name in names)
+        "a rest shape of an arm with rigid pieces: leave one of them out": (
+            arm.rigid_pieces and not arm.rest.is_straight
+        ),
+        "forces and moments of the loads: set `xfrc_applied` of bodies, or a forcing of the rod": (
+            loads != Loads(**weight)
         ),
     }
-    for what, is_there in {**refused, **others}.items():
+    for what, is_there in refused.items():
         if is_there:
             raise NotPossible(f"{model} has no {what}")
 

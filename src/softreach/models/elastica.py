@@ -1,8 +1,7 @@
 """An arm as a rod of PyElastica, whose rest strains follow the activations.
 
-PyElastica's directors are in the middles of elements, between which the rod bends. A fixed element
-of hardly any length stands for the base, so that the arm bends from there to the middle of its own
-first element, too, and tips converge with the square of the length of elements.
+PyElastica's rods bend between the middles of elements. A fixed element of hardly any length stands
+for the base, so that the arm bends from there on, at second order in the length of elements.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from softreach.arm.tables import Tables, tables
 from softreach.models.chain import MOST_BODIES, Elements, check_simulated, elements_of
 from softreach.support.arguments import as_integer
 from softreach.support.arrays import as_rows
-from softreach.support.errors import InvalidInput, check_installed
+from softreach.support.errors import InvalidInput, NotPossible, check_installed
 
 _SHORT = 1e-3  # length of the fixed element over that of the next
 _SHEAR = 27.0 / 28.0 / 3.0  # shear stiffness over K0 that PyElastica takes for rubber
@@ -39,12 +38,11 @@ class ElasticaArm:
     def time_step(self) -> float:
         """A step of time [s], a third of what PyElastica's steppers bear at this activation."""
         rod = self.rod
-        lengths, gaps = rod.rest_lengths[1:], rod.rest_voronoi_lengths
+        lengths, inertia = rod.rest_lengths[1:], rod.mass_second_moment_of_inertia[0, 0, 1:]
         moving = 4.0 * rod.shear_matrix[2, 2, 1:] / lengths / rod.mass[1:-1].min()
-        bending = np.einsum("aae->ae", rod.bend_matrix) / gaps
-        inertia = np.einsum("aae->ae", rod.mass_second_moment_of_inertia)[:, 1:]
-        turning = (4.0 * bending + rod.shear_matrix[0, 0, 1:] * lengths) / inertia
-        return float(2.0 / 3.0 / np.sqrt(max(moving.max(), turning.max())))
+        bending = 4.0 * rod.bend_matrix.max(axis=(0, 1)) / rod.rest_voronoi_lengths
+        turning = (bending + rod.shear_matrix[0, 0, 1:] * lengths) / inertia
+        return float(2.0 / 3.0 / np.sqrt(np.maximum(moving, turning).max()))
 
     def add_to(self, simulator: Any) -> None:
         """Append the rod to a simulator, clamp it at its base, and let gravity act on it.
@@ -114,11 +112,10 @@ def pyelastica(arm: Manipulator, *, elements: int = 50) -> ElasticaArm:
         MissingExtra: PyElastica is not installed.
     """
     arm, count = a_manipulator("arm", arm), as_integer("elements", elements, 2, MOST_BODIES)
-    others = {
-        "rigid pieces: leave them out": bool(arm.rigid_pieces),
-        "payload beside the tip: make `payload_arm` 0": arm.loads and any(arm.loads.payload_arm),
-    }
-    check_simulated(arm, "a rod of PyElastica", "add a forcing to the rod", others)
+    check_simulated(arm, "a rod of PyElastica")
+    if arm.rigid_pieces or (arm.loads and any(arm.loads.payload_arm)):
+        sentence = "a rod of PyElastica has no rigid pieces and no payload beside its tip"
+        raise NotPossible(f"{sentence}: leave them out")
     check_installed("elastica")
     cut = elements_of(arm, count)
     model = ElasticaArm(arm, _rod(arm, cut), cut, tables(arm, cut.stations))
@@ -147,8 +144,8 @@ def _rod(arm: Manipulator, cut: Elements) -> Any:
         position=np.asarray(arm.base.position)[:, None] + ends * axes[2][:, None],
     )
     rod.mass[-1] += arm.loads.payload if arm.loads else 0.0
-    inertia = weights * arm.section.gyration_at(arm.profile, np.append(0.0, cut.nodes))
-    for k, share in enumerate((1.0, 1.0, 2.0)):
-        rod.mass_second_moment_of_inertia[k, k] = share * inertia
-        rod.inv_mass_second_moment_of_inertia[k, k] = 1.0 / (share * inertia)
+    turning = weights * arm.section.gyration_at(arm.profile, np.append(0.0, cut.nodes))
+    inertia = np.array([turning, turning, 2.0 * turning])
+    rod.mass_second_moment_of_inertia[range(3), range(3)] = inertia
+    rod.inv_mass_second_moment_of_inertia[range(3), range(3)] = 1.0 / inertia
     return rod

@@ -86,8 +86,7 @@ class LocalModel:
 def local_model(arm: Manipulator, activation: ArrayLike, damping_ratio: float = 0.05) -> LocalModel:
     """How an arm moves, yields and vibrates about its posture at an activation.
 
-    Tensions and pressures are held. Sections turn with their inertia and do not shear; a payload is
-    a point.
+    Tensions and pressures are held. Sections have rotary inertia and do not shear.
 
     Args:
         arm: The design, with moduli and densities or measured sections. Of loads it may have
@@ -133,8 +132,7 @@ def _modes(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Ar
 def _moves(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Array]:
     """F of masses, of the tip under forces on them, ∂r/∂γ of the masses, and these.
 
-    A mass moves along the axes of the base and turns about its directors, with the inertia of its
-    section: it stands in six rows.
+    Each has six rows: it moves along the axes of the base and turns about its directors.
     """
     rod, (inner, of_drives) = yielding_rod(known), known.inputs.with_slopes(x)
     z, masses = _masses(rod.arm, nodes)
@@ -151,13 +149,10 @@ def _moves(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Ar
 
 def _masses(arm: Manipulator, nodes: int) -> tuple[Array, Array]:
     """Z of Gauss nodes of elements and of the tip [m], masses and inertia there, (node, 6)."""
-    edges, (at, weights) = (
-        elements_of(arm, 12).edges[:, None],
-        np.polynomial.legendre.leggauss(nodes),
-    )
+    edges, gauss = elements_of(arm, 12).edges[:, None], np.polynomial.legendre.leggauss(nodes)
     width = np.diff(edges, axis=0) / 2.0
-    z = (edges[:-1] + width * (1.0 + at)).ravel()
-    masses = (width * weights).ravel() * arm.section.mass_per_length_at(arm.profile, z)
+    z = (edges[:-1] + width * (1.0 + gauss[0])).ravel()
+    masses = (width * gauss[1]).ravel() * arm.section.mass_per_length_at(arm.profile, z)
     turning = masses * arm.section.gyration_at(arm.profile, z)
     rows = np.column_stack([masses, masses, masses, turning, turning, 2.0 * turning])
     payload = arm.loads.payload if arm.loads else 0.0
@@ -170,7 +165,7 @@ def _unit_loads(table: NodeTables, directors: Array) -> list[NodeTables]:
     for z, own in zip(table.places, directors, strict=True):
         before = table.stations < z
         for axis in np.eye(3):
-            force, weight = np.multiply.outer(before, axis), (z == tip) * axis
-            loads.append(none._replace(force=force, weight=weight))
+            force = np.multiply.outer(before, axis)
+            loads.append(none._replace(force=force, weight=(z == tip) * axis))
         loads += [none._replace(moment=np.multiply.outer(before, axis)) for axis in own]
     return loads

@@ -64,13 +64,7 @@ def mujoco(
     tol, damping = as_number("tol", tol, _TOLERANCES), as_number("damping", damping, _DAMPINGS)
     if bodies is not None:
         bodies = as_integer("bodies", bodies, 2, MOST_BODIES)
-    sentence = "set `xfrc_applied` of a body in the simulation"
-    bent = {
-        "a rest shape of an arm with rigid pieces: leave one of them out": (
-            arm.rigid_pieces and not arm.rest.is_straight
-        )
-    }
-    check_simulated(arm, "a model of MuJoCo", sentence, bent)
+    check_simulated(arm, "a model of MuJoCo")
     chain = chain_of(arm, bodies or bodies_for(arm, tol))
     return _Model(arm, chain, damping).text()
 

@@ -162,7 +162,7 @@ class Tracker:
             if not known.is_stable[0]:
                 raise NotPossible("the arm has no stable posture at the start: lighten its loads")
             solver, side, frame = rod.postures.solver, rod.postures.side, known.frame
-            self._beside = PosturesBeside(solver, side, frame=frame)
+            self._beside = PosturesBeside(solver, side, frame=frame, found=frame.copy())
             inputs = self._origin.inputs.continued_from(inner, known.frame)
             self._map = replace(self._map, rod=rod.with_postures(self._beside), inputs=inputs)
         self._x, self._damping = x[0], _FIRST_DAMPING
@@ -190,7 +190,7 @@ class Tracker:
             angle = float(angles_from(here.directions, wanted[None])[0][0])
         bound = (np.minimum(x - self._low, self._high - x) <= _AT_END) & (self._low < self._high)
         if self._beside is not None and isinstance(rod, LoadedRod):  # it will have moved on
-            beside = replace(self._beside, frame=self._beside.frame.copy(), found={})
+            beside = replace(self._beside, frame=self._beside.frame.copy())
             tip_map = replace(tip_map, rod=rod.with_postures(beside))
         names = np.array(self._map.box.names, object)
         return TrackingStep(
@@ -209,34 +209,32 @@ class Tracker:
         """Take the trials that lead nearer; whether one ended where the arm is not stable."""
         low = np.maximum(self._low, self._x - self._most)
         high = np.minimum(self._high, self._x + self._most)
-        if wanted is not None and self._here.directions is None:
+        turns = wanted is not None
+        if turns and self._here.directions is None:
             self._here, self._is_exact = self._motion(self._x, directed=True), True
         error, slope = self._rows(self._here, target, wanted)
-        size, snaps, is_exact = math.sqrt(error @ error), False, self._is_exact
-        for k in range(_TRIALS if wanted is None else _DIRECTED_TRIALS):
+        size, snaps = math.sqrt(error @ error), False
+        for k in range(_DIRECTED_TRIALS if turns else _TRIALS):
             ease = _EASE * (k == 0 and self._damping <= _FIRST_DAMPING)
             trial = self._trial(error, slope, low, high, ease)
             if size <= _ENOUGH * self._map.tol or (trial == self._x).all():
                 break
-            motion = (
-                self._secant(trial, slope) if wanted is None else self._motion(trial, directed=True)
-            )
+            motion = self._motion(trial, directed=True) if turns else self._secant(trial, slope)
             there = self._rows(motion, target, wanted)
             ahead, before = math.sqrt(there[0] @ there[0]), size
             if ahead < size:
-                self._x, self._here, is_exact = trial, motion, wanted is not None
+                self._x, self._here, self._is_exact = trial, motion, turns
                 (error, slope), size = there, ahead
                 if self._beside is not None:
-                    self._beside.move_on()
+                    self._beside.frame[:] = self._beside.found
                 self._damping = max(0.1 * self._damping, _LEAST_DAMPING)
             else:
                 snaps |= (lost := not math.isfinite(ahead))
                 self._damping *= 1e4 if lost else 10.0
                 self._damping = min(max(self._damping, _FIRST_DAMPING), _LARGEST_DAMPING)
-            if not is_exact and not ahead < _GOOD * before:
-                self._here, is_exact = self._motion(self._x), True
+            if not self._is_exact and not ahead < _GOOD * before:
+                self._here, self._is_exact = self._motion(self._x), True
                 error, slope = self._rows(self._here, target, wanted)
-        self._is_exact = is_exact
         return snaps
 
     def _trial(self, error: Array, slope: Array, low: Array, high: Array, ease: float) -> Array:

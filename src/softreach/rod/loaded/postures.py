@@ -327,22 +327,14 @@ class PosturesBeside(Postures):
     """Those within half a radian of one that the arm is in, by one search each."""
 
     frame: Array = field(kw_only=True)  # of the posture, (1, component)
-    found: dict[bytes, Equilibria] = field(kw_only=True, default_factory=dict)  # last, and where
+    found: Array = field(kw_only=True)  # of the last that was found
 
     def find(self, gamma: Array, *, by_lines: bool = True) -> Equilibria:
-        if (last := self.found.get(gamma.tobytes())) is not None:
-            return last
         new, equilibria = self.solver.search(gamma, self.frame), self.solver.empty(len(gamma))
         near = turn_between(new.frame, self.frame) < _POLISHED
         self.solver.put(gamma, slice(None), new.only(new.is_stable & near), equilibria)
-        self.found.clear()
-        self.found[gamma.tobytes()] = equilibria
+        self.found[:] = new.frame
         return equilibria
-
-    def move_on(self) -> None:
-        """Take the posture that was found last for the one that the arm is in."""
-        for last in self.found.values():
-            self.frame[:] = last.frame
 
 
 def _turned(frame: Array, angles: Array, axes: Array) -> Array:
