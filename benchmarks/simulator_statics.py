@@ -57,14 +57,15 @@ def _unbalanced(rod: Any, gravity: np.ndarray) -> np.ndarray:
     return np.concatenate([forces[:, 2:], rod.internal_torques[:, 1:]]).T
 
 
-def _newton_step(rod: Any, gravity: np.ndarray, small: float = 1e-5) -> np.ndarray:
+def _newton_step(rod: Any, gravity: np.ndarray, small: float = 3e-5) -> np.ndarray:
     """By central differences; an element acts on no other than its two neighbors either way."""
     count = rod.n_elems - 1
+    scale = np.repeat([rod.rest_lengths[1:].min(), 1.0], 3)
     kept = rod.position_collection.copy(), rod.director_collection.copy()
     slopes = np.zeros((count, 6, count, 6))
     for first, k in product(range(5), range(6)):
         moved, ends = np.zeros((count, 6)), []
-        moved[first::5, k] = small
+        moved[first::5, k] = small * scale[k]
         for step in (moved, -moved):
             _move(rod, step)
             ends.append(_unbalanced(rod, gravity))
@@ -73,7 +74,7 @@ def _newton_step(rod: Any, gravity: np.ndarray, small: float = 1e-5) -> np.ndarr
             near = slice(max(0, element - 2), element + 3)
             slopes[near, :, element, k] = (ends[0] - ends[1])[near] / (2.0 * small)
     whole = slopes.reshape(6 * count, 6 * count)
-    return np.linalg.solve(whole, -_unbalanced(rod, gravity).ravel()).reshape(count, 6)
+    return scale * np.linalg.solve(whole, -_unbalanced(rod, gravity).ravel()).reshape(count, 6)
 
 
 def _move(rod: Any, step: np.ndarray) -> None:

@@ -157,7 +157,7 @@ def test_base_rest_shape_flat_section_and_weight_are_those_of_the_arm():
 def test_what_no_rod_of_pyelastica_has_is_refused_in_a_sentence():
     stiff, aside = (RigidPiece(start_over_length=0.5),), sr.Loads(payload_arm=(0.0, 0.0, 0.01))
     for change in ({"rigid_pieces": stiff}, {"loads": aside}, {"drives": (DRIVE,)}):
-        with pytest.raises(sr.NotPossible, match="^a rod of PyElastica has no"):
+        with pytest.raises(sr.NotPossible, match=r"^a rod of PyElastica has no"):
             sr.models.pyelastica(SOFT.replace(**change))
     with pytest.raises(sr.InvalidInput, match="activation"):
         sr.models.pyelastica(SOFT).activate([1.0])
