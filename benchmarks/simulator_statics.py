@@ -90,4 +90,4 @@ def _move(rod: Any, step: np.ndarray) -> None:
 
 
 if __name__ == "__main__":
-    main([int(count) for count in sys.argv[1:]] or [25, 50, 100])
+    main([int(count) for count in sys.argv[1:]] or [25, 100])
