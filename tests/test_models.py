@@ -54,7 +54,9 @@ def whole_arm():
     It hardly twists, as its cable would then pull along a twisted line, which no linear law has.
     """
     arm = sr.designs.three_chamber_arm()
-    section = arm.section.replace(measured=Measured(torsion_stiffness=0.1))
+    section = arm.section.replace(
+        measured=Measured(torsion_stiffness=0.1, bending_stiffness=(2e-3, 4e-3), angle=0.6)
+    )
     chambers = arm.actuators[0].replace(end_over_length=0.6)
     tendon = sr.Tendon(name="cable", distance=0.01, offset=0.3, activation_bounds=(0.0, 2.0))
     return arm.replace(

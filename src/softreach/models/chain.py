@@ -18,6 +18,7 @@ from softreach.arm.body import load_number, load_number_faults
 from softreach.arm.driving import pilot
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.section import turned
 from softreach.arm.tables import check_extension, strain_stations, tables
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, NotPossible
@@ -58,9 +59,9 @@ class Chain(Elements):
     """The elements of an arm, and the slides between their nodes."""
 
     masses: Array  # [kg], shape (element,)
-    compliance: Array  # ∫ dZ/K about the directors [1/(N m)], 0 where rigid, (element, 3)
-    turns: Array  # ∫ U dZ, per activation [rad], (element, 3, bundle)
-    rest_turns: Array  # ∫ û dZ [rad], (element, 3)
+    compliance: Array  # ∫ dZ/K about the axes of K [1/(N m)], 0 where rigid, (element, 3)
+    turns: Array  # ∫ U dZ about these, per activation [rad], (element, 3, bundle)
+    rest_turns: Array  # ∫ û dZ about these [rad], (element, 3)
     growth: Array  # Mean of dη/dγ [-], (element, bundle)
     axial_compliance: Array  # ∫ dZ/K0 of slides [m/N], 0 where rigid, (element + 1,)
     stretch: Array  # ∫ z dZ of slides, per activation [m], (element + 1, bundle)
@@ -114,13 +115,14 @@ def chain_of(arm: Manipulator, bodies: int) -> Chain:
     """The arm as a chain of about so many bodies."""
     elements = elements_of(arm, bodies)
     z = elements.stations
-    table, stiffness = tables(arm, z), arm.stiffness_at(z)
+    table, stiffness, angle = tables(arm, z), arm.stiffness_at(z), -arm.section.bending_angle
+    rest = arm.rest.curvature(z / arm.length)[..., None]
     return Chain(
         **vars(elements),
         masses=elements.inside(arm.section.mass_per_length_at(arm.profile, z)),
         compliance=elements.inside(1.0 / arm.section.resistance(stiffness)),
-        turns=elements.inside(table.curvature),
-        rest_turns=elements.inside(arm.rest.curvature(z / arm.length)),
+        turns=elements.inside(turned(table.curvature, angle)),
+        rest_turns=elements.inside(turned(rest, angle)[..., 0]),
         growth=elements.inside(table.rest_length_factor) / np.diff(elements.edges)[:, None],
         axial_compliance=elements.between(1.0 / stiffness.axial),
         stretch=elements.between(table.extension),

@@ -17,7 +17,7 @@ from softreach.arm.tables import Tables, tables
 from softreach.models.chain import MOST_BODIES, Elements, check_simulated, elements_of
 from softreach.support.arguments import as_integer
 from softreach.support.arrays import as_rows
-from softreach.support.errors import InvalidInput, NotPossible, check_installed
+from softreach.support.errors import NotPossible, check_installed
 
 _SHORT = 1e-3  # length of the fixed element over that of the next
 _SHEAR = 27.0 / 28.0 / 3.0  # shear stiffness over K0 that PyElastica takes for rubber
@@ -66,17 +66,16 @@ class ElasticaArm:
         this counts from the arm without loads, and is K/η there as in theory (57).
 
         Args:
-            activation: γ [unit of each input], shape (bundles,).
+            activation: γ [unit of each input], shape (bundles,); what exceeds a bound is the bound.
 
         Raises:
-            InvalidInput: Another shape, or activations that shorten the arm to nothing.
+            InvalidInput: Another shape, or a number that is not finite.
         """
-        allowed = f"{self.arm.bundles} numbers that keep ζ > 0"
-        gamma = as_rows("activation", activation, self.arm.bundles, allowed)[0]
+        count = self.arm.bundles
+        given = as_rows("activation", activation, count, f"{count} numbers")[0]
+        gamma = np.clip(given, *self.arm.bounds.T)
         rod, table, elements, section = self.rod, self._table, self._elements, self.arm.section
         stretch = elements.inside(1.0 + table.extension @ gamma)
-        if not (stretch > 0.0).all():
-            raise InvalidInput("activation", gamma.tolist(), allowed)
         growth = 1.0 + table.rest_length_factor @ gamma
         rest = self.arm.rest.curvature(table.stations / self.arm.length)
         turn = elements.between(growth[:, None] * (rest + table.curvature @ gamma))[:-1]
@@ -114,8 +113,7 @@ def pyelastica(arm: Manipulator, *, elements: int = 50) -> ElasticaArm:
     arm, count = a_manipulator("arm", arm), as_integer("elements", elements, 2, MOST_BODIES)
     check_simulated(arm, "a rod of PyElastica")
     if arm.rigid_pieces or (arm.loads and any(arm.loads.payload_arm)):
-        sentence = "a rod of PyElastica has no rigid pieces and no payload beside its tip"
-        raise NotPossible(f"{sentence}: leave them out")
+        raise NotPossible("a rod of PyElastica has no rigid pieces and no payload beside its tip")
     check_installed("elastica")
     cut = elements_of(arm, count)
     model = ElasticaArm(arm, _rod(arm, cut), cut, tables(arm, cut.stations))

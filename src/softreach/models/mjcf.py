@@ -11,6 +11,7 @@ from softreach.arm.actuators import Actuator, Tendon
 from softreach.arm.body import mass
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.section import turned
 from softreach.arm.tables import ends_over
 from softreach.models.chain import MOST_BODIES, Chain, bodies_for, chain_of, check_simulated
 from softreach.support.arguments import as_integer, as_number
@@ -157,9 +158,10 @@ class _Model:
 
     def _hinges(self, body: ET.Element, k: int) -> None:
         """Those of an element; their order alternates, so that what it costs cancels."""
+        axes = turned(_AXES, self.arm.section.bending_angle).T
         for axis in range(3) if k % 2 == 0 else range(2, -1, -1):
             spring = self.chain.compliance[k, axis], self.chain.rest_turns[k, axis]
-            self._joint(body, _hinge(k, axis), "hinge", _AXES[axis], *spring)
+            self._joint(body, _hinge(k, axis), "hinge", axes[axis], *spring)
 
     def _joint(
         self,
