@@ -54,13 +54,11 @@ def whole_arm():
     It hardly twists, as its cable would then pull along a twisted line, which no linear law has.
     """
     arm = sr.designs.three_chamber_arm()
-    section = arm.section.replace(
-        measured=Measured(torsion_stiffness=0.1, bending_stiffness=(2e-3, 4e-3), angle=0.6)
-    )
+    flat = Measured(torsion_stiffness=0.1, bending_stiffness=(2e-3, 4e-3), angle=0.6)
     chambers = arm.actuators[0].replace(end_over_length=0.6)
     tendon = sr.Tendon(name="cable", distance=0.01, offset=0.3, activation_bounds=(0.0, 2.0))
     return arm.replace(
-        section=section,
+        section=arm.section.replace(measured=flat),
         actuators=(chambers, tendon),
         rigid_pieces=(RigidPiece(start_over_length=0.6, end_over_length=0.7),),
         markers=(Marker(name="tip", station_over_length=0.5, offset=(0.0, 0.01, 0.0)),),
