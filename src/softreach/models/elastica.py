@@ -7,6 +7,7 @@ for the base, so that the arm bends from there on, at second order in the length
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -50,8 +51,7 @@ class ElasticaArm:
         Args:
             simulator: A `BaseSystemCollection` with `Constraints` and `Forcing`.
         """
-        import elastica
-
+        elastica: Any = import_module("elastica")
         simulator.append(self.rod)
         base = {"constrained_position_idx": (0, 1), "constrained_director_idx": (0,)}
         simulator.constrain(self.rod).using(elastica.FixedConstraint, **base)
@@ -123,8 +123,7 @@ def pyelastica(arm: Manipulator, *, elements: int = 50) -> ElasticaArm:
 
 def _rod(arm: Manipulator, cut: Elements) -> Any:
     """A straight rod of the elements and the fixed one, of the masses of the arm."""
-    import elastica
-
+    elastica: Any = import_module("elastica")
     masses = cut.inside(arm.section.mass_per_length_at(arm.profile, cut.stations))
     ends = np.append(-_SHORT * cut.edges[1], cut.edges)
     lengths, axes = np.diff(ends), arm.base.rotation.T
