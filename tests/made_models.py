@@ -44,3 +44,19 @@ def at_rest(text, activations, site="tip"):
         simulator.mj_forward(model, data)
         tips.append(data.site(site).xpos.copy())
     return np.array(tips)
+
+
+def simulated(model, activation, frequency, seconds):
+    """The tip of a rod of PyElastica after so long under critical damping of a frequency [Hz]."""
+    elastica = pytest.importorskip("elastica")
+    parts = elastica.BaseSystemCollection, elastica.Constraints, elastica.Forcing, elastica.Damping
+    simulator, rate = type("Simulator", parts, {})(), 4.0 * np.pi * frequency
+    model.add_to(simulator)
+    step = {"uniform_damping_constant": rate, "time_step": model.time_step}
+    simulator.dampen(model.rod).using(elastica.AnalyticalLinearDamper, **step)
+    simulator.finalize()
+    model.activate(activation)
+    time, stepper = 0.0, elastica.PositionVerlet()
+    while time < seconds:
+        time = stepper.step(simulator, time, model.time_step)
+    return model.rod.position_collection[:, -1].copy()

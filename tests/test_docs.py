@@ -61,6 +61,7 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     pytest.importorskip("matplotlib.pyplot")
     if page.stem == "models":
         pytest.importorskip("mujoco")
+        pytest.importorskip("elastica")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     known = {*sys.modules}

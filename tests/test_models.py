@@ -14,7 +14,7 @@ from softreach.arm.loads import PointLoad
 from softreach.arm.section import Measured
 from softreach.arm.stations import Marker, RigidPiece
 from softreach.models.mjcf import mujoco
-from tests.made_models import HANGING, SLOW, at_rest, model_arms, samples
+from tests.made_models import HANGING, SLOW, at_rest, model_arms, samples, simulated
 
 every_arm = pytest.mark.parametrize("kind", model_arms())
 
@@ -54,11 +54,11 @@ def whole_arm():
     It hardly twists, as its cable would then pull along a twisted line, which no linear law has.
     """
     arm = sr.designs.three_chamber_arm()
-    section = arm.section.replace(measured=Measured(torsion_stiffness=0.1))
+    flat = Measured(torsion_stiffness=0.1, bending_stiffness=(2e-3, 4e-3), angle=0.6)
     chambers = arm.actuators[0].replace(end_over_length=0.6)
     tendon = sr.Tendon(name="cable", distance=0.01, offset=0.3, activation_bounds=(0.0, 2.0))
     return arm.replace(
-        section=section,
+        section=arm.section.replace(measured=flat),
         actuators=(chambers, tendon),
         rigid_pieces=(RigidPiece(start_over_length=0.6, end_over_length=0.7),),
         markers=(Marker(name="tip", station_over_length=0.5, offset=(0.0, 0.01, 0.0)),),
@@ -122,6 +122,45 @@ def test_a_passive_arm_swings_as_a_cantilever_does():
     per_length = mass(arm) / arm.length
     exact = 1.8751040687**2 * math.sqrt(bending / per_length) / arm.length**2
     assert math.isclose(math.sqrt(lowest), exact, rel_tol=1e-3)
+
+
+def elastica_errors(arm, gamma, elements=(10, 20)):
+    """Of tips of rods of PyElastica at rest, in L: of the coarse, the fine, and extrapolated."""
+    exact = sr.tip_positions(arm, [gamma])[0]
+    first = sr.models.local_model(arm, gamma).frequencies[0]
+    rods = (sr.models.pyelastica(arm, elements=count) for count in elements)
+    coarse, fine = (simulated(rod, gamma, first, 3.0 / first) - exact for rod in rods)
+    errors = coarse, fine, (4.0 * fine - coarse) / 3.0
+    return [np.linalg.norm(error) / arm.length for error in errors]
+
+
+@pytest.mark.parametrize("kind", ["three_chamber_arm", "lce_arm"])
+def test_rods_of_pyelastica_swing_to_the_tip_with_the_square_of_their_elements(kind):
+    arm = model_arms()[kind]
+    coarse, fine, left = elastica_errors(arm, samples(arm, 1)[0])
+    assert 3.6 < coarse / fine < 4.4
+    assert left < 0.1 * fine
+
+
+def test_base_rest_shape_flat_section_and_weight_are_those_of_the_arm():
+    """Of one that hardly stretches or shears, which it does by another law in PyElastica."""
+    flat = Measured(axial_stiffness=500.0, bending_stiffness=(8e-3, 16e-3), angle=0.6)
+    arm = SOFT.replace(
+        section=SOFT.section.replace(measured=flat),
+        rest=RestShape(curvature_x=1.0 / SOFT.length, twist=2.0 / SOFT.length),
+        loads=sr.Loads(payload=0.005),
+        base=sr.Base(points="x", turn=0.4, position=(0.1, -0.2, 0.3)),
+    )
+    assert elastica_errors(arm, np.array([6e4, 2e4, 0.0]), (6, 12))[2] < 2e-3
+
+
+def test_what_no_rod_of_pyelastica_has_is_refused_in_a_sentence():
+    stiff, aside = (RigidPiece(start_over_length=0.5),), sr.Loads(payload_arm=(0.0, 0.0, 0.01))
+    for change in ({"rigid_pieces": stiff}, {"loads": aside}, {"drives": (DRIVE,)}):
+        with pytest.raises(sr.NotPossible, match=r"^a rod of PyElastica has no"):
+            sr.models.pyelastica(SOFT.replace(**change))
+    with pytest.raises(sr.InvalidInput, match="activation"):
+        sr.models.pyelastica(SOFT).activate([1.0])
 
 
 SOFT = sr.designs.three_chamber_arm()

@@ -128,7 +128,7 @@ def test_an_arm_under_loads_goes_on_along_its_branch():
 
 @pytest.mark.parametrize(("arm", "most"), [(FREE, 8.0), (HANGING, 6.0)], ids=["free", "hanging"])
 def test_a_step_takes_as_long_as_a_few_tips_with_their_slopes(arm, most):
-    """4.5 and 2 times as long, on their own thread, as other programs run beside."""
+    """4.5 and 1.2 times as long, on their own thread, as other programs run beside."""
     gamma, tip_map = activations_of_path(arm, steps=1000)[:150], as_tip_map(arm)
     path, tracker = sr.tip_positions(arm, gamma), sr.models.Tracker(arm, start=gamma[0])
     times = np.empty((2, len(path)))

@@ -394,6 +394,11 @@ class Section(Part):
             return values_along(mass, np.asarray(z, float) / profile.length)
         return self.mass_per_length(profile.radius(z))
 
+    def gyration_at(self, profile: Profile, z: ArrayLike) -> Array:
+        """Σ ρ I / Σ ρ A about a diameter [m²] at Z [m]; densities left out are those of water."""
+        second, fourth = (self._sum(lambda each: each.density or 1000.0, n) for n in (2, 4))
+        return 0.25 * fourth / second * profile.radius(z) ** 2
+
     def stiffness(self, radius: ArrayLike) -> Stiffness:
         """Stiffness that follows from the materials, theory (5).
 

@@ -237,7 +237,7 @@ def say_limits(arm: sr.Manipulator) -> None:
 
 
 # suffixes of points, surfaces and tables, which are no designs
-_POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".mat", ".ply", ".stl", ".obj")
+_POINTS = (".csv", ".txt", ".xyz", ".npy", ".npz", ".parquet", ".ply", ".stl", ".obj")
 
 
 def _unchanged(text: str) -> sr.Manipulator:

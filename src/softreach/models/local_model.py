@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.models.chain import chain_of
+from softreach.models.chain import elements_of
 from softreach.rod.response import NodeTables, linear_response, node_tables, rod_state, step_grid
 from softreach.rod.rods import ArmMap, as_tip_map
 from softreach.stiffness import tip_compliance, yielding_rod
@@ -86,8 +86,7 @@ class LocalModel:
 def local_model(arm: Manipulator, activation: ArrayLike, damping_ratio: float = 0.05) -> LocalModel:
     """How an arm moves, yields and vibrates about its posture at an activation.
 
-    Tensions and pressures are held. Sections do not shear and have no rotary inertia, without which
-    modes of torsion are missing and those above the first two of a thick bent arm are too high.
+    Tensions and pressures are held. Sections have rotary inertia and do not shear.
 
     Args:
         arm: The design, with moduli and densities or measured sections. Of loads it may have
@@ -131,32 +130,42 @@ def _modes(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Ar
 
 
 def _moves(known: ArmMap, x: Array, nodes: int) -> tuple[Array, Array, Array, Array]:
-    """F of masses, of the tip under forces on them, ∂r/∂γ of the masses, and these, each thrice."""
+    """F of masses, of the tip under forces on them, ∂r/∂γ of the masses, and these.
+
+    Each has six rows: it moves along the axes of the base and turns about its directors.
+    """
     rod, (inner, of_drives) = yielding_rod(known), known.inputs.with_slopes(x)
     z, masses = _masses(rod.arm, nodes)
     table = node_tables(rod.arm, z, step_grid(rod.arm, z, max(48, rod.steps)))
     state = rod_state(rod, inner, table)
-    moves, turns, _ = linear_response(table, state, _unit_forces(table))
+    directors, lever = state.place_directors[0], table.lever @ state.tip_directors[0]
+    moves, turns, _ = linear_response(table, state, _unit_loads(table, directors))
     moves, tip, bundles = moves[0].copy(), moves[0, -1], inner.shape[1]
-    moves[-1] += np.cross(turns[0, -1], table.lever @ state.tip_directors[0], axis=0)
-    rows = moves.reshape(3 * len(z), -1)
+    moves[-1] += np.cross(turns[0, -1], lever, axis=0)
+    rows = np.concatenate([moves, directors @ turns[0]], axis=1).reshape(6 * len(z), -1)
     slopes = rows[:, :bundles] if of_drives is None else rows[:, :bundles] @ of_drives[0]
-    return rows[:, bundles:], tip[:, bundles:], slopes, np.repeat(masses, 3)
+    return rows[:, bundles:], tip[:, bundles:], slopes, masses.ravel()
 
 
 def _masses(arm: Manipulator, nodes: int) -> tuple[Array, Array]:
-    """Z of Gauss nodes of elements and of the tip [m], and the masses there [kg]."""
-    edges, (at, weights) = chain_of(arm, 12).edges[:, None], np.polynomial.legendre.leggauss(nodes)
+    """Z of Gauss nodes of elements and of the tip [m], masses and inertia there, (node, 6)."""
+    edges, gauss = elements_of(arm, 12).edges[:, None], np.polynomial.legendre.leggauss(nodes)
     width = np.diff(edges, axis=0) / 2.0
-    z = (edges[:-1] + width * (1.0 + at)).ravel()
-    masses = (width * weights).ravel() * arm.section.mass_per_length_at(arm.profile, z)
-    return np.append(z, arm.length), np.append(masses, arm.loads.payload if arm.loads else 0.0)
+    z = (edges[:-1] + width * (1.0 + gauss[0])).ravel()
+    masses = (width * gauss[1]).ravel() * arm.section.mass_per_length_at(arm.profile, z)
+    turning = masses * arm.section.gyration_at(arm.profile, z)
+    rows = np.column_stack([masses, masses, masses, turning, turning, 2.0 * turning])
+    payload = arm.loads.payload if arm.loads else 0.0
+    return np.append(z, arm.length), np.vstack([rows, payload * np.repeat([1.0, 0.0], 3)])
 
 
-def _unit_forces(table: NodeTables) -> list[NodeTables]:
-    none, tip = NodeTables(*map(np.zeros_like, table)), table.places[-1]
-    return [
-        none._replace(force=np.multiply.outer(table.stations < z, axis), weight=(z == tip) * axis)
-        for z in table.places
-        for axis in np.eye(3)
-    ]
+def _unit_loads(table: NodeTables, directors: Array) -> list[NodeTables]:
+    """Forces along the axes of the base and moments about the directors, at each place."""
+    none, tip, loads = NodeTables(*map(np.zeros_like, table)), table.places[-1], list[NodeTables]()
+    for z, own in zip(table.places, directors, strict=True):
+        before = table.stations < z
+        for axis in np.eye(3):
+            force = np.multiply.outer(before, axis)
+            loads.append(none._replace(force=force, weight=(z == tip) * axis))
+        loads += [none._replace(moment=np.multiply.outer(before, axis)) for axis in own]
+    return loads

@@ -6,15 +6,16 @@ import xml.etree.ElementTree as ET
 
 import numpy as np
 
-from softreach.arm.actuators import Actuator, LengthTendon, Tendon
+from softreach.arm.actuators import Actuator, Tendon
 from softreach.arm.body import mass
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.arm.tables import check_extension, ends_over
-from softreach.models.chain import MOST_BODIES, Chain, bodies_for, chain_of
+from softreach.arm.section import turned
+from softreach.arm.tables import ends_over
+from softreach.models.chain import MOST_BODIES, Chain, bodies_for, chain_of, check_simulated
 from softreach.support.arguments import as_integer, as_number
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidDesign, NotPossible, Range
+from softreach.support.errors import Range
 
 _TOLERANCES = Range(1e-6, 0.1)
 _DAMPINGS = Range(0.0, 10.0, unit="s", open_low=True)
@@ -59,40 +60,9 @@ def mujoco(
     tol, damping = as_number("tol", tol, _TOLERANCES), as_number("damping", damping, _DAMPINGS)
     if bodies is not None:
         bodies = as_integer("bodies", bodies, 2, MOST_BODIES)
-    _check(arm)
+    check_simulated(arm, "a model of MuJoCo")
     chain = chain_of(arm, bodies or bodies_for(arm, tol))
     return _Model(arm, chain, damping).text()
-
-
-def _check(arm: Manipulator) -> None:
-    """Refuse what the model does not have."""
-    why = "for a model that moves"
-    if faults := arm.section.modulus_faults(why) + arm.section.density_faults(why):
-        raise InvalidDesign(faults)
-    check_extension(arm)
-    loads = arm.loads or Loads()
-    forces = ("tip_force", "tip_moment", "follower_force", "follower_moment", "force_per_length")
-    tendons = [each for each in arm.actuators if isinstance(each, Tendon)]
-    refused = {
-        "drives: export the design without them, and let the controller apply their gains": (
-            arm.drives
-        ),
-        "tendons driven by length: make them Tendons, whose control is the tension": (
-            any(isinstance(each, LengthTendon) for each in tendons)
-        ),
-        "tendons that guides hold: make their `guides` 0": (
-            any(each.has_guides for each in tendons)
-        ),
-        "a rest shape of an arm with rigid pieces: leave one of them out": (
-            arm.rigid_pieces and not arm.rest.is_straight
-        ),
-        "forces and moments of the loads: set `xfrc_applied` of a body in the simulation": (
-            loads.point_loads or any(any(getattr(loads, name)) for name in forces)
-        ),
-    }
-    for what, is_there in refused.items():
-        if is_there:
-            raise NotPossible(f"a model of MuJoCo has no {what}")
 
 
 class _Model:
@@ -146,13 +116,15 @@ class _Model:
         """A body a node, with its element's mass, and the tip, with half of the last element."""
         chain, count = self.chain, len(self.chain.masses)
         lengths, radii = np.diff(chain.edges), self.arm.profile.radius(chain.nodes)
+        turning = self.arm.section.gyration_at(self.arm.profile, chain.nodes)
         for k, gap in enumerate(np.diff(chain.nodes, prepend=0.0, append=self.arm.length)):
             name, last = f"body {k + 1}" if k < count else "tip", min(k, count - 1)
             body = _add(self.bodies[-1], "body", name=name, pos=(0.0, 0.0, gap))
             share = 1.0 if k < count - 1 else 0.5
             length, own = share * lengths[last], share * chain.masses[last]
             center = 0.5 * (share - 1.0) * lengths[last] * _AXES[2]
-            _inertial(body, own, center, self._inertia(radii[last], length, own))
+            across = own * (turning[last] + length**2 / 12.0)
+            _inertial(body, own, center, np.array([across, across, 2.0 * own * turning[last]]))
             self._joint(body, f"slide {k + 1}", "slide", _AXES[2], chain.axial_compliance[k])
             if k < count:
                 self._hinges(body, k)
@@ -164,9 +136,10 @@ class _Model:
 
     def _hinges(self, body: ET.Element, k: int) -> None:
         """Those of an element; their order alternates, so that what it costs cancels."""
+        axes = turned(_AXES, self.arm.section.bending_angle).T
         for axis in range(3) if k % 2 == 0 else range(2, -1, -1):
             spring = self.chain.compliance[k, axis], self.chain.rest_turns[k, axis]
-            self._joint(body, _hinge(k, axis), "hinge", _AXES[axis], *spring)
+            self._joint(body, _hinge(k, axis), "hinge", axes[axis], *spring)
 
     def _joint(
         self,
@@ -181,16 +154,6 @@ class _Model:
         if compliance > 0.0:
             spring = {"stiffness": 1.0 / compliance, "damping": self.damping / compliance}
             _add(body, "joint", name=name, type=kind, axis=axis, springref=rest, **spring)
-
-    def _inertia(self, radius: float, length: float, own: float) -> Array:
-        """Principal moments of inertia of a piece of a mass [kg m²]."""
-        layers = self.arm.section.layers
-        density = np.array([layer.material.density or 1.0 for layer in layers])
-        ratios = np.array([(layer.inner_ratio, layer.outer_ratio) for layer in layers])
-        second, fourth = (density @ (ratios[:, 1] ** n - ratios[:, 0] ** n) for n in (2, 4))
-        turning = 0.25 * own * radius**2 * fourth / second
-        across = turning + own * length**2 / 12.0
-        return np.array([across, across, 2.0 * turning])
 
     def _place(self, z: float) -> tuple[ET.Element, float]:
         """The body that a section goes with, and how far beyond its origin it is [m]."""

@@ -31,6 +31,7 @@ _TRIALS, _DIRECTED_TRIALS = 3, 2
 _SHARE = 0.1  # of its range, by which a bundle moves in a step where no rate is given
 _FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-6, 1e-10, 1e6  # of the mean square slope
 _EASE = 0.05  # of the way to the least activations, in a step, as far as the tip does not move
+_GOOD = 0.1  # of the error, to which a trial with good slopes leads
 _ENOUGH = 0.5  # of the tolerance, at which a step ends
 _AT_END = 1e-9  # of a range, from a limit on which a bundle is
 
@@ -43,8 +44,6 @@ class TrackingStep:
     """Inputs of the arm [unit of each], shape (bundles,)."""
     tip: Array
     """Its tip [m], shape (3,)."""
-    jacobian: Array
-    """∂r/∂γ of the tip [m per unit of each activation], shape (3, bundles)."""
     distance: float
     """|target - tip| [m]."""
     angle: float
@@ -58,6 +57,11 @@ class TrackingStep:
     snaps: bool
     """True if a way was not taken, since the arm loses its stability on it."""
     _map: ArmMap
+
+    @lazy
+    def jacobian(self) -> Array:
+        """∂r/∂γ of the tip [m per unit of each activation], shape (3, bundles), when it is read."""
+        return all_inputs(self._map).tips_and_slopes(self.activations[None])[1][0]
 
     @lazy
     def compliance(self) -> Array | None:
@@ -161,7 +165,7 @@ class Tracker:
             inputs = self._origin.inputs.continued_from(inner, known.frame)
             self._map = replace(self._map, rod=rod.with_postures(self._beside), inputs=inputs)
         self._x, self._damping = x[0], _FIRST_DAMPING
-        self._here = self._motion(self._x)
+        self._here, self._is_exact = self._motion(self._x), True
 
     @property
     def activations(self) -> Array:
@@ -188,11 +192,9 @@ class Tracker:
             beside = replace(self._beside, frame=self._beside.frame.copy())
             tip_map = replace(tip_map, rod=rod.with_postures(beside))
         names = np.array(self._map.box.names, object)
-        assert here.slopes is not None
         return TrackingStep(
             activations=self.activations,
             tip=here.tips[0],
-            jacobian=here.slopes[0] / self._scale,
             distance=distance,
             angle=angle,
             reached=max(distance / self._map.length, angle) <= self._map.tol,
@@ -206,23 +208,21 @@ class Tracker:
         """Take the trials that lead nearer; whether one ended where the arm is not stable."""
         low = np.maximum(self._low, self._x - self._most)
         high = np.minimum(self._high, self._x + self._most)
-        if wanted is not None and self._here.directions is None:
-            self._here = self._motion(self._x, directed=True)
+        turns = wanted is not None
+        if turns and self._here.directions is None:
+            self._here, self._is_exact = self._motion(self._x, directed=True), True
         error, slope = self._rows(self._here, target, wanted)
-        size, snaps, stale = math.sqrt(error @ error), False, False
-        for k in range(_TRIALS if wanted is None else _DIRECTED_TRIALS):
+        size, snaps = math.sqrt(error @ error), False
+        for k in range(_DIRECTED_TRIALS if turns else _TRIALS):
             ease = _EASE * (k == 0 and self._damping <= _FIRST_DAMPING)
-            trial, motion = self._trial(error, slope, low, high, ease), self._here
+            trial = self._trial(error, slope, low, high, ease)
             if size <= _ENOUGH * self._map.tol or (trial == self._x).all():
                 break
-            if wanted is None:
-                there = self._broyden(trial, target, error, slope)
-            else:
-                motion = self._motion(trial, directed=True)
-                there = self._rows(motion, target, wanted)
-            ahead = math.sqrt(there[0] @ there[0])
+            motion = self._motion(trial, directed=True) if turns else self._secant(trial, slope)
+            there = self._rows(motion, target, wanted)
+            ahead, before = math.sqrt(there[0] @ there[0]), size
             if ahead < size:
-                self._x, self._here, stale = trial, motion, wanted is None
+                self._x, self._here, self._is_exact = trial, motion, turns
                 (error, slope), size = there, ahead
                 if self._beside is not None:
                     self._beside.frame[:] = self._beside.found
@@ -231,8 +231,9 @@ class Tracker:
                 snaps |= (lost := not math.isfinite(ahead))
                 self._damping *= 1e4 if lost else 10.0
                 self._damping = min(max(self._damping, _FIRST_DAMPING), _LARGEST_DAMPING)
-        if stale:
-            self._here = self._motion(self._x)
+            if not self._is_exact and not ahead < _GOOD * before:
+                self._here, self._is_exact = self._motion(self._x), True
+                error, slope = self._rows(self._here, target, wanted)
         return snaps
 
     def _trial(self, error: Array, slope: Array, low: Array, high: Array, ease: float) -> Array:
@@ -250,12 +251,13 @@ class Tracker:
             box_steps(0.0 * center, gradient, hessian[None], np.zeros(1), low, high, step)
         return np.clip(self._x + step[0], self._x + low, self._x + high)
 
-    def _broyden(self, x: Array, target: Array, error: Array, slope: Array) -> tuple[Array, Array]:
-        """What is missing at a trial, and Broyden's derivatives: exact ones cost ten times that."""
-        tips, step = np.empty((1, 3)), x - self._x
+    def _secant(self, x: Array, slope: Array) -> TipOutputs:
+        """The tip at a trial, and Broyden's slopes: exact ones cost ten times that."""
+        tips, step, length = np.empty((1, 3)), x - self._x, self._origin.length
         self._map.fill(x[None], TipOutputs(tips))
-        left = (target - tips[0]) / self._origin.length
-        return left, slope + np.outer(error - left - slope @ step, step) / (step @ step)
+        change = (tips[0] - self._here.tips[0]) / length
+        slopes = slope + np.outer(change - slope @ step, step) / (step @ step)
+        return TipOutputs(tips, length * slopes[None])
 
     def _motion(self, x: Array, *, directed: bool = False) -> TipOutputs:
         """Tip and slopes at activations (bundles,), direction and twists if wanted."""

@@ -233,7 +233,7 @@ class Inputs:
         """All inputs in their own units, at checked x (n, bundles)."""
         if self.is_plain:
             return x
-        inputs = np.tile(self.own_box.low, (len(x), 1))
+        inputs = np.full((len(x), len(self.own_box.low)), self.own_box.low)
         inputs[:, self._columns] = x * self.measures
         return inputs
 

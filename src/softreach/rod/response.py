@@ -55,6 +55,8 @@ class NodeTables(NamedTuple):
     """K⁻¹ in the directors [1/(N m²)], shape (step, 3, 3, 3); zero without loads."""
     force: Array
     """Dead force n in the frame of the base [N], shape (step, 3, 3)."""
+    moment: Array
+    """Dead moment in that frame [N m], likewise; zero but for changes."""
     lever: Array
     """Of the payload in the directors of the tip [m], shape (3,)."""
     weight: Array
@@ -141,6 +143,7 @@ def node_tables(arm: Manipulator, stations: Array, grid: StepGrid) -> NodeTables
         thrust=axial,
         compliance=arm.section.in_directors(soft),
         force=force,
+        moment=np.zeros(force.shape),
         lever=np.array((0.0, 0.0, 0.0) if arm.loads is None else arm.loads.payload_arm),
         weight=weight,
         places=np.asarray(stations, float),
@@ -245,7 +248,7 @@ def linear_response(
 
 
 def _changed_tables(table: NodeTables, changes: list[NodeTables]) -> tuple[Array, ...]:
-    """Changes of ζ̂ dZ, η dZ, U, 1/K0, K⁻¹ and force by column.
+    """Changes of ζ̂ dZ, η dZ, U, 1/K0, K⁻¹, force and moment by column.
 
     Those of products are per activation, (..., column, bundle + 1), the last place at rest.
     """
@@ -264,7 +267,7 @@ def _changed_tables(table: NodeTables, changes: list[NodeTables]) -> tuple[Array
         return np.concatenate([by, length], axis=-1)
 
     products = product("extension"), product("rest_length_factor")
-    others = (stacked(name, -1) for name in ("thrust", "compliance", "force"))
+    others = (stacked(name, -1) for name in ("thrust", "compliance", "force", "moment"))
     return *products, stacked("curvature", -2), *others
 
 
@@ -272,7 +275,7 @@ def _per_arm(
     table: NodeTables, change: tuple[Array, ...], gamma: Array, d: Array, moment: Array
 ) -> tuple[Array, ...]:
     """What the kernel wants of one arm."""
-    by_stretch, by_rest_length, by_curvature, by_thrust, by_compliance, by_force = change
+    by_stretch, by_rest_length, by_curvature, by_thrust, by_compliance, by_force, by_moment = change
     length, whole, axial = table.length, np.append(gamma, 1.0), table.thrust
     thrust = np.einsum("kic,kic->ki", d[..., 2, :], table.force)
     squeeze = axial * thrust  # n3/K0
@@ -282,6 +285,7 @@ def _per_arm(
     each = length[..., None]
     grown, stretched = by_rest_length @ whole, by_stretch @ whole
     bent = by_curvature @ gamma + np.einsum("kiabc,kib->kiac", by_compliance, moment)
+    bent += table.compliance @ d @ by_moment
     of_activations = (each * table.rest_length_factor)[:, :, None] * bend[..., None]
     of_activations += rest_length[..., None, None] * table.curvature
     of_changes = grown[:, :, None] * bend[..., None] + rest_length[..., None, None] * bent

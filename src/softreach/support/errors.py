@@ -147,15 +147,17 @@ _EXTRAS = {  # module -> extra with it
     "jinja2": "report",
     "optuna": "search",
     "cmaes": "search",
+    "elastica": "simulators",
 }
 _EXTRAS |= dict.fromkeys(("pyarrow", "trimesh", "meshio", "manifold3d"), "export")
+_PACKAGES = {"skimage": "scikit-image", "elastica": "pyelastica"}
 
 
 class MissingExtra(SoftreachError, ImportError):
     """Optional libraries are needed but not installed."""
 
     def __init__(self, *modules: str) -> None:
-        names = dict.fromkeys(name.replace("skimage", "scikit-image") for name in modules)
+        names = dict.fromkeys(_PACKAGES.get(name, name) for name in modules)
         extras = ",".join(dict.fromkeys(_EXTRAS[name] for name in modules))
         them = "them" if len(names) > 1 else "it"
         remedy = f"pip install 'softreach[{extras}]'"
