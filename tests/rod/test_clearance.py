@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from softreach.arm import Loads, Marker, Obstacle, designs
+from softreach.arm import Base, Loads, Marker, Obstacle, designs
 from softreach.requirements import Box, Cylinder, HalfSpace, Mesh, Sphere, Tube
 from softreach.rod import as_tip_map, compute_clearance
 from softreach.rod.clearance import ITSELF, NONE, ClearanceMap
@@ -203,6 +203,17 @@ def test_slopes_of_the_gap_to_itself_are_differences():
     off = np.abs(slopes - differences).max(axis=1)
     assert np.median(off) < 1e-8
     assert off.max() < 1e-6 * np.abs(slopes).max()
+
+
+def test_obstacles_stand_in_the_world_whatever_frame_places_have():
+    around = (Obstacle(region=HalfSpace((0.2, 0.0, 0.0), (-1.0, 0.0, 0.0))),)
+    base = Base(position=(0.1, 0.0, 0.3), points="down")
+    arm = designs.minimal_trunk().replace(surroundings=around, base=base)
+    gamma = [[-1.0, 0.0, -0.5], [-0.2, -0.9, 0.0]]
+    of_base = compute_clearance(as_tip_map(arm, frame="base"), gamma, slopes=True)
+    of_world = compute_clearance(arm, gamma, slopes=True)
+    for name in ("clearance", "station", "clearance_slope"):
+        assert of_base[name].values == pytest.approx(of_world[name].values, abs=1e-12)
 
 
 def test_a_distance_wanted_is_taken_off_and_an_exempt_part_does_not_count():

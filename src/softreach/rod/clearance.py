@@ -73,7 +73,7 @@ class ClearanceMap:
     """
 
     whole: TipMap
-    """Its tip map, in the world."""
+    """Its tip map."""
     accuracy: float = ACCURACY
     """Largest error, over L."""
     itself: bool = True
@@ -111,8 +111,9 @@ class ClearanceMap:
 
     @lazy
     def tip_map(self) -> ArmMap:
-        """The tip map to a tolerance that does."""
-        return as_tip_map(coarsened(self.whole, _PLACES * self.accuracy))
+        """The tip map to a tolerance that does, in the world, where the obstacles are."""
+        known = as_tip_map(coarsened(self.whole, _PLACES * self.accuracy))
+        return replace(known, pose=self.arm.base)
 
     @lazy
     def _marks(self) -> Array:

@@ -64,7 +64,7 @@ class FreeMotions:
         if not is_known or not isinstance(self.clearance.tip_map.rod, FreeRod):
             unknown = "under loads, or with tendons that are driven by length or have guides"
             raise NotPossible(f"free motions are not known of arms {unknown}")
-        self.box, self.error = self.clearance.whole.box, self.clearance.contact_error
+        self.box, self.error = self.clearance.whole.box, self.clearance.error
 
     def at(self, gamma: Array) -> Clearances:
         """Clearances at activations (n, bundles), less the margin."""
