@@ -162,7 +162,7 @@ def test_needs_of_many_places_are_drawn_with_few_labels(session):
     assert drawn(session, "/needs/label 20") is None
 
 
-# Measured poses: their markers over the arm, and a fit to them
+# Measured poses: their markers over the arm
 
 MARKED = designs.minimal_trunk().replace(
     markers=(Marker(name="half", station=0.5, offset=(0.07, 0.0, 0.0)), Marker(name="tool"))
@@ -185,7 +185,7 @@ def shown(session, number=0, inputs=INPUTS) -> None:
     """Load measured poses, and bring the arm to one of them."""
     columns = table(PLACES, inputs, NAMES, MARKERS).items()
     data = read_measurements(MARKED, {name.removesuffix("_N"): [*row] for name, row in columns})
-    bench = Bench(data=data, arm=MARKED, number=number, free=("pose", "taper"))
+    bench = Bench(data=data, arm=MARKED, number=number)
     session.update(bench.posed)
     session.learn({"bench": bench})
     session.settle()
@@ -226,14 +226,3 @@ def test_inputs_beyond_the_bounds_have_their_markers_predicted_as_they_are(bench
     assert bench.state.activation == (0.0, 0.0, 0.0)
     straight = marker_positions(MARKED, (0.0, 0.0, 0.0))[0] / MARKED.length
     assert np.abs(drawn(bench, "/sample/predicted").points - straight).max() > 0.01
-
-
-def test_a_calibrated_arm_belongs_to_the_design_that_the_fit_began_with(bench):
-    shown(bench)
-    bench.follow("fit")
-    bench.settle()
-    fit = bench.found.bench
-    assert fit.fitted(MARKED) == fit.result.arm
-    assert fit.fitted(changed(MARKED, {"taper": 0.02})) is None
-    assert np.nanmax(bench.found.sample.distances) < 2e-3
-    assert drawn(bench, "/sample/arm/0") is not None

@@ -169,7 +169,7 @@ def test_requirements_are_seen_met_and_missed_and_follow_a_slider(tab):
     page.get_by_text("place 2: missed by").wait_for()
 
 
-def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, tmp_path):
+def test_measured_poses_are_stepped_through(tab, tmp_path):
     page = tab.page
     columns = table(PLACES, INPUTS, NAMES, MARKERS)
     rows = np.column_stack(list(columns.values()))
@@ -188,12 +188,3 @@ def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, t
     tab.slider("sample").press("ArrowRight")
     half, tool = 1e3 * np.linalg.norm(PLACES[1] - marker_positions(MARKED, INPUTS[1])[0], axis=1)
     page.get_by_text(f"half {half:.3g} mm, tool {tool:.3g} mm").wait_for()
-    page.get_by_label("taper φ", exact=True).check()
-    tab.press("Fit")
-    page.get_by_text("20 fitted").first.wait_for()
-    tab.press("Apply")
-    tab.settle()
-    assert tab.session.state.design.profile.taper == pytest.approx(0.012, abs=3e-4)
-    tab.press("Undo")
-    tab.settle()
-    assert tab.session.state.design == MARKED

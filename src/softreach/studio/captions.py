@@ -12,10 +12,9 @@ from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.found import Found
 from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.reach import Reach, Size, shown_samples
+from softreach.studio.reach import Reach, Size
 from softreach.studio.scene.colors import FAINT
-from softreach.studio.scene.scene import shows_cloud
-from softreach.studio.state import Appearance, StudioState
+from softreach.studio.state import StudioState
 from softreach.support.units import LengthUnit, as_unit
 
 UNREACHABILITY = (
@@ -100,25 +99,6 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     if not parts:
         parts.append(f"every sample rests in a stable equilibrium {_GAP}")
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
-
-
-def picture_text(found: Found, reach: Reach, look: Appearance) -> str:
-    """What is gray in a picture of the scene with a reach, and what it leaves out, in words."""
-    arm, cut, shown = reach.arm, look.slice, len(shown_samples(reach, look.level))
-    dots, unit = shows_cloud(reach, look), arm.length_unit
-    off = [unit.rounded(arm.length * value) for value in (cut.thickness, cut.center)]
-    beside = {"without loads": found.free, "of the kept design": found.reference}
-    gray = " and ".join(whose for whose, known in beside.items() if known is not None)
-    parts = {
-        "the arm": not look.arm,
-        "the reach": not (dots or look.surface),
-        "the half of the points in front of the arm": dots and look.half,
-        f"all outside a slab of {off[0]} at {cut.axis} = {off[1]}": cut.axis != "none",
-        f"all but {shown:,} of the samples": dots and shown < reach.samples,
-    }
-    left_out = ", ".join(text for text, is_out in parts.items() if is_out)
-    told = {"Gray: the reach": gray, "Not in the picture:": left_out}
-    return " ".join(f"{head} {text}." for head, text in told.items() if text)
 
 
 def loaded_share(found: Found, design: Manipulator) -> str:

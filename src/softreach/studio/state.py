@@ -76,7 +76,7 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
     return needs
 
 
-VERSION = 4
+VERSION = 5
 LEVELS = range(12, 22)  # 2^level points: every such prefix of a Sobol sequence is even
 MOUSE = {
     "tip": "drags the tip",
@@ -124,9 +124,7 @@ class Appearance:
     arm: bool = True
     surface: bool = True  # the exact boundary of the reachable set
     mouse: str = "tip"  # use of the mouse in the scene, one of `MOUSE`; it turns the view besides
-    section: bool = False  # plots beside the scene, each computed only while it is shown
-    sweep: bool = False
-    swept: str = ""  # parameter against which the volume is plotted; "" for the first there is
+    section: bool = False  # plot beside the scene, computed only while it is shown
     unit: str = ""  # of lengths, areas and volumes; "" for that of the design
 
     def __post_init__(self) -> None:

@@ -221,17 +221,16 @@ class Scene:
         arm: Manipulator,
         activation: Sequence[float],
         path: str = "/arm",
-        length: float | None = None,
         rod: TipMap | None = None,
     ) -> Array:
-        """The body, its fibers and markers, over a length [m]; returns the tip, shape (3,).
+        """The body, its fibers and markers; returns the tip [L], shape (3,).
 
         Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
         stations = np.linspace(0.0, arm.length, _STATIONS)
         frames = with_unstable(rod or solvable_rod(arm)).frames([activation], stations)
         line = Centerline(z=stations, position=frames.position[0], directors=frames.directors[0])
-        return self._draw_line(arm, line, path, length or arm.length)
+        return self._draw_line(arm, line, path)
 
     def draw_rest(self, state: StudioState) -> None:
         """The straight arm, if it is at rest, and a box around where it may go."""
@@ -239,11 +238,11 @@ class Scene:
         line = Centerline.unactivated(np.linspace(0.0, arm.length, _STATIONS), arm.base)
         bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
         if look.arm and not (bent or arm.drives or arm.markers):
-            self._draw_line(arm, line, "/arm", arm.length)
+            self._draw_line(arm, line, "/arm")
         around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
         self.axes.draw(around, line.position / arm.length, arm=arm)
 
-    def _draw_line(self, arm: Manipulator, line: Centerline, path: str, length: float) -> Array:
+    def _draw_line(self, arm: Manipulator, line: Centerline, path: str) -> Array:
         centers, radii = line.position, arm.profile.radius(line.z)
         if np.isnan(centers).any():
             self.remove(path)
@@ -253,7 +252,7 @@ class Scene:
         skins = [arm_surface(arm, line, _SIDES)]
         if arm.bundles <= MOST_BUNDLES:
             skins += bundle_skins(arm, line, lift=_LIFT, step=_ACROSS)
-        corners = [(skin.vertices / length).astype(np.float32) for skin in skins]
+        corners = [(skin.vertices / arm.length).astype(np.float32) for skin in skins]
         known = self._arms.get(path)
         if known is not None and known.arm is arm:
             handles = known.meshes
@@ -261,7 +260,7 @@ class Scene:
                 handle.vertices = vertices
         else:
             self.remove(path)
-            ghost, faces = path.startswith(("/ghosts", "/sample")), [skin.faces for skin in skins]
+            ghost, faces = path.startswith("/ghosts"), [skin.faces for skin in skins]
             clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
             colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
             add = partial(self.api.add_mesh_simple, side="double", **_SHADOWLESS)
@@ -271,9 +270,9 @@ class Scene:
                 for k, (v, f, color, opacity) in parts
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
-        markers = marker_points(arm.markers, line) / length
+        markers = marker_points(arm.markers, line) / arm.length
         self.dots(f"{path}/markers", markers, DARK, MARKER)
-        return centers[-1] / length
+        return centers[-1] / arm.length
 
     def see_through_arm(self, clear: bool) -> None:
         """Let what is behind the arm be seen through it, or not."""

@@ -257,23 +257,6 @@ def other_loads(arm: Manipulator) -> list[str]:
     return others + [f"point loads ({len(loads.point_loads)})"] * bool(loads.point_loads)
 
 
-def setting_text(state: StudioState) -> str:
-    """Loads and base in words, where they are not those of an upright arm that bears its weight."""
-    base, told = state.design.base, list[str]()
-    for name, (label, unit, _, _) in _LOADS.items():
-        if getattr(state.design.loads or _NONE, name) != getattr(Loads(), name):
-            value, known = load_field(name).read(state), name == "gravity" and gravity_name(state)
-            text = f"({', '.join(f'{v:g}' for v in value)})" if name != "payload" else f"{value:g}"
-            unit = unit or shown_parameters.typed_unit(state.design).name
-            told.append(f"gravity {known}" if known else f"{label} {text} {unit}")
-    told += other_loads(state.design)
-    way = base.points if isinstance(base.points, str) else ""
-    told += [f"base {_WAYS[way]}"] * (way != "up")
-    told += [f"base at {state.design.length_unit.place(base.position)}"] * any(base.position)
-    told += [f"base turned by {math.degrees(base.turn):g}°"] * bool(base.turn)
-    return ", ".join(told)
-
-
 def gravity_name(state: StudioState) -> str:
     """Name of the gravity in the list of directions; "" for any other."""
     gravity = (state.design.loads or _NONE).gravity

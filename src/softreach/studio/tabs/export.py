@@ -16,7 +16,7 @@ from softreach.export.surfaces import SURFACE_FILES
 from softreach.plot.coloring import draw_figure_key
 from softreach.plot.style import inked
 from softreach.rod.kinematics import configuration
-from softreach.studio.captions import legend_text, picture_text, reach_text
+from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.fields import GRAY, Change, Fields, file_text
 from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
@@ -26,7 +26,6 @@ from softreach.studio.scene.scene import in_slice
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState, design_of_text
-from softreach.studio.tabs.design import setting_text
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -161,8 +160,7 @@ def _write_picture(session: Session, path: Path) -> None:
         scene = scene[max(0, seen[0] - FINER * _EDGE) : seen[-1] + FINER * _EDGE]
     height, width = (size / FINER for size in scene.shape[:2])
     room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
-    texts = *_caption(state, reach), picture_text(session.found, reach, state.appearance)
-    lines = [line for text in texts for line in textwrap.wrap(text, room)]
+    lines = [line for text in _caption(state, reach) for line in textwrap.wrap(text, room)]
     above, below = _KEY if key is not None else 0, 2 * _EDGE + _LINE * len(lines)
     total, (paper, ink) = above + height + below, _PAPER_AND_INK[state.appearance.dark]
     size = width / _DPI, total / _DPI
@@ -176,15 +174,14 @@ def _write_picture(session: Session, path: Path) -> None:
 
 
 def _caption(state: StudioState, reach: Reach) -> list[str]:
-    """Numbers and marks of a reach, its design, base and loads, and how hard each bundle pulls."""
+    """Numbers and marks of a reach, its design, and how hard each bundle pulls."""
     numbers, marks = (
         "".join(part for part in parts if not isinstance(part, Swatch)).strip()
         for parts in (reach_text(reach), legend_text(reach, free=False))
     )
     values = ", ".join(f"{c.label} {c.shown:g}" for c in slider_parameters(state.design))
     pulls = ", ".join(f"{value:.3g}" for value in state.activation)
-    parts = values, f"L = {state.design.length:g} m", setting_text(state)
-    design = f"{'; '.join(filter(None, parts))}. Activation ({pulls})."
+    design = f"{values}; L = {state.design.length:g} m. Activation ({pulls})."
     return [*filter(None, (numbers, marks, design))]
 
 

@@ -1,16 +1,14 @@
-"""What the arm is for and what was measured on it: live requirements, poses and a fit to them."""
+"""What the arm is for and what was measured on it: live requirements, and poses."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.calibration import calibrate
 from softreach.calibration.free_numbers import free_numbers
 from softreach.calibration.measurements import read_measurements, read_table
 from softreach.calibration.model import MarkerModel
@@ -18,7 +16,7 @@ from softreach.requirements import Box, Check, Finding, Keep, Limits, Requiremen
 from softreach.requirements.checks import checked
 from softreach.requirements.parts import TOL
 from softreach.studio import markup
-from softreach.studio.fields import GRAY, Attribute, Fields, file_text
+from softreach.studio.fields import GRAY, Fields, file_text
 from softreach.studio.found import Bench, Found, Sample
 from softreach.studio.jobs import DESIGN, Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
@@ -232,19 +230,10 @@ _ABOUT_LOAD = (
 _ABOUT_SAMPLE = (
     "Moves the arm to the inputs of a sample. Large dots were measured, small ones are predicted"
 )
-_ABOUT_FIT = "Finds the numbers with which predicted markers come nearest to measured ones"
-_FREE = {
-    "pose": "pose of the base",
-    "taper": "taper φ",
-    "revolution": "revolution Ω",
-    "*.offset": "offsets of bundles",
-    "*.young_modulus": "Young's moduli",
-}
-"""Numbers that a fit may change: name -> what the check box says."""
 
 
 def measured(panel: Fields) -> None:
-    """Measured poses: their markers over the arm, a fit to them, and the calibrated design."""
+    """Measured poses: their markers over the arm."""
     session = panel.session
     with panel.folder("measured poses", expanded=False):
         read = lambda file: _read_poses(session, file)
@@ -260,34 +249,12 @@ def measured(panel: Fields) -> None:
 
             panel.steps("sample", "found.bench", at=at, move=move, hint=_ABOUT_SAMPLE)
             panel.text("design", "found.bench", "found.sample", content=_residuals_text)
-            for name, label in _FREE.items():
-                panel.checkbox(label, _is_free(name), "Lets the fit change this number")
-            panel.button("Fit", lambda: session.follow("fit"), _ABOUT_FIT)
-            panel.html("found.bench", content=_summary)
-            about = "Makes the calibrated arm the design; can be undone"
-            fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
-            apply = lambda state: state.replace(design=fitted(state, session.found) or state.design)
-            panel.change("Apply", apply, about, fitted)
-
-
-def _is_free(name: str) -> Attribute:
-    """Whether a fit may change a number; that of the pose before there are data."""
-
-    def write(found: Found, on: bool) -> Found:
-        if found.bench is None:
-            return found
-        free = tuple(each for each in _FREE if (on if each == name else each in found.bench.free))
-        return replace(found, bench=replace(found.bench, free=free))
-
-    read = lambda found: name in (found.bench.free if found.bench else ("pose",))
-    return Attribute(read, write, "found", "found.bench")
 
 
 def _read_poses(session: Session, file: UploadedFile) -> None:
-    arm, before = session.state.design, session.found.bench
+    arm = session.state.design
     data = read_measurements(arm, read_table(io.BytesIO(file.content), file.name))
-    free = ("pose",) if before is None else before.free
-    _pose(session, Bench(data=replace(data, source=file.name), arm=arm, free=free))
+    _pose(session, Bench(data=replace(data, source=file.name), arm=arm))
 
 
 def _pose(session: Session, bench: Bench) -> None:
@@ -318,18 +285,6 @@ def _residuals_text(state: StudioState, found: Found) -> list[str]:
     beyond = bool(((inputs < low) | (inputs > high)).any())
     note = ". Its inputs are beyond the bounds, at which the arm is drawn" if beyond else ""
     return [f"predicted − measured: {', '.join(each)}{note}."]
-
-
-def _summary(_: StudioState, found: Found) -> str:
-    if found.bench is None or (result := found.bench.result) is None:
-        return ""
-    report = result.report()
-    printed = [part for part in report.sections if part.rows and part.printed]
-    tables = [markup.table(part.head, part.rows) for part in printed]
-    lines = [*(line for part in report.sections for line in part.points), report.verdict]
-    if not result.fit.converged:
-        lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
-    return "".join([*tables, *map(markup.paragraph, lines)])
 
 
 def _check(given: Given) -> Results:
@@ -400,47 +355,25 @@ def _predict(given: Given) -> Results:
     if bench is None or not (here and bench.fits(design)):
         yield Learned({"sample": None})
         return
-    arm = bench.fitted(design) or design
     pose = bench.data.of(np.array([bench.number]))
     # The inputs of a pose may be beyond the bounds of the design.
-    predicted = MarkerModel.of(free_numbers(arm, ["pose"]), pose).of_arm(arm).places[0]
-    yield Learned({"sample": Sample(pose.places[0], predicted, arm)})
+    predicted = MarkerModel.of(free_numbers(design, ["pose"]), pose).of_arm(design).places[0]
+    yield Learned({"sample": Sample(pose.places[0], predicted)})
 
 
 def _draw_sample(given: Given) -> None:
-    """Measured and predicted markers, lines between them, and the arm that predicts."""
-    sample, design, scene = given.found.sample, given.state.design, given.scene
+    """Measured and predicted markers, and lines between them."""
+    sample, length, scene = given.found.sample, given.state.design.length, given.scene
     if sample is None:
         scene.remove("/sample")
         return
-    measured, predicted = sample.measured / design.length, sample.predicted / design.length
+    measured, predicted = sample.measured / length, sample.predicted / length
     scene.dots("/sample/measured", measured, MARK, _MEASURED)
     scene.dots("/sample/predicted", predicted, DARK, MARKER)
     scene.lines("/sample/residuals", np.stack([measured, predicted], axis=1), MARK, 0.005)
-    if sample.arm == design:
-        scene.remove("/sample/arm")
-    else:
-        same = given.state.replace(design=sample.arm).activation
-        scene.draw_arm(sample.arm, same, "/sample/arm", design.length)
-
-
-def _fit(given: Given) -> Results:
-    bench, steps = given.found.bench, count(1)
-    if bench is None:
-        return
-
-    def progress(_: int) -> None:
-        given.check()
-        given.report(f"calibrating, step {next(steps)}")
-
-    with no_warnings():
-        result = calibrate(given.state.design, bench.data, free=bench.free, progress=progress)
-    given.check()
-    yield Learned({"bench": replace(bench, result=result)})
 
 
 JOBS = (
     Job("needs", f"{DESIGN} needs", _check, _draw_needs, wanted="needs", makes="check"),
     Job("sample", "design activation found.bench", _predict, _draw_sample, wanted="found.bench"),
-    Job("fit", "", _fit, doing="calibrating"),
 )
