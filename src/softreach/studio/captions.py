@@ -11,7 +11,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.found import Found
-from softreach.studio.markup import Part, Swatch, Term
+from softreach.studio.markup import Bad, Part, Swatch, Term
 from softreach.studio.reach import Reach, Size
 from softreach.studio.scene.colors import FAINT
 from softreach.studio.state import StudioState
@@ -123,6 +123,21 @@ def tip_text(state: StudioState, found: Found) -> list[Part]:
     if found.posture is not None:
         texts.append(_POSTURES[found.posture])
     return [" · ".join(texts)] if texts else []
+
+
+def clearance_text(state: StudioState, found: Found) -> list[Part]:
+    """The clearance of the arm as it is, in red where it is too near to something."""
+    near, unit = found.clearance, state.design.length_unit
+    if near is None or (math.isnan(near.value) and not near.refusal):
+        return []
+    if near.refusal:
+        return [f"No clearance: {near.refusal}."]
+    if math.isinf(near.value):
+        return ["The arm is near to nothing."]
+    where = f"{near.name} at Z = {unit.rounded(near.station, digits='.3g')}"
+    if near.value > 0.0:
+        return [f"clearance {unit.rounded(near.value, digits='.3g')} from {where}"]
+    return [Bad(f"clearance {unit.rounded(near.value, digits='.3g')}: too near to {where}")]
 
 
 def _percent(share: float) -> str:

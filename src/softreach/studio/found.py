@@ -39,6 +39,7 @@ class Found:
     tip: Array | None = None  # its place [L]; None before it is known, and without an equilibrium
     pointing: Array = field(default_factory=lambda: np.full(3, np.nan))  # direction d3 of the tip
     posture: TipStatus | None = None  # of a loaded arm in its activation; None without loads
+    clearance: Clearance | None = None  # of the whole arm as it is; None without surroundings
     answer: Solution | None = None  # every activation that reaches the target
     takes_nearest: bool = False  # true if the arm moves to the nearest of them, as after a click
     pull: Pull | None = None  # latest order of who drags the tip; None once it is followed
@@ -76,6 +77,16 @@ def in_session(path: str) -> str:
     """Place of "design" of a state, "found.tip" of what is known or "tab.busy" in a session."""
     root, _, rest = path.partition(".")
     return rest if root == "tab" else path if root in ("found", "state") else f"state.{path}"
+
+
+class Clearance(NamedTuple):
+    """Where the arm comes nearest to what it must not touch."""
+
+    value: float = np.nan  # gap beyond the distance to keep [m]; infinite without anything near
+    name: str = ""  # of what is nearest
+    station: float = np.nan  # Z of the place [m]
+    number: int = -1  # of the solid among the surroundings
+    refusal: str = ""  # reason why nothing is known
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,16 @@ import numpy as np
 from softreach.geometry.rays import is_behind
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, volume_slopes
-from softreach.studio.found import Found, Known, in_session
-from softreach.studio.reach import Quality, Reach, count_activations, shown_samples, stages
+from softreach.studio.found import Clearance, Found, Known, in_session
+from softreach.studio.reach import (
+    Quality,
+    Reach,
+    clearance_map,
+    count_activations,
+    sample_clearances,
+    shown_samples,
+    stages,
+)
 from softreach.studio.scene.camera import TabCamera
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import Scene, shows_cloud
@@ -23,7 +31,8 @@ from softreach.studio.serve import theme
 from softreach.studio.shown_parameters import slider_ends
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck, rest
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.parallel import undivided
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -115,7 +124,7 @@ def _compute_reach(given: Given) -> Results:
     try:
         for reach in stages(state.design, level, given.quality, given.check, given.report):
             if shows_cloud(reach, state.appearance):
-                _count(given, reach)
+                _prepare_colors(given, reach)
             yield Learned({"reach": reach, "refusal": ""})
         return
     except InvalidInput as error:
@@ -130,15 +139,18 @@ def _compute_reach(given: Given) -> Results:
 def _color_cloud(given: Given) -> Results:
     reach = given.found.reach
     if reach is not None and shows_cloud(reach, given.state.appearance):
-        _count(given, reach)
+        _prepare_colors(given, reach)
     yield Learned()
 
 
-def _count(given: Given, reach: Reach) -> None:
-    """Count the activations of what is shown, where its colors say them."""
+def _prepare_colors(given: Given, reach: Reach) -> None:
+    """Compute what its colors say of what is shown, if that takes a while."""
     look = given.state.appearance
-    if reach.fine and shown_color(reach.arm, look.color) == "multiplicity":
-        count_activations(reach, shown_samples(reach, look.level), given.check, given.report)
+    color, rows = shown_color(reach.arm, look.color), shown_samples(reach, look.level)
+    if color == "multiplicity" and reach.fine:
+        count_activations(reach, rows, given.check, given.report)
+    if reach.arm.surroundings and (color == "clearance" or look.free):
+        sample_clearances(reach, rows, given.check, given.report)
 
 
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
@@ -156,7 +168,7 @@ def _color_surface(given: Given) -> Results:
         if look.cloud:
             reach.sheets  # noqa: B018  slow the first time
         else:
-            _count(given, reach.boundary)
+            _prepare_colors(given, reach.boundary)
     yield Learned()
 
 
@@ -198,6 +210,29 @@ def _draw_arm(given: Given) -> Mapping[str, Any]:
     status = TipStatus(rod.status([state.activation])[0])
     lost = known["tip"] is None and status <= TipStatus.UNSTABLE  # its shape was not found again
     return known | {"posture": TipStatus.UNDECIDED if lost else status}
+
+
+def _compute_clearance(given: Given) -> Results:
+    state = given.state
+    if not state.design.surroundings:
+        yield Learned({"clearance": None})
+        return
+    try:
+        with undivided():  # the arm may be in a hand
+            room = clearance_map(state.design)
+            found = room.variables(room.of(np.array([state.activation])))
+    except SoftreachError as error:
+        yield Learned({"clearance": Clearance(refusal=str(error))})
+        return
+    (value,), number, (station,) = (found[name][1] for name in ("clearance", "obstacle", "station"))
+    name = room.names[int(number[0])]
+    yield Learned({"clearance": Clearance(float(value), name, float(station), int(number[0]))})
+
+
+def _draw_surroundings(given: Given) -> None:
+    near = given.found.clearance
+    touched = near.number if near is not None and near.value < 0.0 else -1
+    given.scene.draw_surroundings(given.state.design, touched)
 
 
 def _wait(given: Given) -> Results:
@@ -253,9 +288,10 @@ def _beside(name: str) -> Job:
 
 
 _CLOUD: Any = {"draw": _draw_cloud, "draws": "/cloud /unstable", "at_once": False}
-_LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color"
+_LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color appearance.free"
 _OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
 _IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
+_AROUND: Any = {"wanted": "design.surroundings", "draws": "/surroundings"}
 _PLANE = "appearance.slice.axis appearance.slice.center"
 _EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged"
 
@@ -269,6 +305,8 @@ SCENE_JOBS = (
     Job("surface", _OF_SURFACE, _color_surface, _draw_surface, **_IF_SHOWN),
     Job("section", f"found.reach {_PLANE}", _cut, wanted="appearance.section"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
+    # The solids around the arm, and how near it is to them
+    Job("clearance", "design activation", _compute_clearance, _draw_surroundings, **_AROUND),
     # The box with numbers, in a job of its own: of two that drew it, one might know an old unit
     Job("axes", "found.reach found.free", draw=_draw_axes),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,18 +16,21 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.picture.zbuffer import vertex_normals
+from softreach.rod.rods import all_inputs
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.sampling import cube_blocks
 from softreach.studio.state import TOL, solvable_rod
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
-from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.sheets import Sheets
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from softreach.rod.clearance import ClearanceMap
 
 Report = Callable[[str], object]  # shows the reader what is being done
 _quiet: Report = lambda doing: None
@@ -113,6 +117,11 @@ class Reach:
     @cached_property
     def counts(self) -> Array:
         """Number of activations at the place of each sample; NaN before `count_activations`."""
+        return np.full(self.samples, np.nan)
+
+    @cached_property
+    def clearances(self) -> Array:
+        """Clearance of the arm in each sample [m]; NaN before `sample_clearances`."""
         return np.full(self.samples, np.nan)
 
     @property
@@ -288,11 +297,44 @@ def count_activations(
 
     if reach.exact is not None and reach.exact.route == "flux":
         reach.counts[:] = 1.0  # proved one to one
-    missing = rows[np.isnan(reach.counts[rows])]
+    rod, tips = solvable_rod(reach.arm), reach.cloud.tip.values
+    counted = lambda missing: solve_inverse(rod, tips[missing]).counts
+    return _completed(reach.counts, rows, counted, "counting activations", check, report)
+
+
+def sample_clearances(
+    reach: Reach, rows: Index, check: StaleCheck = lambda: None, report: Report = _quiet
+) -> Array:
+    """Clearance of the arm in each sample [m], shape (n,), kept; NaN if its base is in a solid."""
+    gamma = reach.cloud.activation.values
+    with suppress(NotPossible):
+        room = clearance_map(reach.arm)
+        known = lambda missing: room.of(gamma[missing]).value
+        return _completed(reach.clearances, rows, known, "computing clearances", check, report)
+    return reach.clearances[rows]
+
+
+def _completed(
+    values: Array,
+    rows: Index,
+    compute: Callable[[Index], Array],
+    doing: str,
+    check: StaleCheck,
+    report: Report,
+) -> Array:
+    """Values of these rows; those that are NaN are computed, and kept."""
+    missing = rows[np.isnan(values[rows])]
     for block in parallel.blocks(len(missing), _BLOCK):
         check()
         with all_cores:
-            targets = reach.cloud.tip.values[missing[block]]
-            reach.counts[missing[block]] = solve_inverse(solvable_rod(reach.arm), targets).counts
-        report(f"counting activations: {block.stop:,} of {len(missing):,} points")
-    return reach.counts[rows]
+            values[missing[block]] = compute(missing[block])
+        report(f"{doing}: {block.stop:,} of {len(missing):,} points")
+    return values[rows]
+
+
+@lru_cache(maxsize=8)
+def clearance_map(arm: Manipulator) -> ClearanceMap:
+    """The map from activations to the clearance of an arm; NotPossible with its base in a solid."""
+    from softreach.rod.clearance import ClearanceMap
+
+    return ClearanceMap(all_inputs(solvable_rod(arm)))

@@ -118,6 +118,7 @@ class Appearance:
     level: int = 17
     color: str = "effort"  # one of `colors.color_names`
     slice: Slice = field(default_factory=Slice)
+    free: bool = False  # only samples that touch nothing are shown
     half: bool = True  # the half of the cloud in front of the arm is cut away
     dark: bool = False  # the page is dark
     cloud: bool = False

@@ -19,9 +19,10 @@ from softreach.picture.zbuffer import vertex_normals
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
 from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
-from softreach.studio.reach import Reach, cloud_points, shown_samples
+from softreach.studio.reach import Reach, cloud_points, sample_clearances, shown_samples
 from softreach.studio.scene.camera import NumberedBox
 from softreach.studio.scene.colors import FAINT, sample_colors, surface_colors
+from softreach.studio.scene.solids import solid_surfaces
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import bundle_color, eight_bit
@@ -40,6 +41,8 @@ _BODY: Color = (158, 153, 148)  # stands out through the surface from a light an
 _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST = 0.35
+_SOLID, _AROUND, _TOUCHED = 0.4, (120, 135, 110), (210, 40, 40)
+"""Opacity and colors of the surroundings."""
 _SHADOWLESS: Any = {"cast_shadow": False, "receive_shadow": False}
 _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which the arm is seen
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
@@ -72,6 +75,7 @@ class Scene:
         self.pointing: Array = np.full(3, np.nan)  # direction d3 of the tip of the arm as drawn
         self._arms: dict[str, _Arm] = {}
         self._clouds: dict[str, tuple[Mask, Any]] = {}
+        self._solids: list[tuple[object, Any]] = []  # what each was drawn for, and its node
         self._lock = threading.RLock()
         self._ahead: Array | None = None
         self._base = np.zeros(3)
@@ -85,6 +89,7 @@ class Scene:
             for known in [k for k in list(self._arms) if k == path or k.startswith(f"{path}/")]:
                 self._arms.pop(known, None)  # workers draw at the same time
             self._clouds.pop(path, None)
+            self._solids = [] if path == "/surroundings" else self._solids
             if self.api.get_handle_by_name(path) is not None:
                 self.api.remove_by_name(path)
 
@@ -145,6 +150,8 @@ class Scene:
         coloring = sample_colors(reach, look.level, look.color)
         unstable = reach.status[shown_samples(reach, look.level)] == TipStatus.UNSTABLE
         kept = in_slice(points, look.slice)
+        if look.free and reach.arm.surroundings:
+            kept &= sample_clearances(reach, shown_samples(reach, look.level)) > 0.0
         stable, size = kept & ~unstable, _point_size(len(points))
         self._cut_dots("/cloud", points[stable], coloring.rgb[stable], size)
         marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
@@ -198,6 +205,29 @@ class Scene:
         around = [cloud_points(each, 14) for each in (reach, free) if each is not None]
         straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
         self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm)
+
+    def draw_surroundings(self, arm: Manipulator, touched: int = -1) -> None:
+        """The solids around an arm; one of them, by its number, is touched."""
+        keys = [(each, arm.length, arm.base) for each in arm.surroundings]
+        if keys != [key for key, _ in self._solids]:
+            self.remove("/surroundings")
+            surfaces = [(one.vertices / arm.length, one.faces) for one in solid_surfaces(arm)]
+            add = partial(self.api.add_mesh_simple, side="double", flat_shading=True, **_SHADOWLESS)
+            nodes = (
+                add(
+                    f"/surroundings/{k}",
+                    v.astype(np.float32),
+                    f.astype(np.uint32),
+                    opacity=_SOLID,
+                    color=_AROUND,
+                )
+                for k, (v, f) in enumerate(surfaces)
+            )
+            self._solids = list(zip(keys, nodes, strict=True))
+        for k, (_, node) in enumerate(self._solids):
+            color = _TOUCHED if k == touched else _AROUND
+            if tuple(node.color) != color:
+                node.color = color
 
     @property
     def spine(self) -> tuple[Array, Array]:

@@ -23,6 +23,7 @@ from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.colors import sample_values
 from softreach.studio.scene.scene import in_slice
+from softreach.studio.scene.solids import solid_surfaces
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState, design_of_text
@@ -134,6 +135,7 @@ def _write_page(session: Session, path: Path) -> None:
     reach, state, (cloud, color) = _reach(session), session.state, _shown(session)
     is_surface = reach.has_surface and state.appearance.surface and not state.appearance.cloud
     shown = [reach.exact if is_surface else cloud, configuration(state.design, state.activation)]
+    shown += solid_surfaces(state.design)
     unit, caption = state.design.length_unit.name, ". ".join(_caption(state, reach))
     page = plot.plot_3d(shown, color=color, unit=unit, caption=caption)
     path.write_text(page.html, encoding="utf-8")

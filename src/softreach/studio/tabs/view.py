@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softreach.studio import markup
-from softreach.studio.captions import legend_text, loaded_share, reach_text
+from softreach.studio.captions import clearance_text, legend_text, loaded_share, reach_text
 from softreach.studio.fields import Attribute, Fields, attribute
 from softreach.studio.found import Found
 from softreach.studio.markup import Part, Strong
@@ -32,6 +32,7 @@ _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
     "cloud": ("cloud", "Tips of sampled activations"),
+    "free": ("free samples alone", "Of the cloud only what touches none of the surroundings"),
     "half": ("half of the cloud", "Cuts away the half in front of the arm"),
     "dark": ("dark page", "Light on dark"),
 }
@@ -48,7 +49,7 @@ def status(panel: Fields) -> None:
     session, numbers = panel.session, list[Any]()
     known = "design", "found.reach", "found.free", "found.check", "found.key", "found.refusal"
     panel.follow(*known, show=lambda *now: numbers.__setitem__(slice(None), _numbers(*now)))
-    panel.html(*known, *_WORK, content=lambda *_: _status(session, *numbers))
+    panel.html(*known, "found.clearance", *_WORK, content=lambda *_: _status(session, *numbers))
     act = lambda: (session.cancel if session.busy else session.resume)()
     cancel = panel.button(_CANCEL, act, _ABOUT_CANCEL, visible=False)
 
@@ -92,7 +93,8 @@ def _numbers(state: StudioState, found: Found) -> tuple[list[Part], list[str]]:
 def _status(session: Session, numbers: list[Part], below: list[str]) -> str:
     work = _work(session)
     first = [*numbers, f" · {work}" * bool(work)] if numbers else [session.found.refusal or work]
-    return markup.status(markup.paragraph(*first), *below)
+    near = markup.paragraph(*clearance_text(session.state, session.found))
+    return markup.status(markup.paragraph(*first), near, *below)
 
 
 def is_behind(session: Session) -> bool:
