@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.calibration.measurements import Measurements
 from softreach.inverse import Solution
 from softreach.inverse.path import Drag, Dragged
 from softreach.plot.coloring import BundleKey, ScalarKey
@@ -46,8 +45,6 @@ class Found:
     drag: Drag | None = None  # what follows a dragged tip of the design
     lag: Lag | None = None  # how far the arm lags behind the pointer; None when nobody drags
     held: tuple[Manipulator, Dragged] | None = None  # an arm, and how the last drag left it
-    bench: Bench | None = None  # measured poses
-    sample: Sample | None = None  # markers of the pose that is shown
     check: Check | None = None  # the design against its needs
     check_refusal: str = ""  # reason why it cannot be judged
     part: int = 0  # number of the part whose numbers are typed, in the list of parts
@@ -63,6 +60,11 @@ class Found:
         """One of the reaches, where it is the fine one of a design."""
         reach = getattr(self, name)
         return reach if reach is not None and reach.fine and reach.arm == design else None
+
+
+def is_alike(arm: Manipulator, other: Manipulator) -> bool:
+    """True if two designs differ in their surroundings alone, or not at all."""
+    return arm == other or arm.replace(surroundings=other.surroundings) == other
 
 
 class Known(NamedTuple):
@@ -103,34 +105,3 @@ class Lag:
 
     wanted: Array
     dragged: Dragged
-
-
-@dataclass(frozen=True, eq=False)
-class Bench:
-    """Measured poses, and the pose that is shown."""
-
-    data: Measurements
-    arm: Manipulator  # the design that they were read for
-    number: int = 0  # of the pose that is shown
-
-    def fits(self, arm: Manipulator) -> bool:
-        """True of an arm with the inputs and the markers of the one that the data were read for."""
-        columns = lambda arm: (arm.input_names, arm.input_units, [m.name for m in arm.markers])
-        return columns(arm) == columns(self.arm)
-
-    def posed(self, state: StudioState) -> StudioState:
-        """The state with the inputs of the pose, as far as its bounds go."""
-        return state.replace(activation=tuple(self.data.inputs[self.number].tolist()))
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """Markers of a measured pose."""
-
-    measured: Array  # [m], shape (marker, 3)
-    predicted: Array  # of the design [m], shape (marker, 3)
-
-    @property
-    def distances(self) -> Array:
-        """From measured to predicted markers [m], shape (marker,)."""
-        return np.linalg.norm(self.predicted - self.measured, axis=1)

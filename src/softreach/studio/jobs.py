@@ -14,7 +14,7 @@ import numpy as np
 from softreach.geometry.rays import is_behind
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.figures import section_picture, volume_slopes
-from softreach.studio.found import Clearance, Found, Known, in_session
+from softreach.studio.found import Clearance, Found, Known, in_session, is_alike
 from softreach.studio.reach import (
     Quality,
     Reach,
@@ -115,11 +115,13 @@ def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job
 
 def _compute_reach(given: Given) -> Results:
     state, level = given.state, given.state.appearance.level
-    if (known := given.found.complete_reach(state.design)) is not None:
+    known = given.found.reach
+    if known is not None and known.fine and is_alike(known.arm, state.design):
         enough = max(known.samples, known.wanted) >= 1 << level
         if enough or known.cloud.attrs.get("sampler") != "sobol":
             same_unit = known.arm.length_unit == state.design.length_unit
-            yield Learned({} if same_unit else {"reach": replace(known, arm=state.design)})
+            same = same_unit and known.arm == state.design
+            yield Learned({} if same else {"reach": known.beside(state.design), "refusal": ""})
             return
     try:
         for reach in stages(state.design, level, given.quality, given.check, given.report):
@@ -182,7 +184,11 @@ def _differentiate(given: Given) -> Results:
     if (reach := given.found.complete_reach(design)) is not None:
         before, ends = given.found.ends, slider_ends(design, given.found.ends, check)
         yield Learned({"ends": before if ends == before else ends})
-        yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
+        slopes = given.found.slopes
+        if slopes is not None and is_alike(slopes.arm, design):
+            yield Learned({"slopes": slopes._replace(arm=design)})
+        else:
+            yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
 def _cut(given: Given) -> Results:
@@ -253,7 +259,7 @@ def _look(given: Given) -> None:
     scene.axes.turn(position, given.camera.focal)
     tip = found.tip if look.mouse == "tip" and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
-    scene.see_through_arm(found.sample is not None or hides)
+    scene.see_through_arm(hides)
 
 
 def _compute_beside(given: Given, name: str) -> Results:
@@ -293,7 +299,7 @@ _OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
 _IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
 _AROUND: Any = {"wanted": "design.surroundings", "draws": "/surroundings"}
 _PLANE = "appearance.slice.axis appearance.slice.center"
-_EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged"
+_EYE = "appearance.half appearance.arm appearance.mouse found.tip found.is_dragged"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next

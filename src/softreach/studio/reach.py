@@ -152,6 +152,13 @@ class Reach:
         )
         return replace(self, cloud=cloud, order=None)
 
+    def beside(self, arm: Manipulator) -> Reach:
+        """The same of a design that differs in its surroundings and its unit alone."""
+        cloud = self.cloud.assign_attrs(design=arm.to_toml())
+        made, kept = replace(self, arm=arm, cloud=cloud), ("status", "counts", "sheets")
+        vars(made).update({name: value for name, value in vars(self).items() if name in kept})
+        return made
+
     def share(self, status: TipStatus) -> float:
         """Share of the samples that have a status [-]."""
         return float((self.status == status).mean())

@@ -22,7 +22,7 @@ from softreach.support.errors import InvalidDesign, InvalidInput, Range, Softrea
 from softreach.support.units import UNITS
 
 TOL = 1e-5  # [L], the largest tip error: far below a pixel
-LARGEST = 2_000_000  # bytes of a file that a person opens
+LARGEST = 8_000_000  # bytes of a file that a person opens
 _MOST_PLACES = 300  # to reach, which are judged while a slider moves
 _one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
 

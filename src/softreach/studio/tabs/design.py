@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import math
+import os
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from softreach.arm import designs, edits
 from softreach.arm.base import POINTS
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.obstacles import Obstacle
 from softreach.arm.section import material_names
+from softreach.geometry.meshes import Mesh
+from softreach.geometry.region_tables import SHAPES
+from softreach.geometry.regions import HalfSpace, Region, Sphere
 from softreach.studio import shown_parameters
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
@@ -22,7 +31,7 @@ from softreach.studio.found import Found
 from softreach.studio.shown_parameters import Part, ShownParameter, part_parameters, parts
 from softreach.studio.state import StudioState, rod_of, vector
 from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector_kind
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, NotPossible, SoftreachError
 from softreach.support.units import LengthUnit
 
 Numbers = Callable[[Manipulator], Sequence[ShownParameter]]
@@ -31,6 +40,12 @@ _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
 _AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
 _NEW_RING = "ring"
+_UNITS_OF_MESHES = ("as it says", "m", "cm", "mm", "in")
+_ABOUT_UNIT = "Unit of the file of a mesh: a GLB is in m, few others say what they are in"
+_ABOUT_MESH = "STL, OBJ, PLY, OFF or GLB, closed: the arm must not touch it"
+_ABOUT_SOLID = "Places as x, y, z in the world; a normal points out of what is solid"
+_MESHES = ".stl,.obj,.ply,.off,.glb"
+MOST_TRIANGLES = 20_000  # of a mesh: they are part of the design, and of the state of a tab
 _ABOUT_MADE_OF = "Material of all rings: tendons and chambers need its modulus, often left open"
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus, Poisson's ratio and density to those of a known material"
@@ -133,24 +148,28 @@ def arm_parts(panel: Fields) -> None:
     """A list of parts, the fields of the one that is chosen, and new parts."""
     session = panel.session
     with panel.folder("add a part", expanded=False):
-        kinds = (*edits.ACTUATOR_KINDS, _NEW_RING)
-        hint = "An actuator, or a ring of the cross-section"
+        kinds = (*edits.ACTUATOR_KINDS, _NEW_RING, *edits.SOLID_KINDS)
+        hint = "An actuator, a ring of the cross-section, or a solid that the arm must not touch"
         kind = panel.gui.add_dropdown("kind", kinds, hint=hint)
         matters = (_AS_IT_IS, *material_names())
         made_of = panel.gui.add_dropdown("made of", matters, hint=_ABOUT_MADE_OF)
 
         def add() -> None:
-            before, is_ring, matter = session.state.design, kind.value == _NEW_RING, made_of.value
+            name, matter = kind.value, made_of.value
             made = lambda arm: arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
-            grown = edits.with_ring if is_ring else lambda arm: edits.with_actuator(arm, kind.value)
-            panel.apply(lambda state: state.replace(design=grown(made(state.design))))
-            if session.state.design != before:
-                known = parts(session.state.design).values()
-                like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
-                session.learn({"part": like[-1]})
-                made_of.value = _AS_IT_IS
+            grow(lambda arm: _with_part(made(arm), name))
+            made_of.value = _AS_IT_IS
 
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
+        unit = panel.gui.add_dropdown("unit of mesh", _UNITS_OF_MESHES, hint=_ABOUT_UNIT)
+        read = lambda file: grow(lambda arm: with_mesh(arm, file.name, file.content, unit.value))
+        panel.upload("Load a mesh as a solid", read, _ABOUT_MESH, mime_type=_MESHES)
+
+    def grow(with_part: Callable[[Manipulator], Manipulator]) -> None:
+        before = parts(session.state.design)
+        panel.apply(lambda state: state.replace(design=with_part(state.design)))
+        if new := [k for k, label in enumerate(parts(session.state.design)) if label not in before]:
+            session.learn({"part": new[-1]})
 
     def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
         fields.message, fields.words = message, words
@@ -180,15 +199,81 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     )
     hint = "The part whose numbers are below"
     panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
-    own = part.ring is not None or bool(part.actuator)
+    own = part.ring is not None or part.solid is not None or bool(part.actuator)
     if own:
         at = of_design(lambda _: part.name, lambda arm, name: part.changed(arm, name=name))
         panel.typed("name", at, "What tables and files call it", lambda *_: _NAME)
     _add_matter(panel, part)
     _typed(panel, part_parameters(session.state.design, part))
+    if part.solid is not None:
+        _solid(panel, part)
     if own:
         remove = lambda state: state.replace(design=part.removed(state.design))
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
+
+
+def _with_part(arm: Manipulator, kind: str) -> Manipulator:
+    if kind in edits.SOLID_KINDS:
+        return edits.with_solid(arm, kind)
+    return edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
+
+
+def _solid(panel: Fields, part: Part) -> None:
+    """Numbers of a solid, and the part of the arm that keeps clear of it."""
+    arm, k = panel.session.state.design, part.solid or 0
+    solid, unit = arm.surroundings[k], shown_parameters.typed_unit(arm)
+
+    def here(arm: Manipulator) -> Obstacle:  # until the fields of a removed one are gone, too
+        now = arm.surroundings[k] if k < len(arm.surroundings) else solid
+        return now if type(now.region) is type(solid.region) else solid
+
+    def of(read: Callable[[Obstacle], Any], write: Any, size: float = 1.0) -> Attribute:
+        made = lambda arm, value: part.changed(arm, **write(here(arm), _times(value, size)))
+        return of_design(lambda arm: _over(read(here(arm)), size), made)
+
+    if not isinstance(solid.region, HalfSpace | Sphere):
+        middle = lambda solid: vector(solid.region.bounds.mean(axis=0))
+        move = lambda solid, to: {
+            "region": edits.moved(solid.region, np.subtract(to, middle(solid)))
+        }
+        about = "Middle of the solid, as x, y, z in the world: it moves as a whole"
+        panel.typed(unit.label("place"), of(middle, move, unit.size), about, vector_kind)
+    for name, symbol in _numbers_of(solid.region).items():
+        label = name.replace("_", " ")
+        read = lambda solid, name=name: getattr(solid.region, name)
+        write = lambda solid, x, name=name: {"region": replace(solid.region, **{name: x})}
+        kind = vector_kind if isinstance(read(solid), tuple) else number_kind
+        at = of(read, write, unit.size if symbol else 1.0)
+        panel.typed(unit.label(label) if symbol else label, at, _ABOUT_SOLID, kind)
+    keep = of(lambda s: s.clearance, lambda _, x: {"clearance": x}, unit.size)
+    panel.typed(unit.label("distance to keep"), keep, "The clearance is the gap beyond it")
+    start = of(lambda s: s.start_over_length, lambda _, x: {"start_over_length": x, "start": None})
+    panel.typed("clear from Z / L", start, "The arm from here to its tip must keep clear")
+    inside = of(lambda solid: solid.inside, lambda _, on: {"inside": bool(on)})
+    panel.checkbox("the arm is inside", inside, "All around is solid, as for an arm in a tank")
+
+
+def _numbers_of(region: Region) -> Mapping[str, str]:
+    """Numbers of a region that are typed, and their units; none of a mesh."""
+    known = {kind: own for kind, own in SHAPES.values() if kind is not Mesh}
+    return known.get(type(region), {})
+
+
+def with_mesh(arm: Manipulator, name: str, content: bytes, unit: str) -> Manipulator:
+    """The arm with one more solid, from the file of a mesh."""
+    with tempfile.TemporaryDirectory(prefix="softreach-") as folder:
+        path = Path(folder) / Path(name).name
+        path.write_bytes(content)
+        try:
+            mesh = Mesh.load(path, unit=None if unit == _UNITS_OF_MESHES[0] else unit)
+        except SoftreachError as error:
+            raise NotPossible(str(error).replace(f"{folder}{os.sep}", "")) from None
+    if len(mesh.faces) > MOST_TRIANGLES:
+        allowed = f"at most {MOST_TRIANGLES:,} in the studio"
+        hint = "name the file in the design, or make it coarser"
+        raise InvalidInput("triangles", f"{len(mesh.faces):,}", allowed, hint)
+    solid = Obstacle(region=edits.moved(mesh, np.zeros(3)), name=Path(name).stem)
+    return arm.replace(surroundings=(*arm.surroundings, solid))
 
 
 def _add_matter(panel: Fields, part: Part) -> None:

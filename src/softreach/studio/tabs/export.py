@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import tempfile
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.obstacles import Obstacle
 from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
+from softreach.geometry.meshes import MeshFile
 from softreach.plot.coloring import draw_figure_key
 from softreach.plot.style import inked
 from softreach.rod.kinematics import configuration
@@ -56,7 +59,8 @@ def export(panel: Fields) -> None:
         state = lambda: session.state_now().to_json().encode()
         keep = lambda: session.send("softreach-studio.json", state)
         panel.button("Save this work", keep, about)
-        read = lambda file: session.restore(saved(file.name, file.content))
+        own = session.start.state.design.surroundings
+        read = lambda file: session.restore(saved(file.name, file.content, own))
         hint = "A state (.json) or a design (.toml) that was saved"
         panel.upload("Load state or design", read, hint, **GRAY)
     for folder, kind in (("design and data", "data"), ("pictures", "picture")):
@@ -70,14 +74,28 @@ def export(panel: Fields) -> None:
             panel.button(f"Save {kind}", save, "As a file of this type")
 
 
-def saved(name: str, content: bytes) -> Change:
-    """The change to the state in a file that was saved, or to the design of a TOML file."""
+def saved(name: str, content: bytes, own: Sequence[Obstacle] = ()) -> Change:
+    """The change to the state in a file that was saved, or to the design of a TOML file.
+
+    Of files of meshes it may name those of its `own` surroundings: others are not for the page.
+    """
     text = file_text(name, content)
     if name.lower().endswith(".toml"):
         design = design_of_text(text, name)
+        _check_meshes(design, own)
         return lambda state: state.replace(design=design)
     state = StudioState.from_json(text)
+    for arm in filter(None, (state.design, state.reference)):
+        _check_meshes(arm, own)
     return lambda _: state
+
+
+def _check_meshes(arm: Manipulator, own: Sequence[Obstacle]) -> None:
+    known = {each.region for each in own}
+    for region in (each.region for each in arm.surroundings):
+        if isinstance(region, MeshFile) and region not in known:
+            allowed = "part of the text, as other files are not sent along"
+            raise InvalidInput("mesh", region.path, allowed, "load it on the tab Parts")
 
 
 def content_of(session: Session, name: str, write: Write) -> bytes:
