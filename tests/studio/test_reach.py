@@ -10,7 +10,6 @@ import softreach as sr
 from softreach import schema
 from softreach.arm import designs
 from softreach.arm.loads import GRAVITIES, Loads
-from softreach.cloud.clouds import compute_cloud
 from softreach.picture.gltf import ColoredSkin
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.tip_map import TipStatus, has_tip
@@ -40,14 +39,6 @@ def test_the_coarse_cloud_is_the_beginning_of_the_fine_one_which_has_what_is_sho
     assert coarse.volume == pytest.approx(fine.volume, rel=0.02)
     *_, shown = stages(trunk, 14, SMALL, lambda: None)
     assert shown.samples == 1 << 14
-
-
-def test_a_grid_from_a_file_is_thinned_evenly(trunk):
-    grid = reaching.reached(compute_cloud(trunk, 16**3, sampler="grid"), SMALL)
-    few = grid.cloud.activation.values[shown_samples(grid, 9)]
-    np.testing.assert_allclose(few.mean(axis=0), trunk.bounds.mean(axis=1), atol=0.1)
-    uniform = reaching.reached(compute_cloud(trunk, 1000), SMALL)
-    np.testing.assert_array_equal(shown_samples(uniform, 14), np.arange(1000))
 
 
 def test_every_color_that_is_offered_colors_every_point_that_is_shown(both):

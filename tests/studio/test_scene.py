@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import softreach as sr
 from softreach.arm import Marker, designs
 from softreach.arm.parameters import changed
 from softreach.inverse.path import PathStatus
-from softreach.rod import as_tip_map
 from softreach.rod.kinematics import marker_positions
 from softreach.studio.found import Found
 from softreach.studio.reach import Size, stages
@@ -168,24 +166,6 @@ def test_a_reach_beside_is_a_faint_surface_and_points_only_where_it_has_none(who
     assert len(meshes.added["/free"].points)
     scene.draw_beside("/free", None, Slice())
     assert not meshes.added
-
-
-def test_a_ghost_is_met_by_a_ray_to_it_but_not_behind_the_arm_or_where_all_meet(trunk):
-    scene, shapes = Scene(Meshes()), np.array([[-1.0, 0.0, -0.4], [0.0, -1.0, -0.4]])
-    scene.draw_arm(trunk, [0.0, 0.0, -1.2])
-    for k, shape in enumerate(shapes):
-        scene.draw_arm(trunk, shape.tolist(), f"/ghosts/{k}")
-    middles = as_tip_map(trunk).frames(shapes, [0.6 * trunk.length]).position[:, 0] / trunk.length
-    tips = sr.tip_positions(trunk, shapes) / trunk.length
-    for k, (middle, tip) in enumerate(zip(middles, tips, strict=True)):
-        eye = middle + np.array([0.3, -3.0, 0.1])
-        assert scene.ghost_under(eye, 2.0 * (middle - eye)) == k
-        assert scene.ghost_under(eye, eye - middle) is None
-        assert scene.ghost_under(tip + [0.0, 0.0, 3.0], np.array([0.0, 0.0, -1.0])) is None
-        behind = scene.spine[0][30] + 2.0 * (scene.spine[0][30] - middle)
-        assert scene.ghost_under(behind, middle - behind) is None
-    scene.remove("/ghosts")
-    assert scene.ghost_under(eye, middle - eye) is None
 
 
 # Two designs compared, without a server

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import Obstacle, designs
+from softreach.arm import Marker, Obstacle, designs, edits
+from softreach.cloud.clouds import design_of
 from softreach.geometry.regions import Box, Cylinder, HalfSpace, Region, Sphere, Tube
 from softreach.rod import compute_clearance
 from softreach.studio.captions import clearance_text
@@ -14,7 +15,11 @@ from softreach.studio.scene import colors
 from softreach.studio.scene.scene import Scene
 from softreach.studio.scene.solids import region_surface
 from softreach.studio.session import Session
-from softreach.studio.state import Appearance
+from softreach.studio.state import Appearance, StudioState, vector
+from softreach.studio.tabs import move
+from softreach.studio.tabs.design import with_mesh
+from softreach.studio.tabs.export import saved
+from softreach.support.errors import InvalidInput, SoftreachError
 from tests.studio.test_scene import Meshes
 
 SMALL = Quality(coarse_level=10, fine_level=11, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -93,3 +98,92 @@ def test_a_cloud_is_colored_by_the_clearance_of_the_library_and_free_samples_sta
     meshes = Meshes()
     Scene(meshes).draw_cloud(reach, Appearance(level=11 + 1, cloud=True, free=True, half=False))
     assert len(meshes.added["/cloud"].points) == (~touching).sum() > 100
+
+
+# Solids are parts of the design: typed, moved, loaded from the file of a mesh
+
+
+def test_a_solid_that_is_moved_leaves_the_set_as_it_is_and_its_cloud_names_it(session):
+    reach = session.found.reach
+    session.update(lambda s: s.replace(design=edits.with_solid(s.design, "box")))
+    session.settle()
+    assert session.found.reach.exact is reach.exact
+    assert session.found.reach.arm == session.state.design
+    assert design_of(session.found.reach.cloud) == session.state.design
+    assert session.found.slopes.arm == session.state.design
+
+
+def stl(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.torus(120, 30).export(tmp_path / "ring.stl")
+    return (tmp_path / "ring.stl").read_bytes()
+
+
+def test_a_mesh_is_loaded_in_its_unit_and_stays_in_the_text_of_the_design(tmp_path):
+    content = stl(tmp_path)
+    arm = with_mesh(designs.minimal_trunk(), "../ring.stl", content, "mm")
+    (ring,) = arm.surroundings
+    assert ring.name == "ring"
+    assert ring.region.volume == pytest.approx(2 * np.pi**2 * 0.12 * 0.03**2, rel=0.05)
+    again = StudioState.from_json(StudioState(design=arm).to_json()).design.surroundings[0]
+    np.testing.assert_array_equal(again.region.vertices, ring.region.vertices)
+    for unit, bad, words in (
+        ("as it says", content, "does not name its unit"),
+        ("mm", content[:-50], "ring.stl"),
+    ):
+        with pytest.raises(SoftreachError, match=words) as refused:
+            with_mesh(arm, "ring.stl", bad, unit)
+        assert "/" not in str(refused.value)
+
+
+def test_a_page_may_name_no_mesh_of_this_machine_but_those_it_was_opened_on():
+    text = designs.minimal_trunk().to_toml() + '\n[[surroundings]]\nmesh = "/etc/part.stl"\n'
+    with pytest.raises(InvalidInput, match="other files are not sent along"):
+        saved("tank.toml", text.encode())
+    arm = sr.Manipulator.from_toml(text)
+    assert (
+        saved("tank.toml", text.encode(), arm.surroundings)(StudioState(design=ARM)).design == arm
+    )
+
+
+# Where the tip points, and what counts as the tip
+
+
+def test_the_inverse_meets_a_direction_within_its_cone_and_says_how_far_off_it_is(session):
+    arm, pulls = designs.redundant_trunk(), (-0.7, -0.4, -0.9, -0.2)
+    shape = sr.configuration(arm, pulls, 2)
+    target, way = shape.position.values[-1], shape.directors.values[-1, 2]
+    session.update(lambda s: s.replace(design=arm, target=vector(target), direction=tuple(2 * way)))
+    session.settle()
+    answer = session.found.answer
+    assert len(answer) >= 1
+    assert np.degrees(answer.direction_errors.max()) <= 1.0 + 1e-4
+    angle = np.degrees(answer.direction_errors.max())
+    assert f", direction error {angle:.3g}°" in move._answer_text(session.state, session.found)[0]
+    end = session.client.scene.get_handle_by_name("/target/way/end")
+    np.testing.assert_allclose(end.position, 0.15 * way, atol=1e-6)
+    session.update(lambda s: s.replace(direction=tuple(-way)))
+    session.settle()
+    answer = session.found.answer
+    exact = sr.solve_inverse(arm, [target], direction=-way, cone=np.radians(1.0), from_rest=True)[0]
+    assert answer.direction_gap == pytest.approx(exact.direction_gap, rel=1e-6)
+    (text,) = move._answer_text(session.state, session.found)
+    assert f"position error {answer.gap:.3g} m, direction error" in text
+    with pytest.raises(InvalidInput, match="direction"):
+        session.state.replace(direction=(0.0, 0.0, 0.0))
+
+
+def test_the_tip_that_is_shown_is_the_point_of_the_tool():
+    trunk, pulls = designs.minimal_trunk(), (-0.7, -0.4, -0.9)
+    held = Marker(name="tool", offset=(0.02, 0.0, 0.2))
+    middle = Marker(name="middle", station_over_length=0.53, offset=(0.1, 0.0, 0.0))
+    for marker in (held, middle):
+        arm, meshes = trunk.replace(markers=(marker,), point=marker.name), Meshes()
+        scene = Scene(meshes)
+        tip = scene.draw_arm(arm, pulls)
+        np.testing.assert_allclose(tip, sr.tip_positions(arm, [pulls])[0], atol=1e-6)
+        z = marker.station_over_length * arm.length
+        section = sr.configuration(arm, pulls, [0.0, z])
+        np.testing.assert_allclose(scene.pointing, section.directors.values[-1, 2], atol=1e-6)
+        line = meshes.added["/arm/tool"].points[0]
+        np.testing.assert_allclose(line, [section.position.values[-1], tip], atol=1e-6)

@@ -112,11 +112,6 @@ def with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Manipulat
     return _with_rings(arm, rings, {} if rings[index].name == old.name else {old.name: index})
 
 
-def with_material(arm: Manipulator, material: str) -> Manipulator:
-    """The arm with all of its rings made of one named material."""
-    return _with_rings(arm, [ring.replace(material=material) for ring in arm.section.rings])
-
-
 def _with_rings(
     arm: Manipulator, rings: Sequence[Ring], moved: Mapping[int | str, int] = {}
 ) -> Manipulator:

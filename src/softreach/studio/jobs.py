@@ -118,7 +118,7 @@ def _compute_reach(given: Given) -> Results:
     known = given.found.reach
     if known is not None and known.fine and is_alike(known.arm, state.design):
         enough = max(known.samples, known.wanted) >= 1 << level
-        if enough or known.cloud.attrs.get("sampler") != "sobol":
+        if enough:
             same_unit = known.arm.length_unit == state.design.length_unit
             same = same_unit and known.arm == state.design
             yield Learned({} if same else {"reach": known.beside(state.design), "refusal": ""})

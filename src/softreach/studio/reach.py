@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.cloud.clouds import compute_cloud, design_of
+from softreach.cloud.clouds import compute_cloud
 from softreach.picture.zbuffer import vertex_normals
 from softreach.rod.rods import all_inputs
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
@@ -75,7 +75,6 @@ class Reach:
     refusal: str = ""  # reason why there is no exact set
     notes: tuple[str, ...] = ()  # parts that are left out or coarser than wanted, and why
     wanted: int = 0  # number of samples; there are fewer where each costs much
-    order: Index | None = None  # one whose prefixes are even subsamples, if the cloud's is not
 
     @property
     def samples(self) -> int:
@@ -150,7 +149,7 @@ class Reach:
             tip=(cloud.tip.dims, sheets.vertices + inward, cloud.tip.attrs),
             activation=(given.dims, activation, given.attrs),
         )
-        return replace(self, cloud=cloud, order=None)
+        return replace(self, cloud=cloud)
 
     def beside(self, arm: Manipulator) -> Reach:
         """The same of a design that differs in its surroundings and its unit alone."""
@@ -167,8 +166,6 @@ class Reach:
 def shown_samples(reach: Reach, level: int) -> Index:
     """Numbers of the samples that a picture of 2^level points shows: those that have a tip."""
     rows = np.arange(min(1 << level, reach.samples))
-    if reach.order is not None:
-        rows = reach.order[rows]
     return rows[has_tip(reach.status[rows])]
 
 
@@ -256,16 +253,6 @@ class _Work:
             self.report(doing + part if done else doing)
 
         return Budget(self.check, self.quality.most_seconds, report)
-
-
-def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
-    """The reach that belongs to a cloud from a file."""
-    ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
-    shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
-    reach = Reach(arm=design_of(cloud), cloud=cloud, exact=None, fine=True, order=shuffled)
-    work = _Work(reach.arm, 0, quality, lambda: None, _quiet)
-    with all_cores:
-        return work.measured(reach, quality.fine_accuracy)
 
 
 def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:

@@ -57,8 +57,7 @@ class Session:
         left = work and work.latest
         self.is_touched = left is not None  # true once there is anything to keep
         self.state = left or start.state
-        same = self.state.design == start.state.design
-        self.found = Found(reach=start.reach) if same else Found()
+        self.found = Found()
         self.panels: list[Callable[[], None]] = []  # each shows again what has changed
         self.revision = 0  # number of changes that widgets have to follow, whatever they hold
         self.note, self.doing = "", ""  # for the reader, the second on the work that is being done

@@ -17,7 +17,7 @@ from softreach.requirements import Requirements
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_instance, as_integer, as_number, as_one_of
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import as_directions, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.units import UNITS
 
@@ -91,7 +91,7 @@ AXES = ("none", "x", "y", "z")
 _LONGEST = 200  # steps back
 _PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
 _SETTINGS = ("design", "reference", "needs")
-_POSE = ("activation", "target")
+_POSE = ("activation", "target", "direction", "cone")
 _FAR = 1e3  # [L], beyond which there is nothing to see
 _PLACES, _SIZES = Range(-_FAR, _FAR), Range(0.0, _FAR)
 Vector = tuple[float, float, float]
@@ -193,6 +193,8 @@ class StudioState:
     """Of each bundle in its unit, within the bounds; rest, or what is nearest to it, by default."""
     appearance: Appearance = field(default_factory=Appearance)
     target: Vector | None = None  # place where the tip should go [m]
+    direction: tuple[float, ...] = ()  # where it should point there, of any length; () for anywhere
+    cone: float = 1.0  # angle from that direction that is allowed [deg]
     reference: Manipulator | None = None  # a design that is kept, to be compared with this one
     camera: Camera | None = None
     path: TipPath | None = None  # that the tip follows
@@ -202,6 +204,9 @@ class StudioState:
         if self.reference is not None:
             rod_of(self.reference)
         requirements_of(self.needs)
+        as_number("within", self.cone, Range(0.0, 180.0))
+        if self.direction:
+            as_directions("direction", self.direction, 1)
         if (unit := self.appearance.unit) and unit != self.design.display_unit:
             object.__setattr__(self, "design", self.design.replace(display_unit=unit))
         box = rod_of(self.design).box
@@ -262,6 +267,8 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "activation": lambda values: tuple(map(float, values)),
     "appearance": lambda look: Appearance(**look | {"slice": Slice(**look["slice"])}),
     "target": lambda place: vector(place),
+    "direction": lambda way: tuple(map(float, way)),
+    "cone": float,
     "reference": lambda text: design_of_text(text, "state file"),
     "camera": lambda camera: Camera(**camera),
     "path": lambda path: TipPath.through(**path),

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import Centerline, arm_surface, bundle_skins, inside, marker_points
-from softreach.geometry.rays import way_to
 from softreach.picture.gltf import ColoredSkin, glb, shaded
 from softreach.picture.zbuffer import vertex_normals
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
@@ -50,10 +49,10 @@ _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
 """Color and opacity of the reach without loads, and of the one of the kept design."""
 MARK: Color = (235, 90, 0)
 DARK: Color = (30, 30, 30)
+_TOOL = 0.006  # thickness of the line from a section to the point that counts as the tip [L]
 MARKER = 0.016  # edge of the dot of a marker [L]
 _USUAL, _POINT, _POINTS = 1 << 17, 0.007, (0.003, 0.01)  # points of a cloud, and their edges [L]
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
-_AROUND_TIP = 0.06  # [L], where a click means no ghost: all shapes meet there
 _AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
 """Corners around most clouds, seen from the base [L]."""
 
@@ -235,17 +234,6 @@ class Scene:
         drawn = self._arms.get("/arm")
         return (np.empty((0, 3)), np.empty(0)) if drawn is None else (drawn.centers, drawn.radii)
 
-    def ghost_under(self, origin: Array, direction: Array) -> int | None:
-        """Number of the ghost that a ray meets before others and the arm, away from their tips."""
-        met = []
-        for path, ghost in list(self._arms.items()):
-            if path.startswith("/ghosts"):
-                apart = np.linalg.norm(ghost.centers - ghost.centers[-1], axis=1) > _AROUND_TIP
-                way = way_to(ghost.centers[apart], ghost.radii[apart], origin, direction)
-                met.append((way, int(path.rpartition("/")[2])))
-        way, nearest = min(met, default=(np.inf, 0))
-        return nearest if way < way_to(*self.spine, origin, direction) else None
-
     def draw_arm(
         self,
         arm: Manipulator,
@@ -258,6 +246,8 @@ class Scene:
         Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
         stations = np.linspace(0.0, arm.length, _STATIONS)
+        if arm.pointed is not None:
+            stations = np.union1d(stations, arm.pointed.station_at("station", arm.length))
         frames = with_unstable(rod or solvable_rod(arm)).frames([activation], stations)
         line = Centerline(z=stations, position=frames.position[0], directors=frames.directors[0])
         return self._draw_line(arm, line, path)
@@ -277,8 +267,13 @@ class Scene:
         if np.isnan(centers).any():
             self.remove(path)
             return np.full(3, np.nan)
+        markers = marker_points(arm.markers, line) / arm.length
+        end, tip = -1, centers[-1] / arm.length
+        if arm.pointed is not None:
+            end = int(np.searchsorted(line.z, arm.pointed.station_at("station", arm.length)))
+            tip = markers[arm.markers.index(arm.pointed)]
         if path == "/arm":
-            self.pointing = line.directors[-1, 2]
+            self.pointing = line.directors[end, 2]
         skins = [arm_surface(arm, line, _SIDES)]
         if arm.bundles <= MOST_BUNDLES:
             skins += bundle_skins(arm, line, lift=_LIFT, step=_ACROSS)
@@ -300,9 +295,10 @@ class Scene:
                 for k, (v, f, color, opacity) in parts
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
-        markers = marker_points(arm.markers, line) / arm.length
         self.dots(f"{path}/markers", markers, DARK, MARKER)
-        return centers[-1] / arm.length
+        if arm.pointed is not None:
+            self.lines(f"{path}/tool", np.array([[centers[end] / arm.length, tip]]), DARK, _TOOL)
+        return tip
 
     def see_through_arm(self, clear: bool) -> None:
         """Let what is behind the arm be seen through it, or not."""

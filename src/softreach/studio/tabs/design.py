@@ -20,6 +20,7 @@ from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.obstacles import Obstacle
 from softreach.arm.section import material_names
+from softreach.arm.stations import Marker
 from softreach.geometry.meshes import Mesh
 from softreach.geometry.region_tables import SHAPES
 from softreach.geometry.regions import HalfSpace, Region, Sphere
@@ -38,15 +39,14 @@ Numbers = Callable[[Manipulator], Sequence[ShownParameter]]
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
-_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
-_NEW_RING = "ring"
+_AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
+_NEW_RING, _TOOL = "ring", "tool"
 _UNITS_OF_MESHES = ("as it says", "m", "cm", "mm", "in")
 _ABOUT_UNIT = "Unit of the file of a mesh: a GLB is in m, few others say what they are in"
 _ABOUT_MESH = "STL, OBJ, PLY, OFF or GLB, closed: the arm must not touch it"
 _ABOUT_SOLID = "Places as x, y, z in the world; a normal points out of what is solid"
 _MESHES = ".stl,.obj,.ply,.off,.glb"
 MOST_TRIANGLES = 20_000  # of a mesh: they are part of the design, and of the state of a tab
-_ABOUT_MADE_OF = "Material of all rings: tendons and chambers need its modulus, often left open"
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus, Poisson's ratio and density to those of a known material"
 _WAYS = {name: name for name in POINTS} | {"up": "up (upright)", "down": "down (hanging)"}
@@ -151,19 +151,11 @@ def arm_parts(panel: Fields) -> None:
         kinds = (*edits.ACTUATOR_KINDS, _NEW_RING, *edits.SOLID_KINDS)
         hint = "An actuator, a ring of the cross-section, or a solid that the arm must not touch"
         kind = panel.gui.add_dropdown("kind", kinds, hint=hint)
-        matters = (_AS_IT_IS, *material_names())
-        made_of = panel.gui.add_dropdown("made of", matters, hint=_ABOUT_MADE_OF)
-
-        def add() -> None:
-            name, matter = kind.value, made_of.value
-            made = lambda arm: arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
-            grow(lambda arm: _with_part(made(arm), name))
-            made_of.value = _AS_IT_IS
-
+        add = lambda: grow(lambda arm: _with_part(arm, kind.value))
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
         unit = panel.gui.add_dropdown("unit of mesh", _UNITS_OF_MESHES, hint=_ABOUT_UNIT)
         read = lambda file: grow(lambda arm: with_mesh(arm, file.name, file.content, unit.value))
-        panel.upload("Load a mesh as a solid", read, _ABOUT_MESH, mime_type=_MESHES)
+        panel.upload("Load a mesh as a solid", read, _ABOUT_MESH, mime_type=_MESHES, **GRAY)
 
     def grow(with_part: Callable[[Manipulator], Manipulator]) -> None:
         before = parts(session.state.design)
@@ -182,6 +174,38 @@ def arm_parts(panel: Fields) -> None:
     panel.anew("part", "design", "found.part", key=_chosen, build=build)
     message = panel.kept(Line(panel.gui))
     panel.message, panel.words = message, words
+
+
+def tool(panel: Fields) -> None:
+    """The point that counts as the tip: the tip itself, a straight tool, or a marker."""
+    unit = lambda state, _: shown_parameters.typed_unit(state.design)
+    pointed = panel.session.state.design.point is not None
+    panel.anew("tool", "design", key=unit, build=_tool, expanded=pointed)
+
+
+def _tool(panel: Fields, unit: LengthUnit) -> None:
+    def offered(state: StudioState) -> dict[str, str]:
+        known = {marker.name: marker.name for marker in state.design.markers}
+        return {"": "none", _TOOL: "a straight tool"} | known
+
+    def choose(arm: Manipulator, name: str) -> Manipulator:
+        if name and name not in {marker.name for marker in arm.markers}:
+            new = Marker(name=name, offset=(0.0, 0.0, float(f"{0.1 * arm.length:.2g}")))
+            return arm.replace(markers=(*arm.markers, new), point=name)
+        return arm.replace(point=name or None)
+
+    def place(arm: Manipulator, offset: Any) -> Manipulator:
+        held = arm.pointed
+        made = (
+            m if m is not held else m.replace(offset=_times(offset, unit.size)) for m in arm.markers
+        )
+        return arm.replace(markers=tuple(made))
+
+    at = of_design(lambda arm: arm.point or "", choose)
+    panel.dropdown("tool", offered, at, "The point that counts as the tip in all that is computed")
+    offset = lambda arm: _over(arm.pointed.offset if arm.pointed else (0.0, 0.0, 0.0), unit.size)
+    about = "Point of the tool, from the center of its section: across it x, y, and z along the arm"
+    panel.typed(unit.label("tool point"), of_design(offset, place), about, vector_kind)
 
 
 def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, object]:

@@ -41,8 +41,8 @@ Write = Callable[[Session, Path], object]
 _ABOUT = {
     "data": "The design alone, which the command line reads too; all samples of the cloud; the "
     "exact boundary of the reachable set; or the arm as bent. Lengths are in the unit of the page",
-    "picture": "The scene as it is seen, with legend and design; three views and an oblique one of "
-    "the points that are shown; or one web page with the scene, which turns without the studio",
+    "picture": "The scene as it is seen, with legend and design; or one web page with the scene, "
+    "which turns without the studio",
 }
 _PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
 """Of a light page and of a dark one."""
@@ -134,18 +134,6 @@ def _write_arm(session: Session, path: Path) -> None:
     export_arm(arm, shape, path, unit=arm.length_unit)
 
 
-def _write_views(session: Session, path: Path) -> None:
-    """Three views and an oblique one of the points that are shown, in their colors."""
-    from softreach import plot
-    from softreach.plot.style import pyplot
-
-    arm, (cloud, color) = session.state.design, _shown(session)
-    shape = configuration(arm, session.state.activation)
-    figure = plot.plot_views(cloud, arm, shape, color=color)
-    plot.save_figure(figure, path)
-    pyplot().close(figure)
-
-
 def _write_page(session: Session, path: Path) -> None:
     """A web page to be turned: the boundary or the points that are shown, and the arm as it is."""
     from softreach import plot
@@ -219,7 +207,6 @@ FILES: Mapping[str, Mapping[str, tuple[str, Write]]] = {
     },
     "picture": {
         "as it is seen (.png)": ("studio.png", _write_picture),
-        "four views (.png)": ("reachability.png", _write_views),
         "web page (.html)": ("reachability.html", _write_page),
     },
 }

@@ -24,13 +24,16 @@ from softreach.studio.scene.scene import DARK, MARK, MOST_BUNDLES, pieces
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import three_digits
 from softreach.studio.state import MOUSE, StudioState, TipPath, rod_of, solvable_rod, vector
-from softreach.studio.widgets import TypedField, vector_kind
+from softreach.studio.widgets import TextKind, TypedField, numbers_in, vector_kind
 from softreach.support.errors import InvalidInput
+from softreach.support.quantity import five_digits
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
     from viser import UploadedFile
+
+    from softreach.inverse import Solution
 
 _DRAG_HINT = (
     "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
@@ -46,6 +49,13 @@ _DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, an
 _RESIDUAL = 1e-8  # [L]
 _STEP = 0.05  # [s] between points that are played
 _TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
+_WAY = 0.15  # length of the line along the direction that is wanted [L]
+_DIRECTION = TextKind(
+    "three numbers, or nothing",
+    lambda text: numbers_in(text, 3, "", 1.0) if text.strip() else (),
+    lambda way: ", ".join(map(five_digits, way)),
+)
+_ABOUT_DIRECTION = "Where the tip should point at the target, as x, y, z; empty for anywhere"
 _PALE = (240, 175, 205)  # of a path, where the arm does not follow it
 
 
@@ -141,19 +151,22 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
             field.value = tuple(unit.of(np.array(state.target)).tolist())
 
     panel.follow("target", show=follow)
-    some = lambda _, found: found.answer is not None and len(found.answer) > 0
-    panel.anew("activations that reach it", "found.answer", build=_solutions, shown=some)
+    panel.typed("direction", attribute("direction"), _ABOUT_DIRECTION, lambda *_: _DIRECTION)
+    panel.typed("within [deg]", attribute("cone"), "Angle from that direction that is allowed")
+    present = lambda state: state.replace(direction=tuple(session.found.pointing.round(4).tolist()))
+    panel.change("As it points now", present, "Keeps the direction of the tip", **GRAY)
+    panel.anew("activations", "found.answer", build=_solutions, shown="found.answer")
     about, off = "Takes target and solutions away", lambda state: state.replace(target=None)
     panel.change("Clear the target", off, about, "target", **GRAY)
 
 
 def _solutions(panel: Fields, _: object) -> None:
-    """A button for each solution; that of the one that the arm is in is green."""
+    """A button for each solution, or for the nearest; that of where the arm is is green."""
     answer = panel.session.found.answer
-    for row in answer.activations if answer is not None else ():
+    for row in _shapes(answer) if answer is not None else ():
         text = ", ".join(f"{value:.4g}" for value in row)
         act = lambda row=row: take(panel.session, row)
-        button = panel.button(text, act, "Moves the arm to this solution")
+        button = panel.button(text, act, "Moves the arm there")
 
         def mark(state: StudioState, _: Found, row: Any = row, button: Any = button) -> None:
             scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
@@ -178,14 +191,23 @@ def _answer_text(state: StudioState, found: Found) -> list[str]:
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
         near = place_text(answer.nearest / arm.length, arm)
-        gap = unit.rounded(answer.gap, digits=".3g")
-        return [f"{place} is {certain}. Nearest: {near}, {gap} away."]
+        gap, off = unit.rounded(answer.gap, digits=".3g"), _angle_text(answer.direction_gap)
+        return [f"{place} is {certain}. Nearest: {near}, position error {gap}{off}."]
     count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
     return [
-        f"{count} {place} to {unit.rounded(answer.residuals.max(), digits='.1e')}. Press one "
-        f"({', '.join(arm.input_names)}) to move the arm there, or click its shape; the one with a "
-        "check mark is where it is."
+        f"{count} {place}, position error {unit.rounded(answer.residuals.max(), digits='.1e')}"
+        f"{_angle_text(answer.direction_errors.max())}. Press one "
+        f"({', '.join(arm.input_names)}) to move the arm there; it is at the one with a check mark."
     ]
+
+
+def _angle_text(angle: float) -> str:
+    return "" if math.isnan(angle) else f", direction error {math.degrees(angle):.3g}°"
+
+
+def _shapes(answer: Solution) -> np.ndarray:
+    """The activations that reach the target, or those that bring the tip nearest to it."""
+    return answer.activations if len(answer) else answer.nearest_activation[None]
 
 
 def path(panel: Fields) -> None:
@@ -273,8 +295,10 @@ def _solve(given: Given) -> Sequence[Learned]:
         return [Learned({"answer": None})]
     solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
-    answers = solve_inverse(state.design, [state.target], near=near, family=_FAMILY, from_rest=True)
-    answer = answers[0]
+    options: dict[str, Any] = {"near": near, "family": _FAMILY, "from_rest": True}
+    if state.direction:
+        options |= {"direction": state.direction, "cone": math.radians(state.cone)}
+    answer = solve_inverse(state.design, [state.target], **options)[0]
     if given.found.takes_nearest and len(answer):
         distance = np.linalg.norm(answer.activations - state.activation, axis=1)
         best = tuple(answer.activations[np.argmin(distance)].tolist())
@@ -293,8 +317,11 @@ def _draw_answer(given: Given) -> None:
     if not len(answer):
         scene.lines("/gap", pieces(np.stack([target, nearest])), MARK, 0.004)
         scene.api.add_icosphere("/gap/nearest", _NEAREST, DARK, position=nearest)
-    shapes = answer.activations if len(answer) else answer.nearest_activation[None]
-    for k, activation in enumerate(shapes):
+    if (way := np.array(given.state.direction)).any():
+        end = _WAY * way / np.linalg.norm(way)  # from the target, under which its node is
+        scene.lines("/target/way", np.array([[np.zeros(3), end]]), MARK, 0.008)
+        scene.api.add_icosphere("/target/way/end", _NEAREST, MARK, position=end)
+    for k, activation in enumerate(_shapes(answer)):
         scene.draw_arm(design, activation.tolist(), f"/ghosts/{k}")
 
 
@@ -375,7 +402,7 @@ _AIM: Any = {"wanted": "target", "makes": "answer takes_nearest", "draws": "/gho
 _OF_PATH: dict[str, Any] = {"wanted": "path", "makes": "track", "doing": "following the path"}
 JOBS = (
     # The activations that reach the target, and their shapes
-    Job("inverse", "design target", _solve, _draw_answer, **_AIM),
+    Job("inverse", "design target direction cone", _solve, _draw_answer, **_AIM),
     # The arm follows its dragged tip on its branch; where that rests, every branch is looked for
     Job("drag", "found.pull", _follow_tip, makes="pull lag"),
     Job("path", "design path.points path.start", _follow, _draw_path, **_OF_PATH),
