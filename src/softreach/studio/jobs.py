@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 
 _SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 _LEVEL = 16  # of the cloud of another design
 DESIGN = "design design.display_unit"  # equal designs may be shown in other units
 News = Mapping[str, Any] | Callable[[Found], Found]
@@ -255,7 +254,7 @@ def _look(given: Given) -> None:
     position = np.array(camera.position)
     ahead = (camera.look_at - position) * (1.0, 1.0, 0.0)
     base = np.array(state.design.base.position) / state.design.length
-    scene.look(ahead if look.half else None, base, _DRAGGED if found.is_dragged else None)
+    scene.look(ahead if look.half else None, base)
     scene.axes.turn(position, given.camera.focal)
     tip = found.tip if look.mouse == "tip" and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
@@ -299,7 +298,7 @@ _OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
 _IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
 _AROUND: Any = {"wanted": "design.surroundings", "draws": "/surroundings"}
 _PLANE = "appearance.slice.axis appearance.slice.center"
-_EYE = "appearance.half appearance.arm appearance.mouse found.tip found.is_dragged"
+_EYE = "appearance.half appearance.arm appearance.mouse found.tip"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next

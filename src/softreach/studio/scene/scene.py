@@ -78,7 +78,6 @@ class Scene:
         self._lock = threading.RLock()
         self._ahead: Array | None = None
         self._base = np.zeros(3)
-        self._most: int | None = None
 
     # Nodes: adding one of the same name replaces it.
 
@@ -111,18 +110,15 @@ class Scene:
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
 
-    def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
+    def look(self, ahead: Array | None, base: Array) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
-        Of each cloud the first `most` points are drawn; one whose points stay is not sent again.
+        A cloud whose points stay is not sent again.
         """
-        is_thin = most is not None and most == self._most
-        self._ahead, self._base, self._most = ahead, base, most
-        if is_thin:  # it hides little, and the page draws no frame while it takes up another
-            return
+        self._ahead, self._base = ahead, base
         with self._lock:
             for path, (kept, dots) in list(self._clouds.items()):
-                if not np.array_equal(kept, self._kept(dots[0])):
+                if not np.array_equal(kept, ~self.hidden(dots[0])):
                     self._cut_dots(path, *dots)
 
     def hidden(self, points: Array) -> Mask:
@@ -131,12 +127,9 @@ class Scene:
             return np.zeros(len(points), bool)
         return (points - self._base) @ self._ahead < 0.0
 
-    def _kept(self, points: Array) -> Mask:
-        return ~self.hidden(points) & (np.arange(len(points)) < (self._most or len(points)))
-
     def _cut_dots(self, path: str, points: Array, colors: NDArray[np.uint8], *look: Any) -> None:
         with self._lock:
-            kept = self._kept(points)
+            kept = ~self.hidden(points)
             self.dots(path, points[kept], colors[kept] if colors.ndim == 2 else colors, *look)
             self._clouds[path] = kept, (points, colors, *look)
 

@@ -25,7 +25,6 @@ from softreach.geometry.meshes import Mesh
 from softreach.geometry.region_tables import SHAPES
 from softreach.geometry.regions import HalfSpace, Region, Sphere
 from softreach.studio import shown_parameters
-from softreach.studio.captions import tip_text
 from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
 from softreach.studio.figures import NO_BAR, SlopeBar, slope_bars
 from softreach.studio.found import Found
@@ -196,16 +195,14 @@ def _tool(panel: Fields, unit: LengthUnit) -> None:
 
     def place(arm: Manipulator, offset: Any) -> Manipulator:
         held = arm.pointed
-        made = (
-            m if m is not held else m.replace(offset=_times(offset, unit.size)) for m in arm.markers
-        )
+        made = (m if m is not held else m.replace(offset=offset) for m in arm.markers)
         return arm.replace(markers=tuple(made))
 
     at = of_design(lambda arm: arm.point or "", choose)
     panel.dropdown("tool", offered, at, "The point that counts as the tip in all that is computed")
-    offset = lambda arm: _over(arm.pointed.offset if arm.pointed else (0.0, 0.0, 0.0), unit.size)
+    offset = lambda arm: arm.pointed.offset if arm.pointed else (0.0, 0.0, 0.0)
     about = "Point of the tool, from the center of its section: across it x, y, and z along the arm"
-    panel.typed(unit.label("tool point"), of_design(offset, place), about, vector_kind)
+    panel.typed(unit.label("tool point"), _in_unit(offset, place), about, vector_kind)
 
 
 def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, object]:
@@ -251,9 +248,9 @@ def _solid(panel: Fields, part: Part) -> None:
         now = arm.surroundings[k] if k < len(arm.surroundings) else solid
         return now if type(now.region) is type(solid.region) else solid
 
-    def of(read: Callable[[Obstacle], Any], write: Any, size: float = 1.0) -> Attribute:
-        made = lambda arm, value: part.changed(arm, **write(here(arm), _times(value, size)))
-        return of_design(lambda arm: _over(read(here(arm)), size), made)
+    def of(read: Callable[[Obstacle], Any], write: Any, size: float = 0.0) -> Attribute:
+        made = lambda arm, value: part.changed(arm, **write(here(arm), value))
+        return _in_unit(lambda arm: read(here(arm)), made, size)
 
     if not isinstance(solid.region, HalfSpace | Sphere):
         middle = lambda solid: vector(solid.region.bounds.mean(axis=0))
@@ -261,19 +258,21 @@ def _solid(panel: Fields, part: Part) -> None:
             "region": edits.moved(solid.region, np.subtract(to, middle(solid)))
         }
         about = "Middle of the solid, as x, y, z in the world: it moves as a whole"
-        panel.typed(unit.label("place"), of(middle, move, unit.size), about, vector_kind)
+        panel.typed(unit.label("place"), of(middle, move), about, vector_kind)
     for name, symbol in _numbers_of(solid.region).items():
         label = name.replace("_", " ")
         read = lambda solid, name=name: getattr(solid.region, name)
         write = lambda solid, x, name=name: {"region": replace(solid.region, **{name: x})}
         kind = vector_kind if isinstance(read(solid), tuple) else number_kind
-        at = of(read, write, unit.size if symbol else 1.0)
+        at = of(read, write, 0.0 if symbol else 1.0)
         panel.typed(unit.label(label) if symbol else label, at, _ABOUT_SOLID, kind)
-    keep = of(lambda s: s.clearance, lambda _, x: {"clearance": x}, unit.size)
+    keep = of(lambda s: s.clearance, lambda _, x: {"clearance": x})
     panel.typed(unit.label("distance to keep"), keep, "The clearance is the gap beyond it")
-    start = of(lambda s: s.start_over_length, lambda _, x: {"start_over_length": x, "start": None})
+    start = of(
+        lambda s: s.start_over_length, lambda _, x: {"start_over_length": x, "start": None}, 1.0
+    )
     panel.typed("clear from Z / L", start, "The arm from here to its tip must keep clear")
-    inside = of(lambda solid: solid.inside, lambda _, on: {"inside": bool(on)})
+    inside = of(lambda solid: solid.inside, lambda _, on: {"inside": bool(on)}, 1.0)
     panel.checkbox("the arm is inside", inside, "All around is solid, as for an arm in a tank")
 
 
@@ -350,9 +349,6 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     panel.message = panel.kept(Line(panel.gui))
     off, about = lambda s: s.replace(design=s.free or s.design), "Gravity, payload and all forces"
     panel.change("Take all loads off", off, about, "design.loads", **GRAY)
-    follows = "design", "found.tip", "found.pointing", "found.posture"
-    rests = lambda state, found: tip_text(state, found) if state.design.loads else ()
-    panel.text(*follows, content=rests)
     more = lambda s, _: ", ".join(other_loads(s.design))
     act = lambda *known: [f"The design file also has: {more(*known)}."] * bool(more(*known))
     panel.text("design", content=act)
@@ -374,32 +370,40 @@ def gravity_name(state: StudioState) -> str:
 
 def base_field(name: str) -> Attribute:
     """Position in the unit of lengths that are typed, or turn in degrees."""
-    size = lambda arm: shown_parameters.typed_unit(arm).size
-    scale = lambda arm: math.radians(1.0) if name == "turn" else size(arm)
-    read = lambda arm: _over(getattr(arm.base, name), scale(arm))
-    moved = lambda arm, value: arm.base.replace(**{name: _times(value, scale(arm))})
-    return of_design(read, lambda arm, value: arm.replace(base=moved(arm, value)))
+    moved = lambda arm, value: arm.replace(base=arm.base.replace(**{name: value}))
+    return _in_unit(
+        lambda arm: getattr(arm.base, name), moved, math.radians(1.0) if name == "turn" else 0.0
+    )
 
 
 def load_field(name: str) -> Attribute:
     """A load as it is typed; other loads stay, and without any the arm has no loads."""
     label, symbol, size, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
-    scale = lambda arm: size or shown_parameters.typed_unit(arm).size
 
     def write(arm: Manipulator, value: Any) -> Manipulator:
         unit = symbol or shown_parameters.typed_unit(arm).name
+        scale = size or shown_parameters.typed_unit(arm).size
         for number in value if isinstance(value, tuple) else (value,):
-            if not low <= number <= _MOST:
+            if not low <= number / scale <= _MOST:
                 allowed = f"{low:,.0f} to {_MOST:,.0f} {unit}"
-                raise InvalidInput(label, f"{number:g} {unit}", allowed)
-        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale(arm))})
+                raise InvalidInput(label, f"{number / scale:g} {unit}", allowed)
+        loads = (arm.loads or _NONE).replace(**{name: value})
         try:
             return arm.replace(loads=None if loads == _NONE else loads)
         except InvalidDesign as error:
             raise _in_words(error) from None
 
-    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale(arm)), write)
+    return _in_unit(lambda arm: getattr(arm.loads or _NONE, name), write, size)
+
+
+def _in_unit(
+    read: Callable[[Manipulator], Any], write: Callable[[Manipulator, Any], Any], size: float = 0.0
+) -> Attribute:
+    """A value of a design in a unit of some size, by default that of lengths that are typed."""
+    scale = lambda arm: size or shown_parameters.typed_unit(arm).size
+    shown = lambda arm: _over(read(arm), scale(arm))
+    return of_design(shown, lambda arm, value: write(arm, _times(value, scale(arm))))
 
 
 def _times(value: Any, scale: float) -> Any:
