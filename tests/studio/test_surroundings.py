@@ -17,8 +17,8 @@ from softreach.studio.scene.solids import region_surface
 from softreach.studio.session import Session
 from softreach.studio.state import Appearance, StudioState, vector
 from softreach.studio.tabs import move
-from softreach.studio.tabs.design import with_mesh
 from softreach.studio.tabs.export import saved
+from softreach.studio.tabs.solids import with_mesh
 from softreach.support.errors import InvalidInput, SoftreachError
 from tests.studio.test_scene import Meshes
 

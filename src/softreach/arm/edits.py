@@ -175,13 +175,14 @@ def without_solid(arm: Manipulator, index: int) -> Manipulator:
 
 def moved(region: Region, by: Array) -> Region:
     """A region that is moved [m], shape (3,); the mesh of a file becomes one without a file."""
-    region = region.mesh if isinstance(region, MeshFile) else region
-    numbers = next(numbers for kind, numbers in SHAPES.values() if type(region) is kind)
-    places = {name: getattr(region, name) for name, unit in numbers.items() if unit == "m"}
+    solid: Any = region.mesh if isinstance(region, MeshFile) else region
+    numbers = next(numbers for kind, numbers in SHAPES.values() if type(solid) is kind)
+    places = {name: getattr(solid, name) for name, unit in numbers.items() if unit == "m"}
     changes: dict[str, Any] = {
         name: np.round(np.add(place, by), _GRID) for name, place in places.items() if np.ndim(place)
     }
-    return replace(region, **changes, **({"source": ""} if isinstance(region, Mesh) else {}))
+    changes |= {"source": ""} if isinstance(solid, Mesh) else {}
+    return replace(solid, **changes)  # pyright: ignore[reportArgumentType]
 
 
 def _new_name(kind: str, taken: Sequence[str]) -> str:

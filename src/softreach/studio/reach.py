@@ -292,7 +292,7 @@ def count_activations(
     if reach.exact is not None and reach.exact.route == "flux":
         reach.counts[:] = 1.0  # proved one to one
     rod, tips = solvable_rod(reach.arm), reach.cloud.tip.values
-    counted = lambda missing: solve_inverse(rod, tips[missing]).counts
+    counted = lambda missing: solve_inverse(rod, tips[missing]).counts.astype(float)
     return _completed(reach.counts, rows, counted, "counting activations", check, report)
 
 

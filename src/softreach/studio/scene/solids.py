@@ -52,5 +52,5 @@ def region_surface(region: Region, around: Array) -> Surface:
 def _revolved(line: Array, axis: Array, radii: Array) -> Surface:
     first, second = np.linalg.svd(axis[None])[2][1:]
     second *= np.sign(np.cross(first, second) @ axis)
-    across = (np.tile(each, (len(line), 1)) for each in (first, second))
-    return tube_surface(line, *across, radii, _SIDES)
+    first, second = (np.tile(each, (len(line), 1)) for each in (first, second))
+    return tube_surface(line, first, second, radii, _SIDES)

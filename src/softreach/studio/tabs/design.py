@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from softreach.arm import designs, edits
 from softreach.arm.base import POINTS
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.obstacles import Obstacle
 from softreach.arm.section import material_names
 from softreach.arm.stations import Marker
-from softreach.geometry.meshes import Mesh
-from softreach.geometry.region_tables import SHAPES
-from softreach.geometry.regions import HalfSpace, Region, Sphere
 from softreach.studio import shown_parameters
-from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
+from softreach.studio.fields import GRAY, Attribute, Build, Fields, in_unit, of_design
 from softreach.studio.figures import NO_BAR, SlopeBar, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import Part, ShownParameter, part_parameters, parts
-from softreach.studio.state import StudioState, rod_of, vector
+from softreach.studio.state import StudioState, rod_of
+from softreach.studio.tabs.solids import UNITS_OF_MESHES, solid, with_mesh
 from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector_kind
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, NotPossible, SoftreachError
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 from softreach.support.units import LengthUnit
 
 Numbers = Callable[[Manipulator], Sequence[ShownParameter]]
@@ -40,12 +32,9 @@ _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
 _AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
 _NEW_RING, _TOOL = "ring", "tool"
-_UNITS_OF_MESHES = ("as it says", "m", "cm", "mm", "in")
 _ABOUT_UNIT = "Unit of the file of a mesh: a GLB is in m, few others say what they are in"
 _ABOUT_MESH = "STL, OBJ, PLY, OFF or GLB, closed: the arm must not touch it"
-_ABOUT_SOLID = "Places as x, y, z in the world; a normal points out of what is solid"
 _MESHES = ".stl,.obj,.ply,.off,.glb"
-MOST_TRIANGLES = 20_000  # of a mesh: they are part of the design, and of the state of a tab
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus, Poisson's ratio and density to those of a known material"
 _WAYS = {name: name for name in POINTS} | {"up": "up (upright)", "down": "down (hanging)"}
@@ -152,7 +141,7 @@ def arm_parts(panel: Fields) -> None:
         kind = panel.gui.add_dropdown("kind", kinds, hint=hint)
         add = lambda: grow(lambda arm: _with_part(arm, kind.value))
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
-        unit = panel.gui.add_dropdown("unit of mesh", _UNITS_OF_MESHES, hint=_ABOUT_UNIT)
+        unit = panel.gui.add_dropdown("unit of mesh", UNITS_OF_MESHES, hint=_ABOUT_UNIT)
         read = lambda file: grow(lambda arm: with_mesh(arm, file.name, file.content, unit.value))
         panel.upload("Load a mesh as a solid", read, _ABOUT_MESH, mime_type=_MESHES, **GRAY)
 
@@ -202,7 +191,7 @@ def _tool(panel: Fields, unit: LengthUnit) -> None:
     panel.dropdown("tool", offered, at, "The point that counts as the tip in all that is computed")
     offset = lambda arm: arm.pointed.offset if arm.pointed else (0.0, 0.0, 0.0)
     about = "Point of the tool, from the center of its section: across it x, y, and z along the arm"
-    panel.typed(unit.label("tool point"), _in_unit(offset, place), about, vector_kind)
+    panel.typed(unit.label("tool point"), in_unit(offset, place, 0.0), about, vector_kind)
 
 
 def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, object]:
@@ -227,7 +216,7 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     _add_matter(panel, part)
     _typed(panel, part_parameters(session.state.design, part))
     if part.solid is not None:
-        _solid(panel, part)
+        solid(panel, part)
     if own:
         remove = lambda state: state.replace(design=part.removed(state.design))
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
@@ -237,66 +226,6 @@ def _with_part(arm: Manipulator, kind: str) -> Manipulator:
     if kind in edits.SOLID_KINDS:
         return edits.with_solid(arm, kind)
     return edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
-
-
-def _solid(panel: Fields, part: Part) -> None:
-    """Numbers of a solid, and the part of the arm that keeps clear of it."""
-    arm, k = panel.session.state.design, part.solid or 0
-    solid, unit = arm.surroundings[k], shown_parameters.typed_unit(arm)
-
-    def here(arm: Manipulator) -> Obstacle:  # until the fields of a removed one are gone, too
-        now = arm.surroundings[k] if k < len(arm.surroundings) else solid
-        return now if type(now.region) is type(solid.region) else solid
-
-    def of(read: Callable[[Obstacle], Any], write: Any, size: float = 0.0) -> Attribute:
-        made = lambda arm, value: part.changed(arm, **write(here(arm), value))
-        return _in_unit(lambda arm: read(here(arm)), made, size)
-
-    if not isinstance(solid.region, HalfSpace | Sphere):
-        middle = lambda solid: vector(solid.region.bounds.mean(axis=0))
-        move = lambda solid, to: {
-            "region": edits.moved(solid.region, np.subtract(to, middle(solid)))
-        }
-        about = "Middle of the solid, as x, y, z in the world: it moves as a whole"
-        panel.typed(unit.label("place"), of(middle, move), about, vector_kind)
-    for name, symbol in _numbers_of(solid.region).items():
-        label = name.replace("_", " ")
-        read = lambda solid, name=name: getattr(solid.region, name)
-        write = lambda solid, x, name=name: {"region": replace(solid.region, **{name: x})}
-        kind = vector_kind if isinstance(read(solid), tuple) else number_kind
-        at = of(read, write, 0.0 if symbol else 1.0)
-        panel.typed(unit.label(label) if symbol else label, at, _ABOUT_SOLID, kind)
-    keep = of(lambda s: s.clearance, lambda _, x: {"clearance": x})
-    panel.typed(unit.label("distance to keep"), keep, "The clearance is the gap beyond it")
-    start = of(
-        lambda s: s.start_over_length, lambda _, x: {"start_over_length": x, "start": None}, 1.0
-    )
-    panel.typed("clear from Z / L", start, "The arm from here to its tip must keep clear")
-    inside = of(lambda solid: solid.inside, lambda _, on: {"inside": bool(on)}, 1.0)
-    panel.checkbox("the arm is inside", inside, "All around is solid, as for an arm in a tank")
-
-
-def _numbers_of(region: Region) -> Mapping[str, str]:
-    """Numbers of a region that are typed, and their units; none of a mesh."""
-    known = {kind: own for kind, own in SHAPES.values() if kind is not Mesh}
-    return known.get(type(region), {})
-
-
-def with_mesh(arm: Manipulator, name: str, content: bytes, unit: str) -> Manipulator:
-    """The arm with one more solid, from the file of a mesh."""
-    with tempfile.TemporaryDirectory(prefix="softreach-") as folder:
-        path = Path(folder) / Path(name).name
-        path.write_bytes(content)
-        try:
-            mesh = Mesh.load(path, unit=None if unit == _UNITS_OF_MESHES[0] else unit)
-        except SoftreachError as error:
-            raise NotPossible(str(error).replace(f"{folder}{os.sep}", "")) from None
-    if len(mesh.faces) > MOST_TRIANGLES:
-        allowed = f"at most {MOST_TRIANGLES:,} in the studio"
-        hint = "name the file in the design, or make it coarser"
-        raise InvalidInput("triangles", f"{len(mesh.faces):,}", allowed, hint)
-    solid = Obstacle(region=edits.moved(mesh, np.zeros(3)), name=Path(name).stem)
-    return arm.replace(surroundings=(*arm.surroundings, solid))
 
 
 def _add_matter(panel: Fields, part: Part) -> None:
@@ -349,17 +278,6 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     panel.message = panel.kept(Line(panel.gui))
     off, about = lambda s: s.replace(design=s.free or s.design), "Gravity, payload and all forces"
     panel.change("Take all loads off", off, about, "design.loads", **GRAY)
-    more = lambda s, _: ", ".join(other_loads(s.design))
-    act = lambda *known: [f"The design file also has: {more(*known)}."] * bool(more(*known))
-    panel.text("design", content=act)
-
-
-def other_loads(arm: Manipulator) -> list[str]:
-    """Loads of a design that have no field, in words."""
-    loads = arm.loads or _NONE
-    names = ("tip_moment", "follower_force", "follower_moment", "force_per_length")
-    others = [name.replace("_", " ") for name in names if any(getattr(loads, name))]
-    return others + [f"point loads ({len(loads.point_loads)})"] * bool(loads.point_loads)
 
 
 def gravity_name(state: StudioState) -> str:
@@ -371,9 +289,8 @@ def gravity_name(state: StudioState) -> str:
 def base_field(name: str) -> Attribute:
     """Position in the unit of lengths that are typed, or turn in degrees."""
     moved = lambda arm, value: arm.replace(base=arm.base.replace(**{name: value}))
-    return _in_unit(
-        lambda arm: getattr(arm.base, name), moved, math.radians(1.0) if name == "turn" else 0.0
-    )
+    size = math.radians(1.0) if name == "turn" else 0.0
+    return in_unit(lambda arm: getattr(arm.base, name), moved, size)
 
 
 def load_field(name: str) -> Attribute:
@@ -394,25 +311,7 @@ def load_field(name: str) -> Attribute:
         except InvalidDesign as error:
             raise _in_words(error) from None
 
-    return _in_unit(lambda arm: getattr(arm.loads or _NONE, name), write, size)
-
-
-def _in_unit(
-    read: Callable[[Manipulator], Any], write: Callable[[Manipulator, Any], Any], size: float = 0.0
-) -> Attribute:
-    """A value of a design in a unit of some size, by default that of lengths that are typed."""
-    scale = lambda arm: size or shown_parameters.typed_unit(arm).size
-    shown = lambda arm: _over(read(arm), scale(arm))
-    return of_design(shown, lambda arm, value: write(arm, _times(value, scale(arm))))
-
-
-def _times(value: Any, scale: float) -> Any:
-    return vector(scale * v for v in value) if isinstance(value, tuple) else scale * value
-
-
-def _over(value: Any, scale: float) -> Any:
-    over = lambda number: number if scale == 1.0 else float(f"{number / scale:.10g}")
-    return vector(map(over, value)) if isinstance(value, tuple) else over(value)
+    return in_unit(lambda arm: getattr(arm.loads or _NONE, name), write, size)
 
 
 def _in_words(error: InvalidDesign) -> InvalidDesign:
