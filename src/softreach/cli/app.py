@@ -24,7 +24,7 @@ _GROUPS = (
         "reach:reach reach:cloud reach:volume reach:payload reach:gradient "
         "reach:show convert:export convert:import",
     ),
-    ("Places", "places:solve places:track places:equilibria"),
+    ("Places", "places:solve places:track places:plan places:equilibria"),
     ("Families", "atlas:atlas"),
     ("Bench", "bench:plan-poses bench:calibrate"),
     ("Reference", "demo:list"),

@@ -27,6 +27,7 @@ def reach(
     /,
     *,
     accuracy: Number = 3e-3,
+    free: bool = False,
     changes: Changes = UNCHANGED,
     out: Annotated[list[Path] | None, options.OUT] = None,
     at: Annotated[str | None, Parameter(group=options.OUTPUT, allow_leading_hyphen=True)] = None,
@@ -41,6 +42,7 @@ def reach(
 
     Args:
         accuracy: Relative error allowed in the volume.
+        free: Print what the arm reaches without touching anything, and what only through a wall.
         out: Write the boundary (.ply .stl .obj .glb .3mf .vtu), draw slices (.png .pdf .svg), or
             the set as a web page that turns (.html). May be repeated.
         at: Point x,y,z that the slices meet at: the middle of the set if left out.
@@ -50,12 +52,17 @@ def reach(
     from softreach.rod.summary import load_rows
 
     arm = design_from(design, changes, output.unit)
+    if free:
+        options.refuse("with --free, which prints volumes alone", out=out, at=at)
+        found = sr.workspace.free_set(arm).drop_vars(["state", *"xyz"])
+        console.rows(f"free set of {design}", rows_of(found), output.json, arm)
+        return
     outs = sorted(out or [], key=_is_drawn)  # pictures come last
     meshed = ["skimage"] * any(path.suffix.lower() in SURFACE_FILES for path in outs)
     options.check_output(outs, {**SURFACE_FILES, **PICTURES, **PAGES}, output.overwrite, *meshed)
-    free = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
+    dimension = int((arm.input_bounds[:, 0] < arm.input_bounds[:, 1]).sum())
     for path in outs:
-        _check_dimension(path, free)
+        _check_dimension(path, dimension)
     if not any(map(_is_drawn, outs)):
         options.refuse("without a picture: add --out slices.png", at=at)
     point = None if at is None else position_in("at", at, arm.length)

@@ -144,9 +144,12 @@ def export_cloud(
 
 
 def path_csv(found: Dataset) -> str:
-    """Activations and tip errors [m] at the points that `track_path` found, as lines of CSV."""
-    names = [*column_names(found["bundle"].values.astype(str).tolist()), "tip_error_m"]
-    rows = np.column_stack([found.activation.values, found.tip_error.values]).tolist()
+    """What `track_path` or `plan` found at each point of a path, as lines of CSV."""
+    names = column_names(found["bundle"].values.astype(str).tolist())
+    parts = {"tip": ("x", "y", "z"), "tip_error": ("tip_error_m",), "clearance": ("clearance_m",)}
+    parts = {each: own for each, own in (parts | {"time": ("time_s",)}).items() if each in found}
+    names += [name for own in parts.values() for name in own]
+    rows = np.column_stack([found[each].values for each in ("activation", *parts)]).tolist()
     return "\n".join([",".join(names), *(",".join(f"{x:.12g}" for x in row) for row in rows), ""])
 
 

@@ -65,6 +65,16 @@ def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count:
     return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
 
 
+def as_rates(rate: ArrayLike | None, count: int) -> Array | None:
+    """Rates of all inputs from one positive number or one for each, shape (count,)."""
+    if rate is None:
+        return None
+    rates = as_floats("rate", rate)
+    if rates.shape not in ((), (count,)) or not ((rates > 0) & (rates < np.inf)).all():
+        raise InvalidInput("rate", rate, f"one positive number or {count}")
+    return np.broadcast_to(rates, count)
+
+
 def as_orientations(orientation: ArrayLike, count: int) -> Array:
     """Rotation matrices (3, 3) or (t, 3, 3) as (t, 3, 3)."""
     frames = as_floats("orientation", orientation)

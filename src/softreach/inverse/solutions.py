@@ -41,6 +41,8 @@ class Status(IntEnum):
     """It is proved that no activation does: no tip is nearer than `gap_bound`, above `tol` L."""
     NOT_FOUND = 2
     """The search found no activation, and no proof that there is none."""
+    IN_CONTACT = 3
+    """Of those that were found every activation makes the arm touch something."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -198,6 +200,11 @@ class Solutions(Sequence[Solution]):
             offsets=np.concatenate([[0], np.cumsum(counts)]),
             **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS},
         )
+
+    def only(self, rows: Index, counts: Index, statuses: NDArray[np.int8]) -> Self:
+        """The same with some of its activations, so many for each target, and other statuses."""
+        own = self._of({"target": slice(None), "solution": rows})
+        return replace(self, **own | {"statuses": statuses}, offsets=np.cumsum([0, *counts]))
 
     def in_units_of(self, measures: Array) -> Self:
         """The same solutions, their activations multiplied by these; (bundles,)."""

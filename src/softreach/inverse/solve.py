@@ -21,6 +21,7 @@ from softreach.inverse.roots import (
     roots_at,
 )
 from softreach.inverse.solutions import Solutions, Status
+from softreach.rod.clearance import ClearanceMap
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import all_inputs, as_tip_map
 from softreach.rod.tip_map import Frame, TipMap
@@ -31,6 +32,7 @@ from softreach.support.errors import InvalidInput, Range
 from softreach.workspace.search import CLOSELY, nearest_tips
 
 _WEIGHTS = Range(0.0, 1e6, open_low=True)
+_LOOKED_AT = 16  # activations of a family, of which some may be free
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
 _BRANCH_BLOCK = 131_072  # where all roots are searched, which is done in smaller sets
@@ -50,6 +52,7 @@ def solve_inverse(
     family: int = 1,
     seed: int = 0,
     from_rest: bool = False,
+    free: bool = False,
     tol: float = 1e-6,
     frame: Frame = "world",
     point: str | None = None,
@@ -97,6 +100,9 @@ def solve_inverse(
         seed: Seed of these.
         from_rest: Of an arm under loads: only postures to which activations lead straight from
             rest, or from where the arm is in whose tip map is given.
+        free: Only activations at which the arm touches neither its `surroundings` nor itself, those
+            nearest to `near` first, and from rest; a target with others alone is `IN_CONTACT`. With
+            more than three free bundles 16 activations or more of each target are looked at.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
             keeps its own.
@@ -127,6 +133,7 @@ def solve_inverse(
     unit = None if direction is None else as_directions("direction", direction, len(points))
     frames = None if orientation is None else as_orientations(orientation, len(points))
     residual = as_number("residual_over_length", residual_over_length, RESIDUALS) * length
+    most, free = as_integer("family", family, 1, 10_000), as_flag("free", free)
     within = as_number("within", within, Range(0.0, unit="m"))
     request = Request(
         targets=points,
@@ -138,9 +145,9 @@ def solve_inverse(
         cone=as_number("cone", cone, Range(0.0, np.pi, unit="rad")),
         direction_weight=as_number("direction_weight", direction_weight, _WEIGHTS),
         within=within,
-        family=as_integer("family", family, 1, 10_000),
+        family=max(most, _LOOKED_AT if free else 1),
         seed=as_integer("seed", seed, 0, 2**63),
-        from_rest=as_flag("from_rest", from_rest),
+        from_rest=as_flag("from_rest", from_rest) or free,
     )
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
@@ -149,7 +156,30 @@ def solve_inverse(
         solve, size = _by_branches, _BRANCH_BLOCK if request.direction is None else _BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
-    return solutions.in_units_of(measures)
+    solutions = solutions.in_units_of(measures)
+    return _free_of(solutions, prepared, preferred, most) if free else solutions
+
+
+def _free_of(
+    solutions: Solutions, prepared: PreparedMap, near: ArrayLike, family: int
+) -> Solutions:
+    """The solutions that touch nothing, the nearest first; of families so many at most."""
+    whole, target = (
+        all_inputs(prepared.whole),
+        np.repeat(np.arange(len(solutions)), solutions.counts),
+    )
+    clearance = ClearanceMap(whole).of(solutions.activations).value
+    preferred = np.broadcast_to(np.asarray(near, float), (len(solutions), whole.box.bundles))
+    away = np.linalg.norm((solutions.activations - preferred[target]) / whole.box.scales, axis=1)
+    rows = np.lexsort((away, target))
+    rows = rows[clearance[rows] > 0.0]
+    if prepared.dimension > 3:
+        own = target[rows]
+        rows = rows[np.arange(len(rows)) - np.searchsorted(own, own) < family]
+    counts = np.bincount(target[rows], minlength=len(solutions))
+    touches = (counts == 0) & (solutions.counts > 0)
+    statuses = np.where(touches, Status.IN_CONTACT, solutions.statuses).astype(np.int8)
+    return solutions.only(rows, counts, statuses)
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:

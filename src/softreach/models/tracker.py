@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.direction import angles_from
+from softreach.inverse.request import as_rates
 from softreach.kernels.box.bounded_descent import box_steps
 from softreach.kernels.box.box_projection import project
 from softreach.rod.loaded.postures import PosturesBeside
@@ -22,7 +23,7 @@ from softreach.rod.rods import ArmMap, all_inputs, as_tip_map
 from softreach.rod.tip_map import TipMap, TipOutputs
 from softreach.stiffness import tip_compliance
 from softreach.support.arguments import POSITIVE, as_number
-from softreach.support.arrays import Array, as_directions, as_floats, as_points, as_rows
+from softreach.support.arrays import Array, as_directions, as_points, as_rows
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.lazy import lazy
 
@@ -128,11 +129,9 @@ class Tracker:
         margin = np.minimum(_AT_END, 0.5 * (high - low))  # where tendons are taut
         self._low, self._high = low + margin, high - margin
         self._most, self._least = np.full(len(own), _SHARE), np.clip(0.0, self._low, self._high)
-        rates = as_floats("rate", 1.0 if rate is None else rate)
-        if rates.shape not in ((), self._most.shape) or not ((rates > 0) & (rates < np.inf)).all():
-            raise InvalidInput("rate", rate, f"one positive number or {len(own)}")
+        rates = as_rates(rate, len(own))
         period = as_number("period", period, POSITIVE)
-        if rate is not None:
+        if rates is not None:
             self._most = rates * period / self._scale
         self.begin(np.clip(0.0, *ends.T) if start is None else start)
 

@@ -1,4 +1,5 @@
 from . import payload as payload
+from .free import free_set as free_set
 from .gradient import VolumeGradient as VolumeGradient
 from .gradient import volume_gradient as volume_gradient
 from .image import Image as Image

@@ -148,6 +148,11 @@ def _correction(image: Image, sense: int) -> Estimate:
     return Estimate(scale * float(np.mean(values)), scale * float(np.ptp(values)))
 
 
+def covered_volume(image: Image) -> Estimate:
+    """Volume that the mapped tetrahedra cover [m³], of some cells of a grid or of all."""
+    return _covered(image, 1 if _signed_volume(image) >= 0 else -1)
+
+
 def _covered(image: Image, sense: int) -> Estimate:
     """∫ [x is reached] dx [m³], with the scatter of three directions of sight."""
     again = _correction(image, sense)
