@@ -187,3 +187,26 @@ def test_the_tip_that_is_shown_is_the_point_of_the_tool():
         np.testing.assert_allclose(scene.pointing, section.directors.values[-1, 2], atol=1e-6)
         line = meshes.added["/arm/tool"].points[0]
         np.testing.assert_allclose(line, [section.position.values[-1], tip], atol=1e-6)
+
+
+def test_the_arm_moves_to_a_target_on_a_way_that_touches_nothing(session):
+    start, goal = (-0.717, -0.723, -0.049), (-0.194, -0.173, -0.739)
+    session.update(lambda s: s.replace(activation=start))
+    session.settle()
+    session.aim(sr.tip_positions(ARM, [goal])[0])
+    session.settle()
+    np.testing.assert_allclose(session.state.activation, goal, atol=1e-6)
+    rows = np.array(session.state.path.activations)
+    np.testing.assert_allclose(rows[[0, -1]], [start, goal], atol=1e-6)
+    assert compute_clearance(ARM, rows).clearance.min() > 0.0
+    np.testing.assert_allclose(sr.tip_positions(ARM, rows), session.state.path.points, atol=1e-5)
+    assert StudioState.from_json(session.state.to_json()).path == session.state.path
+    move.take(session, np.array(TOUCHING))
+    session.settle()
+    np.testing.assert_allclose(session.state.activation, goal, atol=1e-6)  # it stays
+    assert "goal" in session.note
+    session.aim(sr.tip_positions(ARM, [TOUCHING])[0])
+    session.settle()
+    assert (
+        "reached only where the arm touches" in move._answer_text(session.state, session.found)[0]
+    )

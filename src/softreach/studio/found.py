@@ -40,6 +40,7 @@ class Found:
     posture: TipStatus | None = None  # of a loaded arm in its activation; None without loads
     clearance: Clearance | None = None  # of the whole arm as it is; None without surroundings
     answer: Solution | None = None  # every activation that reaches the target
+    goal: tuple[float, ...] | None = None  # activation to which the arm moves without touching
     takes_nearest: bool = False  # true if the arm moves to the nearest of them, as after a click
     pull: Pull | None = None  # latest order of who drags the tip; None once it is followed
     drag: Drag | None = None  # what follows a dragged tip of the design

@@ -161,6 +161,7 @@ class TipPath:
     points: tuple[Vector, ...]  # [m], in order
     start: tuple[float, ...] | None = None  # activation; None for the best at the first point
     at: int = 0  # the point where the arm is
+    activations: tuple[tuple[float, ...], ...] = ()  # at the points, where the path was planned
 
     def __post_init__(self) -> None:
         if not 2 <= len(self.points) <= MOST_POINTS:
@@ -170,13 +171,20 @@ class TipPath:
         as_integer("path.at", self.at, 0, len(self.points) - 1)
 
     @classmethod
-    def through(cls, points: Any, start: Sequence[float] | None = None, at: int = 0) -> Self:
+    def through(
+        cls,
+        points: Any,
+        start: Sequence[float] | None = None,
+        at: int = 0,
+        activations: Iterable[Sequence[float]] = (),
+    ) -> Self:
         """A path through points [m], shape (k, 3)."""
         values = as_floats("path", points)
         if values.ndim != 2 or values.shape[1] != 3:
             raise InvalidInput("path.shape", values.shape, "of shape (k, 3)")
         start = None if start is None else tuple(map(float, start))
-        return cls(points=tuple(map(vector, values)), start=start, at=at)
+        rows = tuple(tuple(map(float, row)) for row in activations)
+        return cls(points=tuple(map(vector, values)), start=start, at=at, activations=rows)
 
 
 @dataclass(frozen=True, kw_only=True)

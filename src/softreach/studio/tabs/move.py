@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.export.clouds import path_csv
 from softreach.inverse.path import Drag, PathStatus, end_text, track_path
 from softreach.inverse.request import positions_in
@@ -25,6 +26,7 @@ from softreach.studio.session import Session
 from softreach.studio.shown_parameters import three_digits
 from softreach.studio.state import MOUSE, StudioState, TipPath, rod_of, solvable_rod, vector
 from softreach.studio.widgets import TextKind, TypedField, numbers_in, vector_kind
+from softreach.studio.work import all_cores
 from softreach.support.errors import InvalidInput
 from softreach.support.quantity import five_digits
 from softreach.support.units import LengthUnit
@@ -44,10 +46,11 @@ _MOST = 40  # sliders: a page with hundreds takes minutes to build
 _HERE = "\N{CHECK MARK} "
 _NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
 _POINTS = 24  # of the straight line to each place that is clicked
+_OUT_OF_REACH = {1: "out of reach", 3: "reached only where the arm touches something"}
 _FAMILY = 6  # shapes offered where infinitely many reach the target
 _DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
 _RESIDUAL = 1e-8  # [L]
-_STEP = 0.05  # [s] between points that are played
+_STEP, _FRAMES = 0.05, 41  # [s] between points that are played; points of a planned path
 _TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
 _WAY = 0.15  # length of the line along the direction that is wanted [L]
 _DIRECTION = TextKind(
@@ -155,7 +158,8 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
     panel.typed("within [deg]", attribute("cone"), "Angle from that direction that is allowed")
     present = lambda state: state.replace(direction=tuple(session.found.pointing.round(4).tolist()))
     panel.change("As it points now", present, "Keeps the direction of the tip", **GRAY)
-    panel.anew("activations", "found.answer", build=_solutions, shown="found.answer")
+    known = lambda _, found: found.answer is not None
+    panel.anew("activations", "found.answer", build=_solutions, shown=known)
     about, off = "Takes target and solutions away", lambda state: state.replace(target=None)
     panel.change("Clear the target", off, about, "target", **GRAY)
 
@@ -179,8 +183,16 @@ def _solutions(panel: Fields, _: object) -> None:
 
 
 def take(session: Session, activation: Any) -> None:
-    """Move the arm to a solution."""
-    session.update(lambda state: state.replace(activation=tuple(activation.tolist())))
+    """Move the arm to a solution; with surroundings on a way on which it touches nothing."""
+    goal = tuple(activation.tolist())
+    if _plans(session.state.design):
+        session.learn({"goal": goal})
+    else:
+        session.update(lambda state: state.replace(activation=goal))
+
+
+def _plans(arm: Manipulator) -> bool:
+    return bool(arm.surroundings) and arm.loads is None
 
 
 def _answer_text(state: StudioState, found: Found) -> list[str]:
@@ -189,7 +201,7 @@ def _answer_text(state: StudioState, found: Found) -> list[str]:
     arm, unit = state.design, state.design.length_unit
     place = place_text(answer.target / arm.length, arm)
     if not len(answer):
-        certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
+        certain = _OUT_OF_REACH.get(answer.status, "not reached, perhaps out of reach")
         near = place_text(answer.nearest / arm.length, arm)
         gap, off = unit.rounded(answer.gap, digits=".3g"), _angle_text(answer.direction_gap)
         return [f"{place} is {certain}. Nearest: {near}, position error {gap}{off}."]
@@ -238,10 +250,13 @@ def path(panel: Fields) -> None:
                 if (track := _track(session.state, session.found)) is not None:
                     session.send("path.csv", path_csv(track).encode)
 
-            panel.button("Save the path (CSV)", save, "with its activations")
+            tracked = lambda *known: _track(*known) is not None
+            panel.button("Save the path (CSV)", save, "with its activations", tracked)
 
 
 def _path_text(state: StudioState, found: Found) -> list[str]:
+    if state.path is not None and state.path.activations:
+        return ["A planned path, along which the arm touched nothing."]
     track = _track(state, found)
     text = "following ..." if track is None else end_text(track, state.design.length_unit)
     return [text] * (state.path is not None)
@@ -256,6 +271,8 @@ def _track(state: StudioState, found: Found) -> xr.Dataset | None:
 
 def _followed(state: StudioState, found: Found) -> np.ndarray:
     """Activations at the points of the path as far as the arm follows it, shape (k, bundles)."""
+    if state.path is not None and state.path.activations:
+        return np.array(state.path.activations)
     if (track := _track(state, found)) is None:
         return np.empty((0, len(state.activation)))
     return track.activation.values[track.status.values == PathStatus.FOLLOWED]
@@ -296,12 +313,15 @@ def _solve(given: Given) -> Sequence[Learned]:
     solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
     options: dict[str, Any] = {"near": near, "family": _FAMILY, "from_rest": True}
+    options["free"] = bool(state.design.surroundings)
     if state.direction:
         options |= {"direction": state.direction, "cone": math.radians(state.cone)}
     answer = solve_inverse(state.design, [state.target], **options)[0]
     if given.found.takes_nearest and len(answer):
         distance = np.linalg.norm(answer.activations - state.activation, axis=1)
         best = tuple(answer.activations[np.argmin(distance)].tolist())
+        if _plans(state.design):
+            return [Learned({"answer": answer, "takes_nearest": False, "goal": best})]
         change = lambda now: now.replace(activation=best)
     return [Learned({"answer": answer, "takes_nearest": False}, change)]
 
@@ -357,7 +377,7 @@ def _follow_tip(given: Given) -> Results:
 def _follow(given: Given) -> Results:
     path = given.state.path
     yield Learned({"track": None})
-    if path is not None:
+    if path is not None and not path.activations:
         rod = solvable_rod(given.state.design)
         fits = path.start is not None and len(path.start) == rod.box.bundles
         start = rod.box.clip(np.array(path.start)) if fits else None
@@ -381,9 +401,30 @@ def _draw_path(given: Given) -> None:
         scene.lines(f"/path/{name}", pieces(line / length), color, 0.006)
 
 
+def _move_to_goal(given: Given) -> Results:
+    """Along a planned path to an activation; where there is none, the reader is told."""
+    from softreach.inverse import plan
+
+    arm, goal = given.state.design, given.found.goal
+    if goal is None or len(goal) != arm.inputs:
+        return
+    with all_cores:
+        planned = plan(arm, given.state.activation, goal).activation.values
+    ways = np.append(0.0, np.cumsum(np.abs(np.diff(planned, axis=0)).sum(axis=1)))
+    even = np.linspace(0.0, ways[-1], _FRAMES)
+    rows = np.stack([np.interp(even, ways, each) for each in planned.T], axis=1)
+    path = TipPath.through(rod_of(arm).tips(rows), activations=rows)
+    yield Learned(change=lambda now: now.replace(path=path) if now.design == arm else now)
+    yield from _played(given, rows, 0)
+
+
 def _play(given: Given) -> Results:
     path, activations = given.state.path, _followed(given.state, given.found)
     start = path.at if path is not None and path.at < len(activations) - 1 else 0
+    yield from _played(given, activations, start)
+
+
+def _played(given: Given, activations: np.ndarray, start: int) -> Results:
     for point in range(start, len(activations)):
         given.check()
         yield Learned(change=lambda now, k=point: _at_point(now, activations, k))
@@ -407,4 +448,6 @@ JOBS = (
     Job("drag", "found.pull", _follow_tip, makes="pull lag"),
     Job("path", "design path.points path.start", _follow, _draw_path, **_OF_PATH),
     Job("play", "", _play),
+    # The arm moves to a solution between what is around it
+    Job("goal", "found.goal", _move_to_goal, wanted="found.goal", doing="planning a free path"),
 )
