@@ -153,7 +153,7 @@ def test_the_exact_surface_is_shown_first_and_points_only_where_there_is_none_or
     assert drawn(whole, replace(look, surface=False))[1] == set()
 
 
-def test_a_reach_beside_is_a_faint_surface_and_points_only_where_it_has_none(whole):
+def test_a_reach_beside_is_a_faint_surface(whole):
     meshes = Meshes()
     scene = Scene(meshes)
     scene.draw_beside("/free", whole, Slice())
@@ -162,8 +162,6 @@ def test_a_reach_beside_is_a_faint_surface_and_points_only_where_it_has_none(who
     (free,) = loaded.geometry.values()
     np.testing.assert_allclose(free.vertices, whole.sheets.vertices / whole.arm.length, atol=1e-6)
     assert free.visual.vertex_attributes["color"][:, 3].max() < 0.3 * 255
-    scene.draw_beside("/free", replace(whole, exact=None), Slice())
-    assert len(meshes.added["/free"].points)
     scene.draw_beside("/free", None, Slice())
     assert not meshes.added
 

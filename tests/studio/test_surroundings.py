@@ -51,7 +51,7 @@ def test_triangles_of_a_region_stand_on_its_boundary_and_enclose_its_volume(regi
 
 @pytest.fixture
 def session(opened) -> Session:
-    opened.update(lambda state: state.replace(design=ARM, activation=FREE))
+    opened.update(lambda state: StudioState(design=ARM, activation=FREE).showing(level=12))
     opened.settle()
     return opened
 

@@ -128,12 +128,8 @@ def tip_text(state: StudioState, found: Found) -> list[Part]:
 def clearance_text(state: StudioState, found: Found) -> list[Part]:
     """The clearance of the arm as it is, in red where it is too near to something."""
     near, unit = found.clearance, state.design.length_unit
-    if near is None or (math.isnan(near.value) and not near.refusal):
-        return []
-    if near.refusal:
-        return [f"No clearance: {near.refusal}."]
-    if math.isinf(near.value):
-        return ["The arm is near to nothing."]
+    if near is None or not math.isfinite(near.value):
+        return [f"No clearance: {near.refusal}."] if near is not None and near.refusal else []
     where = f"{near.name} at Z = {unit.rounded(near.station, digits='.3g')}"
     if near.value > 0.0:
         return [f"clearance {unit.rounded(near.value, digits='.3g')} from {where}"]

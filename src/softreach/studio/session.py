@@ -200,8 +200,7 @@ class Session:
             self.report("")
             return_memory_soon()
         self.client.send_file_download(name, data, save_immediately=True)
-        size = f"{len(data) / 1e6:.1f} MB" if len(data) >= 1e5 else f"{len(data) / 1e3:.1f} kB"
-        self.say(f"{name} is written: {size}.")
+        self.say(f"{name} is written: {len(data) / 1e6:.3g} MB.")
 
     def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
         """Place of the tip [m] in the sample that a ray from the camera [L] meets, if any."""

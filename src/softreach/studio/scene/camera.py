@@ -29,7 +29,6 @@ VIEWS: dict[str, Array] = {
 """Directions from the middle to the camera."""
 UPRIGHT = 0.6  # aspect below which a window is that of a phone
 _PATIENCE = 30.0  # [s] for a picture
-LONGEST, _MOST_PIXELS = 8192, 33_000_000  # that every browser draws without blowing them up
 _ROOM, _ROOM_UPRIGHT = 1.12, 1.22  # times what would just fill the picture, with its numbers
 _GRAY = 170, 170, 175  # of the axes
 
@@ -83,10 +82,6 @@ class TabCamera:
         """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4)."""
         camera, client = self._client.camera, self._client
         size = {"height": FINER * camera.image_height, "width": FINER * camera.image_width}
-        if max(size.values()) > LONGEST or size["height"] * size["width"] > _MOST_PIXELS:
-            value = f"{size['width']} by {size['height']} pixels"
-            allowed = f"at most {LONGEST} along a side and {_MOST_PIXELS / 1e6:.0f} million"
-            raise InvalidInput("picture", value, allowed, "make the window smaller")
         try:
             return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
         except TimeoutError:

@@ -180,17 +180,11 @@ class Scene:
         self.api.add_glb(path, data, **_SHADOWLESS)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
-        """Another reach, pale, at "/free" or "/reference": its surface, else points, or nothing."""
+        """The surface of another reach, pale, at "/free" or "/reference", if it has one."""
         color, opacity = _BESIDE[path]
         self.remove(path)
-        if reach is None:
-            return
-        if reach.has_surface:
+        if reach is not None and reach.has_surface:
             self._draw_boundary(path, reach, cut, color, opacity, None)
-            return
-        points = cloud_points(reach, 15)
-        size = 0.4 * _point_size(len(points))
-        self._cut_dots(path, points[in_slice(points, cut)], np.array(color, np.uint8), size)
 
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""

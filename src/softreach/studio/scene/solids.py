@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.geometry.meshes import Mesh, MeshFile
 from softreach.geometry.regions import Box, Cylinder, HalfSpace, Region, Sphere, Tube
 from softreach.geometry.surface import Surface, ribbon_surface, tube_surface
 from softreach.support.arrays import Array
@@ -44,8 +45,7 @@ def region_surface(region: Region, around: Array) -> Surface:
     if isinstance(region, HalfSpace):
         (square,) = region.wireframe(around)
         return Surface(vertices=square[:4], faces=np.array([[0, 1, 2], [0, 2, 3]]))
-    mesh = region.mesh if isinstance(region, MeshFile) else region
-    assert isinstance(mesh, Mesh)
+    mesh: Any = getattr(region, "mesh", region)  # of a file, or itself
     return Surface(vertices=mesh.vertices, faces=mesh.faces)
 
 

@@ -207,8 +207,7 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     chosen = Attribute(
         read, lambda found, number: replace(found, part=number), "found", "found.part"
     )
-    hint = "The part whose numbers are below"
-    panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
+    panel.dropdown("edit", dict(enumerate(labels)), chosen, "The part whose numbers are below")
     own = part.ring is not None or part.solid is not None or bool(part.actuator)
     if own:
         at = of_design(lambda _: part.name, lambda arm, name: part.changed(arm, name=name))

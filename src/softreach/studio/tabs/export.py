@@ -75,10 +75,7 @@ def export(panel: Fields) -> None:
 
 
 def saved(name: str, content: bytes, own: Sequence[Obstacle] = ()) -> Change:
-    """The change to the state in a file that was saved, or to the design of a TOML file.
-
-    Of files of meshes it may name those of its `own` surroundings: others are not for the page.
-    """
+    """The change to the state in a file, or to the design of a TOML; it may name `own` meshes."""
     text = file_text(name, content)
     if name.lower().endswith(".toml"):
         design = design_of_text(text, name)

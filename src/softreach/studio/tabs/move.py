@@ -21,7 +21,7 @@ from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute,
 from softreach.studio.found import Found, Lag, Pull
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
-from softreach.studio.scene.scene import DARK, MARK, MOST_BUNDLES, pieces
+from softreach.studio.scene.scene import DARK, MARK, pieces
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import three_digits
 from softreach.studio.state import MOUSE, StudioState, TipPath, rod_of, solvable_rod, vector
@@ -121,8 +121,7 @@ def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
         around = three_digits(low, -1), three_digits(high)  # the state keeps to the bounds
         panel.slider(label, around, step, at, hint)
     if (hidden := len(ends) - _MOST) > 0:
-        drawn = "" if len(ends) <= MOST_BUNDLES else "; no bundle is drawn"
-        panel.say(f"{hidden} more bundles have no slider here{drawn}.")
+        panel.say(f"{hidden} more bundles have no slider here.")
 
 
 def _slider_ends(state: StudioState, _: Found) -> list[tuple[str, float, float]]:
