@@ -113,15 +113,12 @@ def plan(
     goal: Signed = None,
     to: Signed = None,
     rate: str | None = None,
-    margin: str | None = None,
     changes: Changes = UNCHANGED,
     out: options.Place = Path("plan.csv"),
     overwrite: options.Overwrite = False,
     unit: options.Unit = None,
 ) -> None:
-    """Plan a motion that touches neither the surroundings nor the arm itself.
-
-    The activations go into a CSV file, with tips, clearances and, at given rates, times.
+    """Plan a motion that touches nothing, with times at given rates, into a CSV file.
 
     Example: softreach plan tank.toml --goal -1,0,-0.5 --rate 0.5 --out plan.csv
 
@@ -130,30 +127,26 @@ def plan(
         goal: Activations to end with.
         to: Tip position x,y,z to end at, in m unless each has a unit: 80mm,50mm,-24cm.
         rate: Largest change of each activation per second, one number or one per bundle: 0.5
-        margin: Clearance to keep all along, beyond that of each obstacle: 2mm, 0.01L.
         out: CSV file for the plan.
     """
     from softreach.export.clouds import path_csv
-    from softreach.inverse.request import length_in, position_in
+    from softreach.inverse.request import position_in
     from softreach.support.quantity import numbers_in
 
     arm = design_from(design, changes, unit)
     options.check_output(out, TABLES, overwrite)
     if (goal is None) == (to is None):
         raise NotPossible("give either --goal or --to")
-    rates = None if rate is None else numbers_in(rate) or rate
     planned = sr.inverse.plan(
         arm,
         None if start is None else options.activation_of(start, arm, "start"),
         None if goal is None else options.activation_of(goal, arm, "goal"),
         goal_position=None if to is None else position_in("to", to, arm.length),
-        rate=rates[0] if isinstance(rates, list) and len(rates) == 1 else rates,
-        margin=0.0 if margin is None else length_in("margin", margin, arm.length),
+        rate=None if rate is None else numbers_in(rate) or rate,
     )
     write_text(out, path_csv(planned), overwrite=overwrite)
     least = arm.length_unit.rounded(float(planned.clearance.min()))
-    time = "" if rate is None else f", {float(planned.time[-1]):.3g} s"
-    console.line(f"{out}: {planned.sizes['point']} points, least clearance {least}{time}")
+    console.line(f"{out}: {planned.sizes['point']} points, least clearance {least}")
 
 
 def equilibria(

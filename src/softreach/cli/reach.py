@@ -19,6 +19,7 @@ from softreach.support.files.formats import PAGES, PICTURES
 from softreach.support.memory import check_memory
 from softreach.support.units import ERROR, Rows
 
+_ACCURACY = 3e-3
 HULL_BYTES = 700  # of memory that a sample and its share of the triangulation take at most
 
 
@@ -26,7 +27,7 @@ def reach(
     design: options.Design,
     /,
     *,
-    accuracy: Number = 3e-3,
+    accuracy: Number = _ACCURACY,
     free: bool = False,
     changes: Changes = UNCHANGED,
     out: Annotated[list[Path] | None, options.OUT] = None,
@@ -53,7 +54,8 @@ def reach(
 
     arm = design_from(design, changes, output.unit)
     if free:
-        options.refuse("with --free, which prints volumes alone", out=out, at=at)
+        unused = None if accuracy == _ACCURACY else accuracy
+        options.refuse("with --free, which prints volumes alone", out=out, at=at, accuracy=unused)
         found = sr.workspace.free_set(arm).drop_vars(["state", *"xyz"])
         console.rows(f"free set of {design}", rows_of(found), output.json, arm)
         return

@@ -70,7 +70,7 @@ def as_rates(rate: ArrayLike | None, count: int) -> Array | None:
     if rate is None:
         return None
     rates = as_floats("rate", rate)
-    if rates.shape not in ((), (count,)) or not ((rates > 0) & (rates < np.inf)).all():
+    if rates.shape not in ((), (1,), (count,)) or not ((rates > 0) & (rates < np.inf)).all():
         raise InvalidInput("rate", rate, f"one positive number or {count}")
     return np.broadcast_to(rates, count)
 

@@ -201,10 +201,12 @@ class Solutions(Sequence[Solution]):
             **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _COLUMNS},
         )
 
-    def only(self, rows: Index, counts: Index, statuses: NDArray[np.int8]) -> Self:
-        """The same with some of its activations, so many for each target, and other statuses."""
+    def only(self, rows: Index, counts: Index) -> Self:
+        """The same with those of its activations, so many for each target, that touch nothing."""
         own = self._of({"target": slice(None), "solution": rows})
-        return replace(self, **own | {"statuses": statuses}, offsets=np.cumsum([0, *counts]))
+        touches = (counts == 0) & (self.counts > 0)
+        own["statuses"] = np.where(touches, Status.IN_CONTACT, self.statuses).astype(np.int8)
+        return replace(self, offsets=np.cumsum([0, *counts]), **own)
 
     def in_units_of(self, measures: Array) -> Self:
         """The same solutions, their activations multiplied by these; (bundles,)."""

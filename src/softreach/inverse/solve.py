@@ -100,9 +100,8 @@ def solve_inverse(
         seed: Seed of these.
         from_rest: Of an arm under loads: only postures to which activations lead straight from
             rest, or from where the arm is in whose tip map is given.
-        free: Only activations at which the arm touches neither its `surroundings` nor itself, those
-            nearest to `near` first, and from rest; a target with others alone is `IN_CONTACT`. With
-            more than three free bundles 16 activations or more of each target are looked at.
+        free: Only activations from rest at which the arm touches neither its `surroundings` nor
+            itself, those nearest to `near` first; a target with others alone is `IN_CONTACT`.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
             keeps its own.
@@ -160,26 +159,17 @@ def solve_inverse(
     return _free_of(solutions, prepared, preferred, most) if free else solutions
 
 
-def _free_of(
-    solutions: Solutions, prepared: PreparedMap, near: ArrayLike, family: int
-) -> Solutions:
+def _free_of(solutions: Solutions, known: PreparedMap, near: ArrayLike, most: int) -> Solutions:
     """The solutions that touch nothing, the nearest first; of families so many at most."""
-    whole, target = (
-        all_inputs(prepared.whole),
-        np.repeat(np.arange(len(solutions)), solutions.counts),
-    )
-    clearance = ClearanceMap(whole).of(solutions.activations).value
+    whole = as_tip_map(known.whole.arm, known.whole.tol)  # surroundings are in the world
+    target = np.repeat(np.arange(len(solutions)), solutions.counts)
     preferred = np.broadcast_to(np.asarray(near, float), (len(solutions), whole.box.bundles))
     away = np.linalg.norm((solutions.activations - preferred[target]) / whole.box.scales, axis=1)
     rows = np.lexsort((away, target))
-    rows = rows[clearance[rows] > 0.0]
-    if prepared.dimension > 3:
-        own = target[rows]
-        rows = rows[np.arange(len(rows)) - np.searchsorted(own, own) < family]
-    counts = np.bincount(target[rows], minlength=len(solutions))
-    touches = (counts == 0) & (solutions.counts > 0)
-    statuses = np.where(touches, Status.IN_CONTACT, solutions.statuses).astype(np.int8)
-    return solutions.only(rows, counts, statuses)
+    rows = rows[ClearanceMap(whole).of(solutions.activations[rows]).value > 0.0]
+    if known.dimension > 3:
+        rows = rows[np.arange(len(rows)) - np.searchsorted(target[rows], target[rows]) < most]
+    return solutions.only(rows, np.bincount(target[rows], minlength=len(solutions)))
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:

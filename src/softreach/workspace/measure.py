@@ -86,9 +86,8 @@ def torn_volume(image: Image) -> Estimate:
     by O(1/n). Half of what the finer grid changes is added, and all of it is the error; what it
     changes against a third of the cells counts by half.
     """
-    sense = 1 if _signed_volume(image) >= 0 else -1
     third = image_of(LiftedGrid.of(image.grid.tip_map, image.grid.n // 3), image.lattice)
-    value, *rough = (_covered(each, sense) for each in (image, image.coarse, third))
+    value, *rough = map(covered_volume, (image, image.coarse, third))
     changes = [(value.value - each.value) / k for k, each in enumerate(rough, 1)]
     change = max(changes, key=abs)
     return Estimate(value.value + 0.5 * change, abs(change) + value.error)
@@ -149,14 +148,11 @@ def _correction(image: Image, sense: int) -> Estimate:
 
 
 def covered_volume(image: Image) -> Estimate:
-    """Volume that the mapped tetrahedra cover [m³], of some cells of a grid or of all."""
-    return _covered(image, 1 if _signed_volume(image) >= 0 else -1)
-
-
-def _covered(image: Image, sense: int) -> Estimate:
     """∫ [x is reached] dx [m³], with the scatter of three directions of sight."""
+    signed = _signed_volume(image)
+    sense = 1 if signed >= 0 else -1
     again = _correction(image, sense)
-    return Estimate(sense * _signed_volume(image) + again.value, again.error)
+    return Estimate(sense * signed + again.value, again.error)
 
 
 def _signed_volume(image: Image) -> float:
