@@ -5,10 +5,12 @@ import pytest
 
 import softreach as sr
 from softreach.arm import Marker, Obstacle, designs, edits
+from softreach.arm.parameters import changed
 from softreach.cloud.clouds import design_of
 from softreach.geometry.regions import Box, Cylinder, HalfSpace, Region, Sphere, Tube
 from softreach.rod import compute_clearance
 from softreach.studio.captions import clearance_text
+from softreach.studio.found import is_alike
 from softreach.studio.markup import Bad
 from softreach.studio.reach import Quality, sample_clearances, shown_samples, stages
 from softreach.studio.scene import colors
@@ -111,6 +113,14 @@ def test_a_solid_that_is_moved_leaves_the_set_as_it_is_and_its_cloud_names_it(se
     assert session.found.reach.arm == session.state.design
     assert design_of(session.found.reach.cloud) == session.state.design
     assert session.found.slopes.arm == session.state.design
+
+
+def test_designs_are_alike_whatever_stands_around_them():
+    long, short = ARM, changed(designs.minimal_trunk(), {"length": 0.3, "outer_radius": 0.02})
+    far = short.replace(surroundings=(TABLE.replace(start_over_length=0.0, start=0.25),))
+    assert is_alike(short, far)
+    assert is_alike(long, designs.minimal_trunk())
+    assert not is_alike(far, long.replace(surroundings=(TABLE.replace(start=0.9),)))
 
 
 def stl(tmp_path):

@@ -65,7 +65,7 @@ class Found:
 
 def is_alike(arm: Manipulator, other: Manipulator) -> bool:
     """True if two designs differ in their surroundings alone, or not at all."""
-    return arm == other or arm.replace(surroundings=other.surroundings) == other
+    return arm == other or arm.replace(surroundings=()) == other.replace(surroundings=())
 
 
 class Known(NamedTuple):

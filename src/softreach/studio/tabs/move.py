@@ -164,7 +164,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
 
 
 def _solutions(panel: Fields, _: object) -> None:
-    """A button for each solution, or for the nearest; that of where the arm is is green."""
+    """A button for each solution, or for the nearest; the one that the arm is in is green."""
     answer = panel.session.found.answer
     for row in _shapes(answer) if answer is not None else ():
         text = ", ".join(f"{value:.4g}" for value in row)
