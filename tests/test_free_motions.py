@@ -147,16 +147,16 @@ def test_an_arm_with_nothing_around_reaches_all():
 
 
 def test_a_place_behind_a_hole_is_reached_only_through_the_wall(monkeypatch):
-    found = free_set(MAZE, cells=32)
+    found = free_set(MAZE, cells=20)
     assert found.walled_off > 3.0 * found.walled_off_error
     parts = sum(float(found[name]) for name in ("reached", "walled_off", "blocked"))
-    assert parts == pytest.approx(reachable_set(TRUNK).volume, rel=0.01)
+    assert parts == pytest.approx(reachable_set(TRUNK).volume, rel=0.02)
     tip = sr.tip_positions(MAZE, THREADED + [0.08, -0.04, -0.04])[0]
     assert int(found.state.sel(dict(zip("xyz", tip, strict=True)), method="nearest")) == 2
     cells = [float((found.state == k).sum()) * found.attrs["cell"] ** 3 for k in (1, 2)]
     np.testing.assert_allclose(cells, [found.reached, found.walled_off], rtol=0.1)
     assert compute_clearance(MAZE, THREADED).clearance > 0.0
-    monkeypatch.setattr("softreach.inverse.planning._CELLS", {3: (16, 32)})
+    monkeypatch.setattr("softreach.inverse.planning._CELLS", {3: (16,)})
     with pytest.raises(NotPossible, match="no free path was found"):
         plan(MAZE, goal=THREADED)
     assert len(plan(MAZE, THREADED, [-0.9, -0.05, 0.0]).point) > 2

@@ -1,8 +1,8 @@
 """Free paths of activation: from one configuration to another without touching anything.
 
-Links between activations that are free (`workspace.free`) hold the path: neighbors on a grid up to
-three free bundles, random ones with more [Kavraki1996]. It is then shortened. Every piece is
-certified by `workspace.free`: between two rows no point of the arm moves as far as it is clear.
+Links between free activations (`workspace.free`) hold the path: neighbors on a grid, or with more
+than three free bundles random ones [Kavraki1996]. Shortcuts shorten it. Between two of its rows no
+point of the arm moves as far as it is clear.
 """
 
 from __future__ import annotations

@@ -199,9 +199,8 @@ class FreeGraph:
         apart = self.motions.box.to_cube(self.gamma) - self.motions.box.to_cube(gamma)
         away = np.where(self.is_free, (apart**2).sum(axis=1), np.inf)
         nodes = np.argsort(away)[:_NEAR]
-        begin = np.tile(gamma, (len(nodes), 1))
-        outcome = self.motions.check(begin, self.gamma[nodes], _SHORTEST_TO_NODES)[0]
-        return nodes[outcome == CLEAR]
+        ends = np.tile(gamma, (len(nodes), 1)), self.gamma[nodes]
+        return nodes[self.motions.check(*ends, _SHORTEST_TO_NODES)[0] == CLEAR]
 
     def connected(self, gamma: Array) -> tuple[Mask, Mask]:
         """Masks of nodes that are connected with an activation, and of free ones that may be."""
