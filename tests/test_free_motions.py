@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -85,7 +86,7 @@ def test_no_point_moves_farther_than_is_said(name):
 def test_certified_motions_touch_nothing(name):
     arm = ARMS[name]
     motions, (begin, end) = free_motions(as_tip_map(arm)), random_inputs(arm, (2, 120), 1)
-    outcome, which, share, clearance = motions.check(begin, end, 2.0**-8)
+    outcome, which, share, clearance = motions.check(begin, end, shortest=2.0**-8)
     clear, touching = np.flatnonzero(outcome == CLEAR)[:40], np.flatnonzero(outcome == TOUCHES)
     assert min(least_between(arm, each, 151) for each in np.stack([begin, end], 1)[clear]) > 0.0
     assert all(clearance[which == k].min() <= 0.0 for k in touching)
@@ -97,7 +98,8 @@ def brute_force(motions, cells):
     sizes = (cells,) * motions.box.dimension
     places = (np.indices(sizes).reshape(len(sizes), -1).T + 0.5) / cells
     free = motions.clearance.of(motions.box.from_free_cube(places)).value > 0.0
-    number, _ = label(free.reshape(sizes))
+    found: Any = label(free.reshape(sizes))
+    number = found[0]
     return (number == number[(-1,) * len(sizes)]).ravel(), free
 
 

@@ -54,8 +54,7 @@ def reach(
 
     arm = design_from(design, changes, output.unit)
     if free:
-        unused = None if accuracy == _ACCURACY else accuracy
-        options.refuse("with --free, which prints volumes alone", out=out, at=at, accuracy=unused)
+        options.refuse("with --free", out=out, at=at, accuracy=accuracy != _ACCURACY)
         found = sr.workspace.free_set(arm).drop_vars(["state", *"xyz"])
         console.rows(f"free set of {design}", rows_of(found), output.json, arm)
         return

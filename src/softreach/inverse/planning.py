@@ -78,7 +78,7 @@ def plan(
     if (goal is None) == (goal_position is None):
         raise InvalidInput("goal", goal, "either activations, or a goal_position")
     first = motions.free_at("start", start)
-    goals = [goal] if goal_position is None else _goals(motions, first, goal_position, seed)
+    goals: Any = [goal] if goal_position is None else _goals(motions, first, goal_position, seed)
     for each in goals[:-1]:
         with suppress(NotPossible):
             return _planned(motions, first, each, rates, seed)
@@ -91,7 +91,7 @@ def _planned(
     import xarray as xr
 
     corners = _corners(motions, first, motions.free_at("goal", goal), seed)
-    _, k, share, clearance = motions.check(corners[:-1], corners[1:], _SHORTEST)
+    _, k, share, clearance = motions.check(corners[:-1], corners[1:], shortest=_SHORTEST)
     rows = corners[k] + share[:, None] * (corners[k + 1] - corners[k])
     once = np.append(share[:-1] < 1.0, True)  # each corner
     rows, clearance, tip_map = rows[once], clearance[once], motions.clearance.whole
@@ -119,7 +119,7 @@ def _goals(motions: FreeMotions, first: Array, position: ArrayLike, seed: int) -
 
 def _corners(motions: FreeMotions, first: Array, last: Array, seed: int) -> Array:
     ends, rng = np.stack([first, last]), np.random.default_rng(seed)
-    if motions.check(ends[:1], ends[1:], _SHORTEST)[0] == CLEAR:
+    if motions.check(ends[:1], ends[1:], shortest=_SHORTEST)[0] == CLEAR:
         return ends
     for graph, cells in _graphs(motions, rng):
         if cells and _are_parted(graph, cells, first, last):
@@ -177,7 +177,7 @@ def _shortened(motions: FreeMotions, path: Array, rng: np.random.Generator) -> A
         ends = np.stack([np.interp(cuts, lengths, x) for x in path.T], axis=-1)
         gain = np.diff(cuts, axis=1)[:, 0]
         gain -= np.linalg.norm(np.diff(ends, axis=1)[:, 0] / scales, axis=1)
-        gain[motions.check(ends[:, 0], ends[:, 1], _SHORTEST)[0] != CLEAR] = 0.0
+        gain[motions.check(ends[:, 0], ends[:, 1], shortest=_SHORTEST)[0] != CLEAR] = 0.0
         best = gain.argmax()
         if gain[best] > _GAIN * lengths[-1]:
             before, after = path[lengths < cuts[best, 0]], path[lengths > cuts[best, 1]]

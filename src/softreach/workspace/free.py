@@ -126,7 +126,7 @@ class FreeMotions:
         return inner @ self._rates[0], inner @ self._rates[1]
 
     def check(
-        self, begin: Array, end: Array, shortest: float, known: Any = None
+        self, begin: Array, end: Array, *, shortest: float, known: Any = None
     ) -> tuple[Index, Index, Array, Array]:
         """Check straight motions between activations (n, bundles), down to the shortest share.
 
@@ -187,7 +187,8 @@ class FreeGraph:
         self.links, self._maybe = left[:0], left[:0]
         while len(left):
             chosen, left = np.split(left, [some])
-            found = motions.check(*gamma[chosen.T], _SHORTEST, self.clearance[chosen.T])[0]
+            (a, b), known = gamma[chosen.T], self.clearance[chosen.T]
+            found = motions.check(a, b, shortest=_SHORTEST, known=known)[0]
             self.links = np.concatenate([self.links, chosen[found == CLEAR]])
             self._maybe = np.concatenate([self._maybe, chosen[found == UNDECIDED]])
             part = components(self.links, len(gamma))
@@ -200,7 +201,7 @@ class FreeGraph:
         away = np.where(self.is_free, (apart**2).sum(axis=1), np.inf)
         nodes = np.argsort(away)[:_NEAR]
         ends = np.tile(gamma, (len(nodes), 1)), self.gamma[nodes]
-        return nodes[self.motions.check(*ends, _SHORTEST_TO_NODES)[0] == CLEAR]
+        return nodes[self.motions.check(*ends, shortest=_SHORTEST_TO_NODES)[0] == CLEAR]
 
     def connected(self, gamma: Array) -> tuple[Mask, Mask]:
         """Masks of nodes that are connected with an activation, and of free ones that may be."""
