@@ -50,13 +50,15 @@ def studio_handle(tab: Tab) -> None:
     assert len(tab.session.found.answer or ()) > 1, "there is no ghost to see"
 
 
-def studio_plots(tab: Tab) -> None:
-    """The section, and the volume against the taper."""
+def studio_section(tab: Tab) -> None:
+    """The section in its window."""
     pose(tab, CURLED)
-    tab.open("Plots")
-    tab.session.update(lambda state: state.showing(section=True, sweep=True, swept="taper"))
+    tab.open("View")
+    tab.session.update(lambda state: state.showing(section=True))
     tab.settle()
     tab.page.get_by_text("one closed curve").wait_for()
+    tab.page.wait_for_timeout(1000)  # until the page has told how narrow the scene is
+    tab.session.look_from("oblique")
 
 
 def studio_compare(tab: Tab) -> None:
@@ -84,7 +86,7 @@ def studio_phone(tab: Tab) -> None:
 SCENES: dict[str, Callable[[Tab], None]] = {
     "studio": studio,
     "studio-handle": studio_handle,
-    "studio-plots": studio_plots,
+    "studio-section": studio_section,
     "studio-compare": studio_compare,
     "studio-needs": studio_needs,
     "studio-phone": studio_phone,

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import Manipulator, Obstacle, designs
-from softreach.requirements import HalfSpace, Tube
+from softreach.arm import Manipulator, Obstacle, designs, edits
+from softreach.requirements import Box, HalfSpace, Tube
 from softreach.rod import compute_clearance
 from softreach.support.errors import InvalidDesign, InvalidInput, NotPossible
 from tests.requirements.test_regions import box_mesh
@@ -126,3 +126,28 @@ def test_a_cloud_keeps_its_clearance_and_what_is_left_touches_nothing(tmp_path):
     assert (again.clearance > 0).all()
     plain = sr.compute_cloud(arm, 2000)
     np.testing.assert_array_equal(plain.tip, cloud.tip)
+
+
+@pytest.mark.parametrize("kind", edits.SOLID_KINDS)
+@pytest.mark.parametrize("points", ["up", "down"])
+def test_a_solid_that_is_added_is_apart_from_the_arm_named_and_moved_as_a_whole(kind, points, rng):
+    trunk = designs.minimal_trunk().replace(base=sr.Base(points=points, position=(0.1, 0, 0)))
+    arm = edits.with_solid(edits.with_solid(trunk, kind), kind)
+    assert [each.name for each in arm.surroundings] == [f"{kind} 1", f"{kind} 2"]
+    assert compute_clearance(arm, [0, 0, 0]).clearance[0] > 0.0
+    region, by = arm.surroundings[0].region, np.array([0.1, -0.2, 0.3])
+    points = rng.uniform(-1, 1, (50, 3))
+    apart = edits.moved(region, by).distance(points + by)
+    np.testing.assert_allclose(apart, region.distance(points), atol=1e-9)
+    assert edits.without_solid(edits.without_solid(arm, 1), 0) == trunk
+    wide = edits.with_changed_solid(arm, 1, clearance=0.02)
+    assert [each.clearance for each in wide.surroundings] == [0.0, 0.02]
+
+
+def test_the_mesh_of_a_file_that_is_moved_is_part_of_the_design(tmp_path):
+    cube = box_mesh(Box((0, 0, 0), (1, 1, 2)))
+    arm = arm_beside(stl(tmp_path / "cube.stl", (cube.vertices, cube.faces)), mesh_unit="m")
+    before, by = arm.surroundings[0].region, np.array([0.25, 0.0, 0.5])
+    moved = edits.with_changed_solid(arm, 0, region=edits.moved(before, by))
+    again = Manipulator.from_toml(moved.to_toml()).surroundings[0].region
+    np.testing.assert_allclose(again.bounds, before.bounds + by, atol=1e-9)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from softreach.arm import designs
+from softreach.arm import designs, edits
 from softreach.arm.parameters import changed
 from softreach.cli.app import run
 from softreach.cloud.clouds import compute_cloud, save_cloud
@@ -47,7 +47,6 @@ HOSTILE = {
     "50 MB.json": " " * 50_000_000,
     "mouse.json": look_with(mouse=["tip"]),
     "section.json": look_with(section=1),
-    "swept.json": look_with(swept=None),
     "huge level.json": look_with(level=10**4000),
     "digits.json": '{"softreach_studio": 2, "activation": ' + "9" * 5000 + "}",
     "infinite activation.json": state_with(activation=[float("inf")] * 3),
@@ -101,30 +100,33 @@ def test_files_are_those_of_the_command_line_in_the_unit_of_the_page(fine, tmp_p
     for name in ("design.toml", "cloud.ply", "surface.glb", "arm.stl", "arm.glb"):
         label = next(k for k, (file, _) in FILES["data"].items() if file == name)
         assert written(fine, pulled, "data", label) == (tmp_path / name).read_bytes()
-    assert written(fine, pulled, "picture", "four views (.png)").startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
-def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypatch):
+def test_a_page_shows_the_points_and_colors_of_the_studio_and_the_surroundings(
+    fine, color, monkeypatch
+):
     from softreach import plot
 
-    plotted, views = {}, plot.plot_views
+    plotted, turning = {}, plot.plot_3d
 
-    def watched(cloud, *rest, color):
-        plotted.update(cloud=cloud, color=color, figure=views(cloud, *rest, color=color))
-        return plotted["figure"]
+    def watched(shown, **options):
+        plotted.update(shown=shown, color=options["color"])
+        return turning(shown, **options)
 
-    monkeypatch.setattr(plot, "plot_views", watched)
+    monkeypatch.setattr(plot, "plot_3d", watched)
     cut = Slice(axis="y", center=0.1, thickness=0.3)
-    state = StudioState(design=fine.arm).showing(level=14, color=color, slice=cut)
-    written(fine, state, "picture", "four views (.png)")
+    arm = edits.with_solid(fine.arm, "sphere")
+    reach, state = fine.beside(arm), StudioState(design=arm)
+    state = state.showing(level=14, color=color, slice=cut, cloud=True)
+    written(reach, state, "picture", "web page (.html)")
     kept = in_slice(fine.cloud.tip.values / fine.arm.length, cut)
-    np.testing.assert_array_equal(plotted["cloud"].tip, fine.cloud.tip[kept])
+    cloud, _, ball = plotted["shown"]
+    np.testing.assert_array_equal(cloud.tip, fine.cloud.tip[kept])
     wanted = sample_values(fine, 14, color)
-    if not isinstance(wanted, str | int):
-        wanted = wanted[kept]
-        assert plotted["figure"].axes[-1].get_ylabel().startswith(color)
+    wanted = wanted if isinstance(wanted, str | int) else wanted[kept]
     np.testing.assert_array_equal(plotted["color"], wanted)
+    assert ball.volume == pytest.approx(arm.surroundings[0].region.volume, rel=0.02)
 
 
 def test_a_saved_page_holds_everything_itself(fine):
@@ -155,16 +157,12 @@ def test_a_design_begins_at_rest_and_a_saved_state_as_it_is_but_no_large_file(tr
     with pytest.raises(InvalidInput, match="state file"):
         start_on_state(tmp_path / "nothing.json")
     os.truncate(tmp_path / "state.json", 50_000_000)
-    with pytest.raises(SoftreachError, match=r"state\.json: must be at most 2 MB"):
+    with pytest.raises(SoftreachError, match=r"state\.json: must be at most 8 MB"):
         start_on_state(tmp_path / "state.json")
 
 
-def test_a_cloud_from_a_file_is_shown_as_it_is(trunk, tmp_path):
-    cloud = compute_cloud(trunk, 500)
-    save_cloud(cloud, tmp_path / "cloud.zarr")
-    start = start_on_cloud(tmp_path / "cloud.zarr", SMALL)
-    assert start.reach is not None
-    np.testing.assert_array_equal(start.reach.cloud.tip, cloud.tip)
-    assert start.state.design == trunk
+def test_a_cloud_from_a_file_leads_to_its_design(trunk, tmp_path):
+    save_cloud(compute_cloud(trunk, 500), tmp_path / "cloud.zarr")
+    assert start_on_cloud(tmp_path / "cloud.zarr", SMALL).state.design == trunk
     with pytest.raises(InvalidInput, match="Zarr store"):
         start_on_cloud(tmp_path / "nothing.zarr")

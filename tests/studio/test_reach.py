@@ -10,13 +10,11 @@ import softreach as sr
 from softreach import schema
 from softreach.arm import designs
 from softreach.arm.loads import GRAVITIES, Loads
-from softreach.cloud.clouds import compute_cloud
 from softreach.picture.gltf import ColoredSkin
 from softreach.plot.coloring import BundleKey, ScalarKey
 from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.studio import reach as reaching
-from softreach.studio.captions import legend_text, picture_text, size_text
-from softreach.studio.found import Found
+from softreach.studio.captions import legend_text, size_text
 from softreach.studio.reach import Quality, Reach, shown_samples, stages
 from softreach.studio.scene import colors
 from softreach.studio.scene.scene import Scene, in_slice, sliced
@@ -41,14 +39,6 @@ def test_the_coarse_cloud_is_the_beginning_of_the_fine_one_which_has_what_is_sho
     assert coarse.volume == pytest.approx(fine.volume, rel=0.02)
     *_, shown = stages(trunk, 14, SMALL, lambda: None)
     assert shown.samples == 1 << 14
-
-
-def test_a_grid_from_a_file_is_thinned_evenly(trunk):
-    grid = reaching.reached(compute_cloud(trunk, 16**3, sampler="grid"), SMALL)
-    few = grid.cloud.activation.values[shown_samples(grid, 9)]
-    np.testing.assert_allclose(few.mean(axis=0), trunk.bounds.mean(axis=1), atol=0.1)
-    uniform = reaching.reached(compute_cloud(trunk, 1000), SMALL)
-    np.testing.assert_array_equal(shown_samples(uniform, 14), np.arange(1000))
 
 
 def test_every_color_that_is_offered_colors_every_point_that_is_shown(both):
@@ -174,25 +164,8 @@ def test_place_and_turn_of_the_base_are_typed_in_mm_and_degrees_and_the_rest_of_
 
 def test_loads_without_a_field_stay(lce):
     twisted = lce.replace(loads=sr.Loads(gravity=HANGING, tip_moment=(0.0, 0.0, 1e-4)))
-    assert design.other_loads(twisted) == ["tip moment"]
     changed = loaded(twisted, gravity=(0.0, 0.0, 0.0))
     assert changed.loads.tip_moment == (0.0, 0.0, 1e-4)
-    assert design.other_loads(lce) == []
-
-
-def test_a_caption_says_how_an_arm_stands_and_what_acts_on_it_where_that_is_not_usual(lce):
-    standing = lce.replace(loads=Loads())
-    base = sr.Base(points="down", position=(0.0, 0.0, 0.3), turn=math.radians(30))
-    hung = loaded(standing, payload=20.0, tip_force=(0.0, 0.5, 0.0)).replace(base=base)
-    words = "payload 20 g, tip force (0, 0.5, 0) N, base down (hanging), base at (0, 0, 300) mm"
-    for arm, text in {
-        standing: "",
-        lce: "gravity none",
-        loaded(lce, gravity=(0.0, 0.0, -1.62)): "g (0, 0, -1.62) m/s²",
-        standing.replace(loads=Loads(tip_moment=(0.0, 0.0, 1e-4))): "tip moment",
-        hung: f"{words}, base turned by 30°",
-    }.items():
-        assert design.setting_text(StudioState(design=arm)) == text
 
 
 def test_matter_that_lacks_what_loads_need_is_named_in_one_line(trunk):
@@ -248,27 +221,6 @@ def test_unstable_samples_are_those_of_the_cloud_that_are_shown(torn):
     assert 0 < drawn == (status[shown] == TipStatus.UNSTABLE).sum()
     text = "".join(str(part) for part in legend_text(marked, free=False))
     assert f"unstable: {100 * (status == TipStatus.UNSTABLE).mean():.2g} % of the samples" in text
-
-
-@pytest.mark.parametrize(
-    ("look", "text"),
-    [
-        ({}, ""),
-        ({"arm": False, "surface": False}, "the arm, the reach"),
-        ({"slice": Slice(axis="x", center=0.1)}, "all outside a slab of 0.05 m at x = 0.1 m"),
-        ({"cloud": True}, "the half of the points in front of the arm"),
-        ({"cloud": True, "half": False}, ""),
-    ],
-)
-def test_a_caption_says_what_is_gray_in_a_picture_and_what_it_leaves_out(both, look, text):
-    coarse, fine = both
-    out = f"Not in the picture: {text}." if text else ""
-    assert picture_text(Found(), fine, Appearance(**look)) == out
-    beside = picture_text(Found(free=coarse, reference=coarse), fine, Appearance(**look))
-    assert beside == f"Gray: the reach without loads and of the kept design. {out}".strip()
-    many = replace(coarse, cloud=fine.cloud.isel(sample=np.arange(5000) % fine.samples))
-    some = picture_text(Found(), many, Appearance(level=12, cloud=True, half=False))
-    assert some == "Not in the picture: all but 4,096 of the samples."
 
 
 @pytest.mark.filterwarnings("ignore:the load number is above")

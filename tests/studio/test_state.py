@@ -35,7 +35,6 @@ def states(draw: st.DrawFn) -> StudioState:
         surface=draw(st.booleans()),
         mouse=draw(st.sampled_from([*MOUSE])),
         section=draw(st.booleans()),
-        swept=draw(st.sampled_from(["", "taper"])),
     )
     return StudioState(
         design=draw(arms() | st.just(LOADED)),

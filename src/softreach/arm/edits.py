@@ -1,9 +1,10 @@
-"""Edits of an arm: actuators and rings added, removed, renamed, made of another material."""
+"""Edits of an arm: actuators, rings and solids beside it, added, removed and changed."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,12 +18,19 @@ from softreach.arm.actuators import (
     Tendon,
 )
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.obstacles import Obstacle
 from softreach.arm.section import Ring
+from softreach.geometry.meshes import Mesh, MeshFile
+from softreach.geometry.region_tables import SHAPES
+from softreach.geometry.regions import Box, Cylinder, HalfSpace, Region, Sphere, Tube
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 ACTUATOR_KINDS = ("fiber", "oblique muscle", "radial muscle", "tendon", "chamber")
+SOLID_KINDS = ("box", "sphere", "cylinder", "tube", "plane")
 
 _EXTENT = np.radians(40)
+_GRID = 9  # digits after the point of places in m: no rounding shows in files
 _TURN = 2.0  # bending of a new actuator at its bound, over the arm [rad]
 
 
@@ -104,11 +112,6 @@ def with_changed_ring(arm: Manipulator, index: int, **changes: Any) -> Manipulat
     return _with_rings(arm, rings, {} if rings[index].name == old.name else {old.name: index})
 
 
-def with_material(arm: Manipulator, material: str) -> Manipulator:
-    """The arm with all of its rings made of one named material."""
-    return _with_rings(arm, [ring.replace(material=material) for ring in arm.section.rings])
-
-
 def _with_rings(
     arm: Manipulator, rings: Sequence[Ring], moved: Mapping[int | str, int] = {}
 ) -> Manipulator:
@@ -131,6 +134,55 @@ def ring_label(arm: Manipulator, index: int) -> str:
     """Label of a ring: its index, and its name if it has one."""
     name = arm.section.rings[index].name
     return f"ring {index} ({name})" if name else f"ring {index}"
+
+
+def with_solid(arm: Manipulator, kind: str) -> Manipulator:
+    """The arm with one more solid to keep clear of, of one of `SOLID_KINDS`, beside it.
+
+    A plane is behind the base.
+    """
+    size = _rounded(0.1 * arm.length)
+    middle = np.round(arm.base.to_world([5.0 * size, 0.0, 5.0 * size]), _GRID)
+    up = np.array([0.0, 0.0, 2.0 * size])
+    low, high = (tuple((middle + side * up).tolist()) for side in (-1.0, 1.0))
+    if kind == "box":
+        region: Region = Box(*(tuple((middle + side * size).tolist()) for side in (-1.0, 1.0)))
+    elif kind == "sphere":
+        region = Sphere(tuple(middle.tolist()), size)
+    elif kind == "cylinder":
+        region = Cylinder(low, high, 0.5 * size)
+    elif kind == "tube":
+        region = Tube(low, high, size, 0.9 * size)
+    else:
+        behind = arm.base.to_world([0.0, 0.0, -size])
+        away = np.subtract(arm.base.position, behind)
+        region = HalfSpace(tuple(np.round(behind, _GRID).tolist()), tuple(away.tolist()))
+    solid = Obstacle(region=region, name=_new_name(kind, [one.name for one in arm.surroundings]))
+    return arm.replace(surroundings=(*arm.surroundings, solid))
+
+
+def with_changed_solid(arm: Manipulator, index: int, **changes: Any) -> Manipulator:
+    """The arm with other values of one of its surroundings, such as its region."""
+    solids = [*arm.surroundings]
+    solids[index] = solids[index].replace(**changes)
+    return arm.replace(surroundings=tuple(solids))
+
+
+def without_solid(arm: Manipulator, index: int) -> Manipulator:
+    """The arm without one of its surroundings."""
+    return arm.replace(surroundings=arm.surroundings[:index] + arm.surroundings[index + 1 :])
+
+
+def moved(region: Region, by: Array) -> Region:
+    """A region that is moved [m], shape (3,); the mesh of a file becomes one without a file."""
+    solid: Any = region.mesh if isinstance(region, MeshFile) else region
+    numbers = next(numbers for kind, numbers in SHAPES.values() if type(solid) is kind)
+    places = {name: getattr(solid, name) for name, unit in numbers.items() if unit == "m"}
+    changes: dict[str, Any] = {
+        name: np.round(np.add(place, by), _GRID) for name, place in places.items() if np.ndim(place)
+    }
+    changes |= {"source": ""} if isinstance(solid, Mesh) else {}
+    return replace(solid, **changes)  # pyright: ignore[reportArgumentType]
 
 
 def _new_name(kind: str, taken: Sequence[str]) -> str:

@@ -99,15 +99,12 @@ def _write_static(
 
 
 def begun(source: str, *, fresh: bool) -> "tuple[Start, KeptWork]":
-    """What is shown first, and the work that is kept; a state or a cloud is shown as it is."""
+    """What is shown first, and the work that is kept; a saved state is shown as it is."""
     from softreach.studio.start import start_on_cloud, start_on_design, start_on_state, work_on
 
-    if is_stored(source):
-        start = start_on_cloud(source)
-    elif source.lower().endswith(".json"):
+    if source.lower().endswith(".json"):
+        refuse("on a saved state, which is always shown as it is", fresh=fresh)
         start = start_on_state(source)
-    else:
-        start = start_on_design(design_from(source))
-        return start, work_on(start.state.design, goes_on=not fresh)
-    refuse("on a state or a cloud, which is always shown as it is", fresh=fresh)
-    return start, work_on(start.state.design, goes_on=False)
+        return start, work_on(start.state.design, goes_on=False)
+    start = start_on_cloud(source) if is_stored(source) else start_on_design(design_from(source))
+    return start, work_on(start.state.design, goes_on=not fresh)

@@ -1,4 +1,4 @@
-"""Lines of sight: what they meet first, what hides a place, how far along an axis they point.
+"""Lines of sight: what hides a place, which point they pick, how far along an axis they point.
 
 All lengths are in that of the arm.
 """
@@ -12,7 +12,6 @@ from softreach.support.arrays import Array
 
 _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
 _CLICK = 0.01  # [rad] between the ray of a click and a point that it hits
-_POINTER = 0.012  # radius of what is clicked [L]
 _STEEPEST = 0.03  # sin² between axis and line of sight, below which a drag tells no distance
 
 
@@ -21,13 +20,6 @@ def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool
     distance = float(np.linalg.norm(point - camera))
     ahead, aside = _beside(centers, camera, (point - camera) / distance)
     return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
-
-
-def way_to(centers: Array, radii: Array, origin: Array, direction: Array) -> float:
-    """Way along a ray to the first ball, no thinner than a pointer [L]; infinite without one."""
-    ahead, aside = _beside(centers, origin, direction / np.linalg.norm(direction))
-    met = (aside < np.maximum(radii, _POINTER)) & (ahead > 0)
-    return float(ahead[met].min(initial=np.inf))
 
 
 def _beside(points: Array, origin: Array, way: Array) -> tuple[Array, Array]:

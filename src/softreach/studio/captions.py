@@ -11,11 +11,10 @@ from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.found import Found
-from softreach.studio.markup import Part, Swatch, Term
-from softreach.studio.reach import Reach, Size, shown_samples
+from softreach.studio.markup import Bad, Part, Swatch, Term
+from softreach.studio.reach import Reach, Size
 from softreach.studio.scene.colors import FAINT
-from softreach.studio.scene.scene import shows_cloud
-from softreach.studio.state import Appearance, StudioState
+from softreach.studio.state import StudioState
 from softreach.support.units import LengthUnit, as_unit
 
 UNREACHABILITY = (
@@ -102,25 +101,6 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 
 
-def picture_text(found: Found, reach: Reach, look: Appearance) -> str:
-    """What is gray in a picture of the scene with a reach, and what it leaves out, in words."""
-    arm, cut, shown = reach.arm, look.slice, len(shown_samples(reach, look.level))
-    dots, unit = shows_cloud(reach, look), arm.length_unit
-    off = [unit.rounded(arm.length * value) for value in (cut.thickness, cut.center)]
-    beside = {"without loads": found.free, "of the kept design": found.reference}
-    gray = " and ".join(whose for whose, known in beside.items() if known is not None)
-    parts = {
-        "the arm": not look.arm,
-        "the reach": not (dots or look.surface),
-        "the half of the points in front of the arm": dots and look.half,
-        f"all outside a slab of {off[0]} at {cut.axis} = {off[1]}": cut.axis != "none",
-        f"all but {shown:,} of the samples": dots and shown < reach.samples,
-    }
-    left_out = ", ".join(text for text, is_out in parts.items() if is_out)
-    told = {"Gray: the reach": gray, "Not in the picture:": left_out}
-    return " ".join(f"{head} {text}." for head, text in told.items() if text)
-
-
 def loaded_share(found: Found, design: Manipulator) -> str:
     """Share of the reach without loads that is left; nothing for an arm without loads."""
     reach, free = found.reach, found.free
@@ -143,6 +123,17 @@ def tip_text(state: StudioState, found: Found) -> list[Part]:
     if found.posture is not None:
         texts.append(_POSTURES[found.posture])
     return [" · ".join(texts)] if texts else []
+
+
+def clearance_text(state: StudioState, found: Found) -> list[Part]:
+    """The clearance of the arm as it is, in red where it is too near to something."""
+    near, unit = found.clearance, state.design.length_unit
+    if near is None or not math.isfinite(near.value):
+        return [f"No clearance: {near.refusal}."] if near is not None and near.refusal else []
+    where = f"{near.name} at Z = {unit.rounded(near.station, digits='.3g')}"
+    if near.value > 0.0:
+        return [f"clearance {unit.rounded(near.value, digits='.3g')} from {where}"]
+    return [Bad(f"clearance {unit.rounded(near.value, digits='.3g')}: too near to {where}")]
 
 
 def _percent(share: float) -> str:

@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 from softreach.studio.found import Found, in_session
 from softreach.studio.markup import Part, paragraph
 from softreach.studio.session import Change, Session
-from softreach.studio.state import LARGEST, StudioState
+from softreach.studio.shown_parameters import typed_unit
+from softreach.studio.state import LARGEST, StudioState, vector
 from softreach.studio.widgets import Ends, Line, Slider, TextKind, TypedField, number_kind, unit_in
 from softreach.support.errors import SoftreachError
 from softreach.support.files.text import text_of
@@ -58,6 +59,22 @@ def of_design(read: Callable[[Any], Any], write: Callable[[Any, Any], Any]) -> A
     return Attribute(lambda state: read(state.design), made, follows="design")
 
 
+def in_unit(read: Callable[[Any], Any], write: Callable[[Any, Any], Any], size: float) -> Attribute:
+    """A value of a design in a unit of some size, 0 for that of lengths that are typed."""
+    scale = lambda arm: size or typed_unit(arm).size
+    shown = lambda arm: _over(read(arm), scale(arm))
+    return of_design(shown, lambda arm, value: write(arm, _times(value, scale(arm))))
+
+
+def _times(value: Any, scale: float) -> Any:
+    return vector(scale * v for v in value) if isinstance(value, tuple) else scale * value
+
+
+def _over(value: Any, scale: float) -> Any:
+    over = lambda number: number if scale == 1.0 else float(f"{number / scale:.10g}")
+    return vector(map(over, value)) if isinstance(value, tuple) else over(value)
+
+
 class Fields:
     """Widgets of a panel. A refused value stays in its field, and the reason stands below it."""
 
@@ -88,6 +105,7 @@ class Fields:
 
     def remove(self) -> None:
         """Take all widgets away."""
+        self._bindings.clear()
         for widget in self._widgets:
             widget.remove()
 

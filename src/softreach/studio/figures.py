@@ -1,27 +1,25 @@
-"""Figures in panels: a section of the reachable set, volumes over a parameter, bars of slopes."""
+"""Figures in panels: a section of the reachable set, and bars of slopes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
-from functools import lru_cache
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed, parameters
+from softreach.arm.parameters import parameters
 from softreach.geometry.surface import plane_cut, section_area
 from softreach.picture.projection import View, plane_of
 from softreach.plot.reach import plot_slice
 from softreach.plot.style import inked
 from softreach.studio import markup
-from softreach.studio.reach import Quality, Reach, exact_set
+from softreach.studio.reach import Quality, Reach
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
-from softreach.studio.state import Slice, StudioState, solvable_rod
+from softreach.studio.state import Slice
 from softreach.studio.widgets import unit_in
-from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
+from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
 from softreach.support.parallel import undivided
@@ -33,14 +31,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
-_LINE, _HERE = "#2f6db5", "#d9731a"
+_LINE = "#2f6db5"
 _INK = "#7d848b"  # legible on white and on black
-_WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
-_VALUES = 9  # of the parameter, beside that of the design
-_SECONDS = 10.0  # [s] for each volume
+_SIZE, _DPI = (4.3, 4.6), 200  # [inch], about as wide as a panel; sharp with two pixels per point
 PART = 0.01  # part of the range of a slider over which the change of the volume is told
 NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)  # room for a bar
-Swept = Iterator[tuple[float, float | None]]
 _FINEST = 1e-3  # [%] of V: more digits tell nobody more
 
 
@@ -52,10 +47,10 @@ class Picture(NamedTuple):
     text: str  # its content in words
 
 
-def _axes(height: float) -> Axes:
+def _axes() -> Axes:
     from matplotlib.figure import Figure  # away from pyplot, which belongs to one thread
 
-    return Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained").subplots()
+    return Figure(figsize=_SIZE, dpi=_DPI, layout="constrained").subplots()
 
 
 def _pixels(ax: Axes) -> NDArray[np.uint8]:
@@ -92,7 +87,7 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
         curves = section_curves(reach, cut)
         solid = reach.exact if curves else None
         grid = solid.grid if solid is not None and solid.dimension == 3 else None
-    ax = _axes(4.6)
+    ax = _axes()
     if grid is not None:
         plot_slice(grid, ax=ax, view=view, at=at, unit=unit.name)
         (cells,) = ax.images
@@ -129,51 +124,6 @@ def _described(curves: list[Array], plane: Slice, arm: Manipulator) -> str:
     area = section_area(curves, "xyz".index(plane.axis)) * arm.length**2
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     return f"{parts}, {arm.length_unit.rounded(area, 2)}"
-
-
-def swept_parameter(state: StudioState) -> ShownParameter | None:
-    """The parameter that is chosen, the first for an unknown one; None if there is none."""
-    sliders = {slider.name: slider for slider in slider_parameters(state.design)}
-    return sliders.get(state.appearance.swept) or next(iter(sliders.values()), None)
-
-
-def sweep_pictures(arm: Manipulator, slider: ShownParameter, quality: Quality) -> Iterator[Picture]:
-    """Volumes over the range of a slider, from the design's own value outwards, ever more."""
-    unit, known = arm.length_unit, dict[float, float | None]()
-    for value, volume in swept_volumes(arm, slider, quality):
-        known[value] = volume
-        volumes = {each: known[each] for each in sorted(known) if known[each] is not None}
-        ax = _axes(3.0)
-        ax.plot([*volumes], unit.of(np.array([*volumes.values()], float), 3), ".-", color=_LINE)
-        ax.axvline(slider.shown, color=_HERE, lw=1.2, ls="--")
-        ax.set(xlabel=slider.label, ylabel=unit.label("V", 3), xlim=slider.limits)
-        here, missing = volumes.get(slider.shown), len(known) - len(volumes)
-        text = "" if here is None else f"here V = {unit.rounded(here, 3)} at {slider.shown:g}"
-        if missing:
-            text += f" · {missing} values make no design or take too long"
-        yield Picture(arm, _pixels(ax), text)
-
-
-def swept_volumes(arm: Manipulator, slider: ShownParameter, quality: Quality) -> Swept:
-    """Values of a slider, nearest to its own first, and volumes [m³]; None where none is known."""
-    low, high = slider.limits
-    even = np.linspace(low, high, _VALUES)
-    steps = np.clip(low + np.round((even - low) / slider.step) * slider.step, low, high)
-    values = {round(float(value), 9) for value in steps} | {slider.shown}
-    for value in sorted(values, key=lambda value: abs(value - slider.shown)):
-        check_wanted()
-        volume = None
-        with suppress(SoftreachError, OverBudget, MemoryError):
-            design = changed(arm, {slider.name: value * slider.scale})
-            volume = _volume(design, quality.coarse_accuracy, quality.tol)
-        yield value, volume
-
-
-@lru_cache(maxsize=512)
-def _volume(design: Manipulator, accuracy: float, tol: float) -> float:
-    with all_cores:
-        solvable_rod(design)
-        return exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS)).volume
 
 
 class Slope(NamedTuple):

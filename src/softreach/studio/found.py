@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.calibration.calibration import Calibration
-from softreach.calibration.measurements import Measurements
 from softreach.inverse import Solution
 from softreach.inverse.path import Drag, Dragged
 from softreach.plot.coloring import BundleKey, ScalarKey
@@ -40,19 +38,18 @@ class Found:
     tip: Array | None = None  # its place [L]; None before it is known, and without an equilibrium
     pointing: Array = field(default_factory=lambda: np.full(3, np.nan))  # direction d3 of the tip
     posture: TipStatus | None = None  # of a loaded arm in its activation; None without loads
+    clearance: Clearance | None = None  # of the whole arm as it is; None without surroundings
     answer: Solution | None = None  # every activation that reaches the target
+    goal: tuple[float, ...] | None = None  # activation to which the arm moves without touching
     takes_nearest: bool = False  # true if the arm moves to the nearest of them, as after a click
     pull: Pull | None = None  # latest order of who drags the tip; None once it is followed
     drag: Drag | None = None  # what follows a dragged tip of the design
     lag: Lag | None = None  # how far the arm lags behind the pointer; None when nobody drags
     held: tuple[Manipulator, Dragged] | None = None  # an arm, and how the last drag left it
-    bench: Bench | None = None  # measured poses, and what was fitted to them
-    sample: Sample | None = None  # markers of the pose that is shown
     check: Check | None = None  # the design against its needs
     check_refusal: str = ""  # reason why it cannot be judged
     part: int = 0  # number of the part whose numbers are typed, in the list of parts
     section: Picture | None = None  # of the reachable set by the plane of the slice
-    sweep: Picture | None = None  # volumes of designs that differ in one parameter
     track: xr.Dataset | None = None  # result of `track_path` for the path
 
     @property
@@ -64,6 +61,11 @@ class Found:
         """One of the reaches, where it is the fine one of a design."""
         reach = getattr(self, name)
         return reach if reach is not None and reach.fine and reach.arm == design else None
+
+
+def is_alike(arm: Manipulator, other: Manipulator) -> bool:
+    """True if two designs differ in their surroundings alone, or not at all."""
+    return arm == other or arm.replace(surroundings=()) == other.replace(surroundings=())
 
 
 class Known(NamedTuple):
@@ -80,6 +82,16 @@ def in_session(path: str) -> str:
     return rest if root == "tab" else path if root in ("found", "state") else f"state.{path}"
 
 
+class Clearance(NamedTuple):
+    """Where the arm comes nearest to what it must not touch."""
+
+    value: float = np.nan  # gap beyond the distance to keep [m]; infinite without anything near
+    name: str = ""  # of what is nearest
+    station: float = np.nan  # Z of the place [m]
+    number: int = -1  # of the solid among the surroundings
+    refusal: str = ""  # reason why nothing is known
+
+
 @dataclass(frozen=True, eq=False)
 class Pull:
     """Place where a person wants the tip [L]."""
@@ -94,42 +106,3 @@ class Lag:
 
     wanted: Array
     dragged: Dragged
-
-
-@dataclass(frozen=True, eq=False)
-class Bench:
-    """Measured poses, the pose that is shown, and what was fitted to them."""
-
-    data: Measurements
-    arm: Manipulator  # the design that they were read for
-    number: int = 0  # of the pose that is shown
-    free: tuple[str, ...] = ("pose",)  # numbers that a fit may change
-    result: Calibration | None = None
-
-    def fits(self, arm: Manipulator) -> bool:
-        """True of an arm with the inputs and the markers of the one that the data were read for."""
-        columns = lambda arm: (arm.input_names, arm.input_units, [m.name for m in arm.markers])
-        return columns(arm) == columns(self.arm)
-
-    def posed(self, state: StudioState) -> StudioState:
-        """The state with the inputs of the pose, as far as its bounds go."""
-        return state.replace(activation=tuple(self.data.inputs[self.number].tolist()))
-
-    def fitted(self, design: Manipulator) -> Manipulator | None:
-        """The calibrated arm; None without a fit that began with this design."""
-        result = self.result
-        return result.arm if result is not None and result.start == design else None
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """Markers of a measured pose."""
-
-    measured: Array  # [m], shape (marker, 3)
-    predicted: Array  # of the calibrated arm, or of the design [m], shape (marker, 3)
-    arm: Manipulator  # the one that predicts
-
-    @property
-    def distances(self) -> Array:
-        """From measured to predicted markers [m], shape (marker,)."""
-        return np.linalg.norm(self.predicted - self.measured, axis=1)

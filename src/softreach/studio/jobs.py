@@ -13,9 +13,17 @@ import numpy as np
 
 from softreach.geometry.rays import is_behind
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
-from softreach.studio.found import Found, Known, in_session
-from softreach.studio.reach import Quality, Reach, count_activations, shown_samples, stages
+from softreach.studio.figures import section_picture, volume_slopes
+from softreach.studio.found import Clearance, Found, Known, in_session, is_alike
+from softreach.studio.reach import (
+    Quality,
+    Reach,
+    clearance_map,
+    count_activations,
+    sample_clearances,
+    shown_samples,
+    stages,
+)
 from softreach.studio.scene.camera import TabCamera
 from softreach.studio.scene.colors import shown_color
 from softreach.studio.scene.scene import Scene, shows_cloud
@@ -23,14 +31,14 @@ from softreach.studio.serve import theme
 from softreach.studio.shown_parameters import slider_ends
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck, rest
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.parallel import undivided
 
 if TYPE_CHECKING:
     from viser import ClientHandle
 
 _SOON = 0.3  # [s] after a coarse set its fine one often comes, in whose place no surface is made
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 _LEVEL = 16  # of the cloud of another design
 DESIGN = "design design.display_unit"  # equal designs may be shown in other units
 News = Mapping[str, Any] | Callable[[Found], Found]
@@ -106,16 +114,18 @@ def what_follows(jobs: Iterable[Job], old: Known | None, new: Known) -> list[Job
 
 def _compute_reach(given: Given) -> Results:
     state, level = given.state, given.state.appearance.level
-    if (known := given.found.complete_reach(state.design)) is not None:
+    known = given.found.reach
+    if known is not None and known.fine and is_alike(known.arm, state.design):
         enough = max(known.samples, known.wanted) >= 1 << level
-        if enough or known.cloud.attrs.get("sampler") != "sobol":
+        if enough:
             same_unit = known.arm.length_unit == state.design.length_unit
-            yield Learned({} if same_unit else {"reach": replace(known, arm=state.design)})
+            same = same_unit and known.arm == state.design
+            yield Learned({} if same else {"reach": known.beside(state.design), "refusal": ""})
             return
     try:
         for reach in stages(state.design, level, given.quality, given.check, given.report):
             if shows_cloud(reach, state.appearance):
-                _count(given, reach)
+                _prepare_colors(given, reach)
             yield Learned({"reach": reach, "refusal": ""})
         return
     except InvalidInput as error:
@@ -130,15 +140,18 @@ def _compute_reach(given: Given) -> Results:
 def _color_cloud(given: Given) -> Results:
     reach = given.found.reach
     if reach is not None and shows_cloud(reach, given.state.appearance):
-        _count(given, reach)
+        _prepare_colors(given, reach)
     yield Learned()
 
 
-def _count(given: Given, reach: Reach) -> None:
-    """Count the activations of what is shown, where its colors say them."""
+def _prepare_colors(given: Given, reach: Reach) -> None:
+    """Compute what its colors say of what is shown, if that takes a while."""
     look = given.state.appearance
-    if reach.fine and shown_color(reach.arm, look.color) == "multiplicity":
-        count_activations(reach, shown_samples(reach, look.level), given.check, given.report)
+    color, rows = shown_color(reach.arm, look.color), shown_samples(reach, look.level)
+    if color == "multiplicity" and reach.fine:
+        count_activations(reach, rows, given.check, given.report)
+    if reach.arm.surroundings and (color == "clearance" or look.free):
+        sample_clearances(reach, rows, given.check, given.report)
 
 
 def _draw_cloud(given: Given) -> Mapping[str, Any] | None:
@@ -156,7 +169,7 @@ def _color_surface(given: Given) -> Results:
         if look.cloud:
             reach.sheets  # noqa: B018  slow the first time
         else:
-            _count(given, reach.boundary)
+            _prepare_colors(given, reach.boundary)
     yield Learned()
 
 
@@ -170,19 +183,17 @@ def _differentiate(given: Given) -> Results:
     if (reach := given.found.complete_reach(design)) is not None:
         before, ends = given.found.ends, slider_ends(design, given.found.ends, check)
         yield Learned({"ends": before if ends == before else ends})
-        yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
+        slopes = given.found.slopes
+        if slopes is not None and is_alike(slopes.arm, design):
+            yield Learned({"slopes": slopes._replace(arm=design)})
+        else:
+            yield Learned({"slopes": volume_slopes(reach, given.quality, check)})
 
 
 def _cut(given: Given) -> Results:
     if (reach := given.found.complete_reach(given.state.design)) is not None:
         given.report("cutting the reachable set")
         yield Learned({"section": section_picture(reach, given.state.appearance.slice)})
-
-
-def _sweep(given: Given) -> Results:
-    if (parameter := swept_parameter(given.state)) is not None:
-        for picture in sweep_pictures(given.state.design, parameter, given.quality):
-            yield Learned({"sweep": picture})
 
 
 def _draw_arm(given: Given) -> Mapping[str, Any]:
@@ -206,11 +217,31 @@ def _draw_arm(given: Given) -> Mapping[str, Any]:
     return known | {"posture": TipStatus.UNDECIDED if lost else status}
 
 
+def _compute_clearance(given: Given) -> Results:
+    state = given.state
+    if not state.design.surroundings:
+        yield Learned({"clearance": None})
+        return
+    try:
+        with undivided():  # the arm may be in a hand
+            room = clearance_map(state.design)
+            found = room.variables(room.of(np.array([state.activation])))
+    except SoftreachError as error:
+        yield Learned({"clearance": Clearance(refusal=str(error))})
+        return
+    (value,), number, (station,) = (found[name][1] for name in ("clearance", "obstacle", "station"))
+    name = room.names[int(number[0])]
+    yield Learned({"clearance": Clearance(float(value), name, float(station), int(number[0]))})
+
+
+def _draw_surroundings(given: Given) -> None:
+    near = given.found.clearance
+    touched = near.number if near is not None and near.value < 0.0 else -1
+    given.scene.draw_surroundings(given.state.design, touched)
+
+
 def _wait(given: Given) -> Results:
     time.sleep(_PAUSE)
-    while given.camera.keep_width():
-        given.check()
-        time.sleep(_PAUSE)
     yield Learned()
 
 
@@ -220,11 +251,11 @@ def _look(given: Given) -> None:
     position = np.array(camera.position)
     ahead = (camera.look_at - position) * (1.0, 1.0, 0.0)
     base = np.array(state.design.base.position) / state.design.length
-    scene.look(ahead if look.half else None, base, _DRAGGED if found.is_dragged else None)
+    scene.look(ahead if look.half else None, base)
     scene.axes.turn(position, given.camera.focal)
     tip = found.tip if look.mouse == "tip" and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
-    scene.see_through_arm(found.sample is not None or hides)
+    scene.see_through_arm(hides)
 
 
 def _compute_beside(given: Given, name: str) -> Results:
@@ -259,11 +290,12 @@ def _beside(name: str) -> Job:
 
 
 _CLOUD: Any = {"draw": _draw_cloud, "draws": "/cloud /unstable", "at_once": False}
-_LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color"
+_LOOKS = "appearance.surface appearance.slice appearance.cloud appearance.color appearance.free"
 _OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
 _IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
+_AROUND: Any = {"wanted": "design.surroundings", "draws": "/surroundings"}
 _PLANE = "appearance.slice.axis appearance.slice.center"
-_EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample found.is_dragged"
+_EYE = "appearance.half appearance.arm appearance.mouse found.tip"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
@@ -274,8 +306,9 @@ SCENE_JOBS = (
     # The exact boundary
     Job("surface", _OF_SURFACE, _color_surface, _draw_surface, **_IF_SHOWN),
     Job("section", f"found.reach {_PLANE}", _cut, wanted="appearance.section"),
-    Job("sweep", f"{DESIGN} appearance.swept", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
+    # The solids around the arm, and how near it is to them
+    Job("clearance", "design activation", _compute_clearance, _draw_surroundings, **_AROUND),
     # The box with numbers, in a job of its own: of two that drew it, one might know an old unit
     Job("axes", "found.reach found.free", draw=_draw_axes),
     # Cuts away the half of a cloud that hides the arm, and turns the axes to the camera

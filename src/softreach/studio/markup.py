@@ -15,6 +15,10 @@ class Strong(str):
     """Text in bold."""
 
 
+class Bad(str):
+    """Text in red."""
+
+
 class Term(str):
     """Text in bold that explains itself when pointed at."""
 
@@ -34,7 +38,7 @@ class Swatch(str):
         return super().__new__(cls, text)
 
 
-Part = str | Strong | Term | Swatch
+Part = str | Strong | Bad | Term | Swatch
 
 
 def inline(*parts: Part) -> str:
@@ -98,4 +102,6 @@ def _part(part: Part) -> str:
     text = html.escape(part)
     if isinstance(part, Term):
         return f'<b class="sr-term" title="{html.escape(part.meaning)}">{text}</b>'
+    if isinstance(part, Bad):
+        return f'<b class="sr-bad">{text}</b>'
     return f"<b>{text}</b>" if isinstance(part, Strong) else text

@@ -95,20 +95,8 @@ window.Worker = class extends Worker {  // one of viser's holds the socket
   }
 };
 
-// Smooth edges cost a third of the pictures a second where no graphics card draws them: there edges are
-// plain, and the arm follows a dragged tip.
 const context = HTMLCanvasElement.prototype.getContext;
-const isSoftware = () => {
-  const gl = context.call(document.createElement("canvas"), "webgl2");
-  if (!gl) return false;
-  const names = gl.getExtension("WEBGL_debug_renderer_info");
-  const renderer = gl.getParameter(names ? names.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
-  gl.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
-};
-let plain;
 HTMLCanvasElement.prototype.getContext = function (kind, options) {
-  if (kind === "webgl2" && options?.antialias) options = {...options, antialias: !(plain ??= isSoftware())};
   const drawn = context.call(this, kind, options);
   if (kind === "webgl2" && !drawn) document.body.append(blind);
   return drawn;

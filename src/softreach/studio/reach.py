@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -13,20 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.cloud.clouds import compute_cloud, design_of
+from softreach.cloud.clouds import compute_cloud
 from softreach.picture.zbuffer import vertex_normals
+from softreach.rod.rods import all_inputs
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.sampling import cube_blocks
 from softreach.studio.state import TOL, solvable_rod
 from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index
-from softreach.support.errors import InvalidInput, no_warnings
+from softreach.support.errors import InvalidInput, NotPossible, no_warnings
 from softreach.workspace import ReachableSet, reachable_set
 from softreach.workspace.sheets import Sheets
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from softreach.rod.clearance import ClearanceMap
 
 Report = Callable[[str], object]  # shows the reader what is being done
 _quiet: Report = lambda doing: None
@@ -71,7 +75,6 @@ class Reach:
     refusal: str = ""  # reason why there is no exact set
     notes: tuple[str, ...] = ()  # parts that are left out or coarser than wanted, and why
     wanted: int = 0  # number of samples; there are fewer where each costs much
-    order: Index | None = None  # one whose prefixes are even subsamples, if the cloud's is not
 
     @property
     def samples(self) -> int:
@@ -115,6 +118,11 @@ class Reach:
         """Number of activations at the place of each sample; NaN before `count_activations`."""
         return np.full(self.samples, np.nan)
 
+    @cached_property
+    def clearances(self) -> Array:
+        """Clearance of the arm in each sample [m]; NaN before `sample_clearances`."""
+        return np.full(self.samples, np.nan)
+
     @property
     def has_surface(self) -> bool:
         """True if there is a boundary to be drawn."""
@@ -141,7 +149,14 @@ class Reach:
             tip=(cloud.tip.dims, sheets.vertices + inward, cloud.tip.attrs),
             activation=(given.dims, activation, given.attrs),
         )
-        return replace(self, cloud=cloud, order=None)
+        return replace(self, cloud=cloud)
+
+    def beside(self, arm: Manipulator) -> Reach:
+        """The same of a design that differs in its surroundings and its unit alone."""
+        cloud = self.cloud.assign_attrs(design=arm.to_toml())
+        made, kept = replace(self, arm=arm, cloud=cloud), ("status", "counts", "sheets")
+        vars(made).update({name: value for name, value in vars(self).items() if name in kept})
+        return made
 
     def share(self, status: TipStatus) -> float:
         """Share of the samples that have a status [-]."""
@@ -151,8 +166,6 @@ class Reach:
 def shown_samples(reach: Reach, level: int) -> Index:
     """Numbers of the samples that a picture of 2^level points shows: those that have a tip."""
     rows = np.arange(min(1 << level, reach.samples))
-    if reach.order is not None:
-        rows = reach.order[rows]
     return rows[has_tip(reach.status[rows])]
 
 
@@ -242,16 +255,6 @@ class _Work:
         return Budget(self.check, self.quality.most_seconds, report)
 
 
-def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
-    """The reach that belongs to a cloud from a file."""
-    ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
-    shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
-    reach = Reach(arm=design_of(cloud), cloud=cloud, exact=None, fine=True, order=shuffled)
-    work = _Work(reach.arm, 0, quality, lambda: None, _quiet)
-    with all_cores:
-        return work.measured(reach, quality.fine_accuracy)
-
-
 def exact_set(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
     """The exact set, to a relative error of its volume and a largest tip error in L."""
     memory = budget.memory if solvable_rod(arm).box.dimension > 3 else None
@@ -288,11 +291,44 @@ def count_activations(
 
     if reach.exact is not None and reach.exact.route == "flux":
         reach.counts[:] = 1.0  # proved one to one
-    missing = rows[np.isnan(reach.counts[rows])]
+    rod, tips = solvable_rod(reach.arm), reach.cloud.tip.values
+    counted = lambda missing: solve_inverse(rod, tips[missing]).counts.astype(float)
+    return _completed(reach.counts, rows, counted, "counting activations", check, report)
+
+
+def sample_clearances(
+    reach: Reach, rows: Index, check: StaleCheck = lambda: None, report: Report = _quiet
+) -> Array:
+    """Clearance of the arm in each sample [m], shape (n,), kept; NaN if its base is in a solid."""
+    gamma = reach.cloud.activation.values
+    with suppress(NotPossible):
+        room = clearance_map(reach.arm)
+        known = lambda missing: room.of(gamma[missing]).value
+        return _completed(reach.clearances, rows, known, "computing clearances", check, report)
+    return reach.clearances[rows]
+
+
+def _completed(
+    values: Array,
+    rows: Index,
+    compute: Callable[[Index], Array],
+    doing: str,
+    check: StaleCheck,
+    report: Report,
+) -> Array:
+    """Values of these rows; those that are NaN are computed, and kept."""
+    missing = rows[np.isnan(values[rows])]
     for block in parallel.blocks(len(missing), _BLOCK):
         check()
         with all_cores:
-            targets = reach.cloud.tip.values[missing[block]]
-            reach.counts[missing[block]] = solve_inverse(solvable_rod(reach.arm), targets).counts
-        report(f"counting activations: {block.stop:,} of {len(missing):,} points")
-    return reach.counts[rows]
+            values[missing[block]] = compute(missing[block])
+        report(f"{doing}: {block.stop:,} of {len(missing):,} points")
+    return values[rows]
+
+
+@lru_cache(maxsize=8)
+def clearance_map(arm: Manipulator) -> ClearanceMap:
+    """The map from activations to the clearance of an arm; NotPossible with its base in a solid."""
+    from softreach.rod.clearance import ClearanceMap
+
+    return ClearanceMap(all_inputs(solvable_rod(arm)))

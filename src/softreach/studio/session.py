@@ -57,8 +57,7 @@ class Session:
         left = work and work.latest
         self.is_touched = left is not None  # true once there is anything to keep
         self.state = left or start.state
-        same = self.state.design == start.state.design
-        self.found = Found(reach=start.reach) if same else Found()
+        self.found = Found()
         self.panels: list[Callable[[], None]] = []  # each shows again what has changed
         self.revision = 0  # number of changes that widgets have to follow, whatever they hold
         self.note, self.doing = "", ""  # for the reader, the second on the work that is being done
@@ -201,8 +200,7 @@ class Session:
             self.report("")
             return_memory_soon()
         self.client.send_file_download(name, data, save_immediately=True)
-        size = f"{len(data) / 1e6:.1f} MB" if len(data) >= 1e5 else f"{len(data) / 1e3:.1f} kB"
-        self.say(f"{name} is written: {size}.")
+        self.say(f"{name} is written: {len(data) / 1e6:.3g} MB.")
 
     def picked_place(self, origin: ArrayLike, direction: ArrayLike) -> Array | None:
         """Place of the tip [m] in the sample that a ray from the camera [L] meets, if any."""

@@ -12,6 +12,7 @@ from softreach.arm.actuators import SectorActuator
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.number import own_fields
+from softreach.arm.obstacles import obstacle_names
 from softreach.arm.parameters import Parameter, parameters, with_values
 from softreach.arm.parameters import parts as parts_of
 from softreach.studio.widgets import Ends
@@ -238,15 +239,20 @@ class Part(NamedTuple):
     ring: int | None = None  # index of a ring; None for all else
     actuator: str = ""  # name of an actuator; "" for all else
     home: int | str | None = None  # the ring that an actuator is in
+    solid: int | None = None  # index among the surroundings; None for all else
 
     def changed(self, arm: Manipulator, **changes: Any) -> Manipulator:
-        """The arm with other values of fields of this ring or actuator."""
+        """The arm with other values of fields of this ring, actuator or solid."""
+        if self.solid is not None:
+            return edits.with_changed_solid(arm, self.solid, **changes)
         if self.ring is not None:
             return edits.with_changed_ring(arm, self.ring, **changes)
         return edits.with_changed_actuator(arm, self.actuator, **changes)
 
     def removed(self, arm: Manipulator) -> Manipulator:
-        """The arm without this ring or actuator."""
+        """The arm without this ring, actuator or solid."""
+        if self.solid is not None:
+            return edits.without_solid(arm, self.solid)
         if self.ring is not None:
             return edits.without_ring(arm, self.ring)
         return edits.without_actuator(arm, self.actuator)
@@ -262,7 +268,7 @@ def body_numbers(arm: Manipulator) -> list[ShownParameter]:
 
 
 def parts(arm: Manipulator) -> dict[str, Part]:
-    """Core, rings and actuators of an arm by their labels."""
+    """Core, rings, actuators and surroundings of an arm by their labels."""
     listed = [Part("core", ("core",), "")] if arm.section.core is not None else []
     for k, ring in enumerate(arm.section.rings):
         owners = (f"rings[{k}]", f"rings[{k}].material")
@@ -272,6 +278,8 @@ def parts(arm: Manipulator) -> dict[str, Part]:
         home = each.ring if isinstance(each, SectorActuator) else None
         label = f"{each.name} (actuator)" if each.name in labels else each.name
         listed.append(Part(label, (each.name,), each.name, actuator=each.name, home=home))
+    for k, name in enumerate(obstacle_names(arm.surroundings)):
+        listed.append(Part(f"solid {k + 1} ({name})", (), arm.surroundings[k].name, solid=k))
     return {part.label: part for part in listed}
 
 

@@ -1,4 +1,4 @@
-"""Start of a tab: a design, a saved state, a stored cloud, or the work that was kept."""
+"""Start of a tab: a design, that of a stored cloud, a saved state, or the work that was kept."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.reach import Quality, Reach, reached
+from softreach.studio.reach import Quality
 from softreach.studio.state import LARGEST, StudioState
 from softreach.support.errors import SoftreachError
 from softreach.support.files.text import read_text, write_text
@@ -23,11 +23,10 @@ _STATE = {"win32": "~/AppData/Local", "darwin": "~/Library/Application Support"}
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """State and knowledge that every new tab begins with."""
+    """State that every new tab begins with."""
 
     state: StudioState
     quality: Quality
-    reach: Reach | None = None
 
 
 def start_on_design(arm: Manipulator, quality: Quality = USUAL) -> Start:
@@ -47,15 +46,14 @@ def start_on_state(path: str | PathLike[str], quality: Quality = USUAL) -> Start
 
 
 def start_on_cloud(path: str | PathLike[str], quality: Quality = USUAL) -> Start:
-    """Begin with a cloud that `save_cloud` wrote.
+    """Begin with the design of a cloud that `save_cloud` wrote.
 
     Raises:
         InvalidInput: There is no cloud at this path.
     """
-    from softreach.cloud.clouds import open_cloud
+    from softreach.cloud.clouds import design_of, open_cloud
 
-    reach = reached(open_cloud(path), quality)
-    return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
+    return start_on_design(design_of(open_cloud(path)), quality)
 
 
 class KeptWork:

@@ -17,12 +17,12 @@ from softreach.requirements import Requirements
 from softreach.rod.rods import as_tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_instance, as_integer, as_number, as_one_of
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import as_directions, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput, Range, SoftreachError
 from softreach.support.units import UNITS
 
 TOL = 1e-5  # [L], the largest tip error: far below a pixel
-LARGEST = 2_000_000  # bytes of a file that a person opens
+LARGEST = 8_000_000  # bytes of a file that a person opens
 _MOST_PLACES = 300  # to reach, which are judged while a slider moves
 _one_at_a_time = threading.Lock()  # jobs that draw and measure one arm would both try for long
 
@@ -76,7 +76,7 @@ def needs_of_text(text: str, *, length: float | None = None, source: str = "") -
     return needs
 
 
-VERSION = 4
+VERSION = 5
 LEVELS = range(12, 22)  # 2^level points: every such prefix of a Sobol sequence is even
 MOUSE = {
     "tip": "drags the tip",
@@ -91,7 +91,7 @@ AXES = ("none", "x", "y", "z")
 _LONGEST = 200  # steps back
 _PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
 _SETTINGS = ("design", "reference", "needs")
-_POSE = ("activation", "target")
+_POSE = ("activation", "target", "direction", "cone")
 _FAR = 1e3  # [L], beyond which there is nothing to see
 _PLACES, _SIZES = Range(-_FAR, _FAR), Range(0.0, _FAR)
 Vector = tuple[float, float, float]
@@ -118,15 +118,14 @@ class Appearance:
     level: int = 17
     color: str = "effort"  # one of `colors.color_names`
     slice: Slice = field(default_factory=Slice)
+    free: bool = False  # only samples that touch nothing are shown
     half: bool = True  # the half of the cloud in front of the arm is cut away
     dark: bool = False  # the page is dark
     cloud: bool = False
     arm: bool = True
     surface: bool = True  # the exact boundary of the reachable set
     mouse: str = "tip"  # use of the mouse in the scene, one of `MOUSE`; it turns the view besides
-    section: bool = False  # plots beside the scene, each computed only while it is shown
-    sweep: bool = False
-    swept: str = ""  # parameter against which the volume is plotted; "" for the first there is
+    section: bool = False  # plot beside the scene, computed only while it is shown
     unit: str = ""  # of lengths, areas and volumes; "" for that of the design
 
     def __post_init__(self) -> None:
@@ -162,6 +161,7 @@ class TipPath:
     points: tuple[Vector, ...]  # [m], in order
     start: tuple[float, ...] | None = None  # activation; None for the best at the first point
     at: int = 0  # the point where the arm is
+    activations: tuple[tuple[float, ...], ...] = ()  # at the points, where the path was planned
 
     def __post_init__(self) -> None:
         if not 2 <= len(self.points) <= MOST_POINTS:
@@ -171,13 +171,20 @@ class TipPath:
         as_integer("path.at", self.at, 0, len(self.points) - 1)
 
     @classmethod
-    def through(cls, points: Any, start: Sequence[float] | None = None, at: int = 0) -> Self:
+    def through(
+        cls,
+        points: Any,
+        start: Sequence[float] | None = None,
+        at: int = 0,
+        activations: Iterable[Sequence[float]] = (),
+    ) -> Self:
         """A path through points [m], shape (k, 3)."""
         values = as_floats("path", points)
         if values.ndim != 2 or values.shape[1] != 3:
             raise InvalidInput("path.shape", values.shape, "of shape (k, 3)")
         start = None if start is None else tuple(map(float, start))
-        return cls(points=tuple(map(vector, values)), start=start, at=at)
+        rows = tuple(tuple(map(float, row)) for row in activations)
+        return cls(points=tuple(map(vector, values)), start=start, at=at, activations=rows)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,6 +201,8 @@ class StudioState:
     """Of each bundle in its unit, within the bounds; rest, or what is nearest to it, by default."""
     appearance: Appearance = field(default_factory=Appearance)
     target: Vector | None = None  # place where the tip should go [m]
+    direction: tuple[float, ...] = ()  # where it should point there, of any length; () for anywhere
+    cone: float = 1.0  # angle from that direction that is allowed [deg]
     reference: Manipulator | None = None  # a design that is kept, to be compared with this one
     camera: Camera | None = None
     path: TipPath | None = None  # that the tip follows
@@ -203,6 +212,9 @@ class StudioState:
         if self.reference is not None:
             rod_of(self.reference)
         requirements_of(self.needs)
+        as_number("within", self.cone, Range(0.0, 180.0))
+        if self.direction:
+            as_directions("direction", self.direction, 1)
         if (unit := self.appearance.unit) and unit != self.design.display_unit:
             object.__setattr__(self, "design", self.design.replace(display_unit=unit))
         box = rod_of(self.design).box
@@ -263,6 +275,8 @@ _READ: dict[str, Callable[[Any], Any]] = {
     "activation": lambda values: tuple(map(float, values)),
     "appearance": lambda look: Appearance(**look | {"slice": Slice(**look["slice"])}),
     "target": lambda place: vector(place),
+    "direction": lambda way: tuple(map(float, way)),
+    "cone": float,
     "reference": lambda text: design_of_text(text, "state file"),
     "camera": lambda camera: Camera(**camera),
     "path": lambda path: TipPath.through(**path),

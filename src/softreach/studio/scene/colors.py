@@ -16,7 +16,13 @@ from softreach.plot.figure_3d import page_keys
 from softreach.rod.tip_map import has_tip
 from softreach.schema import input_symbols
 from softreach.studio import markup
-from softreach.studio.reach import Reach, count_activations, nearest_samples, shown_samples
+from softreach.studio.reach import (
+    Reach,
+    count_activations,
+    nearest_samples,
+    sample_clearances,
+    shown_samples,
+)
 from softreach.studio.state import LEVELS, rod_of
 from softreach.studio.work import all_cores
 from softreach.support.arrays import Array, Index
@@ -41,7 +47,8 @@ def color_names(arm: Manipulator) -> dict[str, str]:
     labels = zip(input_symbols(arm), box.names, strict=True)
     names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
     names |= {"manipulability": "manipulability", "activation distance": "activation distance D̄"}
-    return names | ({"multiplicity": "multiplicity"} if box.dimension == 3 else {})
+    names |= {"multiplicity": "multiplicity"} if box.dimension == 3 else {}
+    return names | ({"clearance": "clearance"} if arm.surroundings else {})
 
 
 def shown_color(arm: Manipulator, color: str) -> str:
@@ -64,9 +71,13 @@ def sample_values(reach: Reach, level: int, color: str) -> str | int | xr.DataAr
     values = values_of(reach, shown_samples(reach, level))
     clipped = color != "multiplicity" and np.isfinite(values).any()
     if clipped:  # the few smallest and largest would leave the others one color
-        values = np.clip(values, *np.nanpercentile(values, _PERCENTILES))
+        low, high = np.nanpercentile(values, _PERCENTILES)
+        if color == "clearance" and high > 0.0:  # what touches has one color
+            low = max(low, 0.0)
+        values = np.clip(values, low, high)
     unit = manipulability_unit(reach.arm.input_units, "L").translate(POWERS)
-    attrs = {"long_name": label.format(unit=unit), "clipped": clipped}
+    name = label.format(unit=unit, length=reach.arm.length_unit.label("clearance"))
+    attrs = {"long_name": name, "clipped": clipped}
     return xr.DataArray(values, dims="sample", attrs=attrs, name=color)
 
 
@@ -86,7 +97,7 @@ def surface_colors(reach: Reach, color: str) -> Coloring:
 
     boundary, color = reach.boundary, shown_color(reach.arm, color)
     known = reach.sheets.activation is not None and color != "activation distance"
-    if known or color == "multiplicity":
+    if known or color in ("multiplicity", "clearance"):
         return sample_colors(boundary, LEVELS[-1], color, shares=False)
     values = sample_values(reach, _LEVEL, color)
     if not isinstance(values, str | int):
@@ -127,6 +138,10 @@ def _manipulability(reach: Reach, rows: Index) -> Array:
     return volume / reach.arm.length ** min(reach.arm.inputs, 3)
 
 
+def _clearance(reach: Reach, rows: Index) -> Array:
+    return sample_clearances(reach, rows) / reach.arm.length_unit.size
+
+
 def _activation_distance(reach: Reach, rows: Index) -> Array:
     """D̄ of the samples that are shown, among all that have a tip; NaN where isolated."""
     settled = np.flatnonzero(has_tip(reach.status))
@@ -140,6 +155,7 @@ def _activation_distance(reach: Reach, rows: Index) -> Array:
 _SCALES = {
     "manipulability": ("manipulability [{unit}]", _manipulability),
     "activation distance": ("activation distance D̄ [-]", _activation_distance),
+    "clearance": ("{length}", _clearance),
     # none is found where a set is thinner than a boundary looks inside
     "multiplicity": ("multiplicity", lambda *shown: np.maximum(count_activations(*shown), 1.0)),
 }

@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.body import STRAIGHT
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import Centerline, arm_surface, bundle_skins, inside, marker_points
-from softreach.geometry.rays import way_to
 from softreach.picture.gltf import ColoredSkin, glb, shaded
 from softreach.picture.zbuffer import vertex_normals
 from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey
 from softreach.rod.rods import with_unstable
 from softreach.rod.tip_map import TipMap, TipStatus
-from softreach.studio.reach import Reach, cloud_points, shown_samples
+from softreach.studio.reach import Reach, cloud_points, sample_clearances, shown_samples
 from softreach.studio.scene.camera import NumberedBox
 from softreach.studio.scene.colors import FAINT, sample_colors, surface_colors
+from softreach.studio.scene.solids import solid_surfaces
 from softreach.studio.state import Appearance, Slice, StudioState, solvable_rod
 from softreach.support.arrays import Array, Mask
 from softreach.support.palette import bundle_color, eight_bit
@@ -40,6 +40,8 @@ _BODY: Color = (158, 153, 148)  # stands out through the surface from a light an
 _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST = 0.35
+_SOLID, _AROUND, _TOUCHED = 0.4, (120, 135, 110), (210, 40, 40)
+"""Opacity and colors of the surroundings."""
 _SHADOWLESS: Any = {"cast_shadow": False, "receive_shadow": False}
 _SURFACE, _CLEAR_SURFACE = (90, 140, 200), 0.6  # the boundary, through which the arm is seen
 _INK = (60, 62, 80), (190, 192, 200)  # of its lines on a light page, and on a dark one
@@ -47,10 +49,10 @@ _BESIDE = {"/free": (FAINT, 0.2), "/reference": ((150, 150, 158), 0.3)}
 """Color and opacity of the reach without loads, and of the one of the kept design."""
 MARK: Color = (235, 90, 0)
 DARK: Color = (30, 30, 30)
+_TOOL = 0.006  # thickness of the line from a section to the point that counts as the tip [L]
 MARKER = 0.016  # edge of the dot of a marker [L]
 _USUAL, _POINT, _POINTS = 1 << 17, 0.007, (0.003, 0.01)  # points of a cloud, and their edges [L]
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
-_AROUND_TIP = 0.06  # [L], where a click means no ghost: all shapes meet there
 _AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
 """Corners around most clouds, seen from the base [L]."""
 
@@ -72,10 +74,10 @@ class Scene:
         self.pointing: Array = np.full(3, np.nan)  # direction d3 of the tip of the arm as drawn
         self._arms: dict[str, _Arm] = {}
         self._clouds: dict[str, tuple[Mask, Any]] = {}
+        self._solids: list[tuple[object, Any]] = []  # what each was drawn for, and its node
         self._lock = threading.RLock()
         self._ahead: Array | None = None
         self._base = np.zeros(3)
-        self._most: int | None = None
 
     # Nodes: adding one of the same name replaces it.
 
@@ -85,6 +87,7 @@ class Scene:
             for known in [k for k in list(self._arms) if k == path or k.startswith(f"{path}/")]:
                 self._arms.pop(known, None)  # workers draw at the same time
             self._clouds.pop(path, None)
+            self._solids = [] if path == "/surroundings" else self._solids
             if self.api.get_handle_by_name(path) is not None:
                 self.api.remove_by_name(path)
 
@@ -107,18 +110,15 @@ class Scene:
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
 
-    def look(self, ahead: Array | None, base: Array, most: int | None = None) -> None:
+    def look(self, ahead: Array | None, base: Array) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
 
-        Of each cloud the first `most` points are drawn; one whose points stay is not sent again.
+        A cloud whose points stay is not sent again.
         """
-        is_thin = most is not None and most == self._most
-        self._ahead, self._base, self._most = ahead, base, most
-        if is_thin:  # it hides little, and the page draws no frame while it takes up another
-            return
+        self._ahead, self._base = ahead, base
         with self._lock:
             for path, (kept, dots) in list(self._clouds.items()):
-                if not np.array_equal(kept, self._kept(dots[0])):
+                if not np.array_equal(kept, ~self.hidden(dots[0])):
                     self._cut_dots(path, *dots)
 
     def hidden(self, points: Array) -> Mask:
@@ -127,12 +127,9 @@ class Scene:
             return np.zeros(len(points), bool)
         return (points - self._base) @ self._ahead < 0.0
 
-    def _kept(self, points: Array) -> Mask:
-        return ~self.hidden(points) & (np.arange(len(points)) < (self._most or len(points)))
-
     def _cut_dots(self, path: str, points: Array, colors: NDArray[np.uint8], *look: Any) -> None:
         with self._lock:
-            kept = self._kept(points)
+            kept = ~self.hidden(points)
             self.dots(path, points[kept], colors[kept] if colors.ndim == 2 else colors, *look)
             self._clouds[path] = kept, (points, colors, *look)
 
@@ -145,6 +142,8 @@ class Scene:
         coloring = sample_colors(reach, look.level, look.color)
         unstable = reach.status[shown_samples(reach, look.level)] == TipStatus.UNSTABLE
         kept = in_slice(points, look.slice)
+        if look.free and reach.arm.surroundings:
+            kept &= sample_clearances(reach, shown_samples(reach, look.level)) > 0.0
         stable, size = kept & ~unstable, _point_size(len(points))
         self._cut_dots("/cloud", points[stable], coloring.rgb[stable], size)
         marks, color = points[kept & unstable], np.array(UNSTABLE, np.uint8)
@@ -181,17 +180,11 @@ class Scene:
         self.api.add_glb(path, data, **_SHADOWLESS)
 
     def draw_beside(self, path: str, reach: Reach | None, cut: Slice) -> None:
-        """Another reach, pale, at "/free" or "/reference": its surface, else points, or nothing."""
+        """The surface of another reach, pale, at "/free" or "/reference", if it has one."""
         color, opacity = _BESIDE[path]
         self.remove(path)
-        if reach is None:
-            return
-        if reach.has_surface:
+        if reach is not None and reach.has_surface:
             self._draw_boundary(path, reach, cut, color, opacity, None)
-            return
-        points = cloud_points(reach, 15)
-        size = 0.4 * _point_size(len(points))
-        self._cut_dots(path, points[in_slice(points, cut)], np.array(color, np.uint8), size)
 
     def draw_axes(self, reach: Reach, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
@@ -199,39 +192,52 @@ class Scene:
         straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
         self.axes.draw(*around, straight / reach.arm.length, arm=reach.arm)
 
+    def draw_surroundings(self, arm: Manipulator, touched: int = -1) -> None:
+        """The solids around an arm; one of them, by its number, is touched."""
+        keys = [(each, arm.length, arm.base) for each in arm.surroundings]
+        if keys != [key for key, _ in self._solids]:
+            self.remove("/surroundings")
+            surfaces = [(one.vertices / arm.length, one.faces) for one in solid_surfaces(arm)]
+            add = partial(self.api.add_mesh_simple, side="double", flat_shading=True, **_SHADOWLESS)
+            nodes = (
+                add(
+                    f"/surroundings/{k}",
+                    v.astype(np.float32),
+                    f.astype(np.uint32),
+                    opacity=_SOLID,
+                    color=_AROUND,
+                )
+                for k, (v, f) in enumerate(surfaces)
+            )
+            self._solids = list(zip(keys, nodes, strict=True))
+        for k, (_, node) in enumerate(self._solids):
+            color = _TOUCHED if k == touched else _AROUND
+            if tuple(node.color) != color:
+                node.color = color
+
     @property
     def spine(self) -> tuple[Array, Array]:
         """Centers (n, 3) and radii (n,) of balls along the arm [L], as it is drawn."""
         drawn = self._arms.get("/arm")
         return (np.empty((0, 3)), np.empty(0)) if drawn is None else (drawn.centers, drawn.radii)
 
-    def ghost_under(self, origin: Array, direction: Array) -> int | None:
-        """Number of the ghost that a ray meets before others and the arm, away from their tips."""
-        met = []
-        for path, ghost in list(self._arms.items()):
-            if path.startswith("/ghosts"):
-                apart = np.linalg.norm(ghost.centers - ghost.centers[-1], axis=1) > _AROUND_TIP
-                way = way_to(ghost.centers[apart], ghost.radii[apart], origin, direction)
-                met.append((way, int(path.rpartition("/")[2])))
-        way, nearest = min(met, default=(np.inf, 0))
-        return nearest if way < way_to(*self.spine, origin, direction) else None
-
     def draw_arm(
         self,
         arm: Manipulator,
         activation: Sequence[float],
         path: str = "/arm",
-        length: float | None = None,
         rod: TipMap | None = None,
     ) -> Array:
-        """The body, its fibers and markers, over a length [m]; returns the tip, shape (3,).
+        """The body, its fibers and markers; returns the tip [L], shape (3,).
 
         Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
         stations = np.linspace(0.0, arm.length, _STATIONS)
+        if arm.pointed is not None:
+            stations = np.union1d(stations, arm.pointed.station_at("station", arm.length))
         frames = with_unstable(rod or solvable_rod(arm)).frames([activation], stations)
         line = Centerline(z=stations, position=frames.position[0], directors=frames.directors[0])
-        return self._draw_line(arm, line, path, length or arm.length)
+        return self._draw_line(arm, line, path)
 
     def draw_rest(self, state: StudioState) -> None:
         """The straight arm, if it is at rest, and a box around where it may go."""
@@ -239,21 +245,26 @@ class Scene:
         line = Centerline.unactivated(np.linspace(0.0, arm.length, _STATIONS), arm.base)
         bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
         if look.arm and not (bent or arm.drives or arm.markers):
-            self._draw_line(arm, line, "/arm", arm.length)
+            self._draw_line(arm, line, "/arm")
         around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
         self.axes.draw(around, line.position / arm.length, arm=arm)
 
-    def _draw_line(self, arm: Manipulator, line: Centerline, path: str, length: float) -> Array:
+    def _draw_line(self, arm: Manipulator, line: Centerline, path: str) -> Array:
         centers, radii = line.position, arm.profile.radius(line.z)
         if np.isnan(centers).any():
             self.remove(path)
             return np.full(3, np.nan)
+        markers = marker_points(arm.markers, line) / arm.length
+        end, tip = -1, centers[-1] / arm.length
+        if arm.pointed is not None:
+            end = int(np.searchsorted(line.z, arm.pointed.station_at("station", arm.length)))
+            tip = markers[arm.markers.index(arm.pointed)]
         if path == "/arm":
-            self.pointing = line.directors[-1, 2]
+            self.pointing = line.directors[end, 2]
         skins = [arm_surface(arm, line, _SIDES)]
         if arm.bundles <= MOST_BUNDLES:
             skins += bundle_skins(arm, line, lift=_LIFT, step=_ACROSS)
-        corners = [(skin.vertices / length).astype(np.float32) for skin in skins]
+        corners = [(skin.vertices / arm.length).astype(np.float32) for skin in skins]
         known = self._arms.get(path)
         if known is not None and known.arm is arm:
             handles = known.meshes
@@ -261,7 +272,7 @@ class Scene:
                 handle.vertices = vertices
         else:
             self.remove(path)
-            ghost, faces = path.startswith(("/ghosts", "/sample")), [skin.faces for skin in skins]
+            ghost, faces = path.startswith("/ghosts"), [skin.faces for skin in skins]
             clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
             colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
             add = partial(self.api.add_mesh_simple, side="double", **_SHADOWLESS)
@@ -271,9 +282,10 @@ class Scene:
                 for k, (v, f, color, opacity) in parts
             ]
         self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
-        markers = marker_points(arm.markers, line) / length
         self.dots(f"{path}/markers", markers, DARK, MARKER)
-        return centers[-1] / length
+        if arm.pointed is not None:
+            self.lines(f"{path}/tool", np.array([[centers[end] / arm.length, tip]]), DARK, _TOOL)
+        return tip
 
     def see_through_arm(self, clear: bool) -> None:
         """Let what is behind the arm be seen through it, or not."""

@@ -12,12 +12,11 @@ from softreach.studio.tabs import compare, design, export, goals, move, view
 
 TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
     "Design": (design.design,),
-    "Parts": (design.loads, design.arm_parts),
+    "Parts": (design.loads, design.tool, design.arm_parts),
     "Move": (move.drag, move.activation, move.target, move.path),
-    "View": (view.view,),
-    "Plots": (view.plots,),
+    "View": (view.view, view.section),
     "Compare": (compare.compare,),
-    "Goals": (goals.needs, goals.measured),
+    "Goals": (goals.needs,),
     "Export": (export.export,),
 }
 JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)  # every kind of work that a tab has done for it
@@ -41,17 +40,12 @@ def furnish(session: Session) -> None:
 
 
 def click(session: Session, origin: Any, direction: Any) -> None:
-    """Do what the mouse is for with the place under the cursor, or take the shape there."""
+    """Do what the mouse is for with the place under the cursor."""
     uses: dict[str, Callable[[Any], object]] = {
         "target": session.aim,
         "path": lambda place: move.extend_path(session, place),
         "place": lambda place: goals.add_place(session, place),
     }
-    use, answer = uses.get(session.state.appearance.mouse), session.found.answer
-    if use is not None:
-        if (place := session.picked_place(origin, direction)) is not None:
-            use(place)
-    elif answer is not None:
-        ghost = session.scene.ghost_under(origin, direction)
-        if ghost is not None and ghost < len(answer):
-            move.take(session, answer.activations[ghost])
+    use = uses.get(session.state.appearance.mouse)
+    if use is not None and (place := session.picked_place(origin, direction)) is not None:
+        use(place)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed, parameters
 from softreach.studio import markup
 from softreach.studio.captions import size_unit, told_error
 from softreach.studio.fields import GRAY, Fields
@@ -15,7 +14,6 @@ from softreach.studio.found import Found
 from softreach.studio.reach import Reach
 from softreach.studio.shown_parameters import ShownParameter, named_parameters, slider_parameters
 from softreach.studio.state import StudioState
-from softreach.support.errors import SoftreachError
 
 _HINT = "Keep this design to see what a change of it costs and gains."
 _EQUAL = 1e-9  # relative difference that is rounding
@@ -60,22 +58,18 @@ class Row(NamedTuple):
         return None if self.kept is None or self.now is None else self.now - self.kept
 
 
-def compared(kept: Candidate, now: Candidate) -> tuple[list[Row], bool]:
-    """What two designs reach and the parameters in which they differ; True if that is all."""
+def compared(kept: Candidate, now: Candidate) -> list[Row]:
+    """What two designs reach, and the parameters with sliders, or else all, that differ."""
     rows = _differing(slider_parameters(kept[0]), slider_parameters(now[0]))
-    is_complete = _explained(kept[0], now[0], list(rows))
-    if not is_complete:
-        rows = rows | _differing(named_parameters(kept[0]), named_parameters(now[0])) | rows
-    return [*_reach_rows(kept, now), *[*rows.values()][:_MOST]], is_complete
+    rows = rows or _differing(named_parameters(kept[0]), named_parameters(now[0]))
+    return [*_reach_rows(kept, now), *[*rows.values()][:_MOST]]
 
 
 def comparison_html(kept: Candidate, now: Candidate) -> str:
     """A row for each quantity: kept, now, and the change."""
-    rows, is_complete = compared(kept, now)
+    rows = compared(kept, now)
     cells = [(row.title, *map(_digits, row[1:3], row.errors), _change_text(row)) for row in rows]
-    others = "The designs differ in more than these numbers."
-    more = "" if is_complete else markup.paragraph(others)
-    return markup.table(["", "kept", "now", "change"], cells) + more
+    return markup.table(["", "kept", "now", "change"], cells)
 
 
 def _change_text(row: Row) -> str:
@@ -127,22 +121,6 @@ def _differing(kept: Sequence[ShownParameter], now: Sequence[ShownParameter]) ->
         if len(known) == 1 or (known and not math.isclose(*known, rel_tol=_EQUAL)):
             rows[name] = Row((after.get(name) or before[name]).label, both[0], both[1])
     return rows
-
-
-def _explained(kept: Manipulator, now: Manipulator, names: Sequence[str]) -> bool:
-    """True if the kept design becomes the present one by these parameters alone."""
-    kinds = lambda arm: (  # all that is no number
-        *(type(arm.profile), arm.loads is None),
-        *((ring.name, ring.material) for ring in arm.section.rings),
-        *((type(each), each.name) for each in arm.actuators),
-    )
-    try:
-        goal = parameters(now)
-        near = changed(kept, {name: goal[name].value(now) for name in names})
-    except (KeyError, SoftreachError):
-        return False
-    alike = not _differing(named_parameters(near), named_parameters(now))
-    return alike and kinds(near) == kinds(now)
 
 
 def _finite(value: float) -> Value:

@@ -14,13 +14,14 @@ from softreach.arm.design_file import in_file_terms
 from softreach.arm.loads import GRAVITIES, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.section import material_names
+from softreach.arm.stations import Marker
 from softreach.studio import shown_parameters
-from softreach.studio.captions import tip_text
-from softreach.studio.fields import GRAY, Attribute, Build, Fields, of_design
+from softreach.studio.fields import GRAY, Attribute, Build, Fields, in_unit, of_design
 from softreach.studio.figures import NO_BAR, SlopeBar, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import Part, ShownParameter, part_parameters, parts
-from softreach.studio.state import StudioState, rod_of, vector
+from softreach.studio.state import StudioState, rod_of
+from softreach.studio.tabs.solids import UNITS_OF_MESHES, solid, with_mesh
 from softreach.studio.widgets import Line, Slider, TextKind, number_kind, vector_kind
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
 from softreach.support.units import LengthUnit
@@ -29,9 +30,11 @@ Numbers = Callable[[Manipulator], Sequence[ShownParameter]]
 
 _ABOUT_BARS = "Bars: change of V over 1 % of each slider's range."
 _ABOUT_START = "Replaces the whole design by an arm of the literature or an example; can be undone"
-_AS_IT_IS, _AS_TYPED, _AS_INNERMOST = "(as it is)", "(as typed)", "as the innermost ring"
-_NEW_RING = "ring"
-_ABOUT_MADE_OF = "Material of all rings: tendons and chambers need its modulus, often left open"
+_AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
+_NEW_RING, _TOOL = "ring", "tool"
+_ABOUT_UNIT = "Unit of the file of a mesh: a GLB is in m, few others say what they are in"
+_ABOUT_MESH = "STL, OBJ, PLY, OFF or GLB, closed: the arm must not touch it"
+_MESHES = ".stl,.obj,.ply,.off,.glb"
 _NAME = TextKind("a name", lambda text: text.strip() or None, str)
 _ABOUT_MATERIAL = "Sets modulus, Poisson's ratio and density to those of a known material"
 _WAYS = {name: name for name in POINTS} | {"up": "up (upright)", "down": "down (hanging)"}
@@ -133,24 +136,20 @@ def arm_parts(panel: Fields) -> None:
     """A list of parts, the fields of the one that is chosen, and new parts."""
     session = panel.session
     with panel.folder("add a part", expanded=False):
-        kinds = (*edits.ACTUATOR_KINDS, _NEW_RING)
-        hint = "An actuator, or a ring of the cross-section"
+        kinds = (*edits.ACTUATOR_KINDS, _NEW_RING, *edits.SOLID_KINDS)
+        hint = "An actuator, a ring of the cross-section, or a solid that the arm must not touch"
         kind = panel.gui.add_dropdown("kind", kinds, hint=hint)
-        matters = (_AS_IT_IS, *material_names())
-        made_of = panel.gui.add_dropdown("made of", matters, hint=_ABOUT_MADE_OF)
-
-        def add() -> None:
-            before, is_ring, matter = session.state.design, kind.value == _NEW_RING, made_of.value
-            made = lambda arm: arm if matter == _AS_IT_IS else edits.with_material(arm, matter)
-            grown = edits.with_ring if is_ring else lambda arm: edits.with_actuator(arm, kind.value)
-            panel.apply(lambda state: state.replace(design=grown(made(state.design))))
-            if session.state.design != before:
-                known = parts(session.state.design).values()
-                like = [k for k, part in enumerate(known) if bool(part.actuator) != is_ring]
-                session.learn({"part": like[-1]})
-                made_of.value = _AS_IT_IS
-
+        add = lambda: grow(lambda arm: _with_part(arm, kind.value))
         panel.button("Add", add, "Adds this part, with numbers to be changed below")
+        unit = panel.gui.add_dropdown("unit of mesh", UNITS_OF_MESHES, hint=_ABOUT_UNIT)
+        read = lambda file: grow(lambda arm: with_mesh(arm, file.name, file.content, unit.value))
+        panel.upload("Load a mesh as a solid", read, _ABOUT_MESH, mime_type=_MESHES, **GRAY)
+
+    def grow(with_part: Callable[[Manipulator], Manipulator]) -> None:
+        before = parts(session.state.design)
+        panel.apply(lambda state: state.replace(design=with_part(state.design)))
+        if new := [k for k, label in enumerate(parts(session.state.design)) if label not in before]:
+            session.learn({"part": new[-1]})
 
     def build(fields: Fields, chosen: tuple[Mapping[str, Part], str, object]) -> None:
         fields.message, fields.words = message, words
@@ -163,6 +162,36 @@ def arm_parts(panel: Fields) -> None:
     panel.anew("part", "design", "found.part", key=_chosen, build=build)
     message = panel.kept(Line(panel.gui))
     panel.message, panel.words = message, words
+
+
+def tool(panel: Fields) -> None:
+    """The point that counts as the tip: the tip itself, a straight tool, or a marker."""
+    unit = lambda state, _: shown_parameters.typed_unit(state.design)
+    pointed = panel.session.state.design.point is not None
+    panel.anew("tool", "design", key=unit, build=_tool, expanded=pointed)
+
+
+def _tool(panel: Fields, unit: LengthUnit) -> None:
+    def offered(state: StudioState) -> dict[str, str]:
+        known = {marker.name: marker.name for marker in state.design.markers}
+        return {"": "none", _TOOL: "a straight tool"} | known
+
+    def choose(arm: Manipulator, name: str) -> Manipulator:
+        if name and name not in {marker.name for marker in arm.markers}:
+            new = Marker(name=name, offset=(0.0, 0.0, float(f"{0.1 * arm.length:.2g}")))
+            return arm.replace(markers=(*arm.markers, new), point=name)
+        return arm.replace(point=name or None)
+
+    def place(arm: Manipulator, offset: Any) -> Manipulator:
+        held = arm.pointed
+        made = (m if m is not held else m.replace(offset=offset) for m in arm.markers)
+        return arm.replace(markers=tuple(made))
+
+    at = of_design(lambda arm: arm.point or "", choose)
+    panel.dropdown("tool", offered, at, "The point that counts as the tip in all that is computed")
+    offset = lambda arm: arm.pointed.offset if arm.pointed else (0.0, 0.0, 0.0)
+    about = "Point of the tool, from the center of its section: across it x, y, and z along the arm"
+    panel.typed(unit.label("tool point"), in_unit(offset, place, 0.0), about, vector_kind)
 
 
 def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, object]:
@@ -178,17 +207,24 @@ def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     chosen = Attribute(
         read, lambda found, number: replace(found, part=number), "found", "found.part"
     )
-    hint = "The part whose numbers are below"
-    panel.dropdown("edit", dict(enumerate(labels)), chosen, hint)
-    own = part.ring is not None or bool(part.actuator)
+    panel.dropdown("edit", dict(enumerate(labels)), chosen, "The part whose numbers are below")
+    own = part.ring is not None or part.solid is not None or bool(part.actuator)
     if own:
         at = of_design(lambda _: part.name, lambda arm, name: part.changed(arm, name=name))
         panel.typed("name", at, "What tables and files call it", lambda *_: _NAME)
     _add_matter(panel, part)
     _typed(panel, part_parameters(session.state.design, part))
+    if part.solid is not None:
+        solid(panel, part)
     if own:
         remove = lambda state: state.replace(design=part.removed(state.design))
         panel.change("Remove", remove, "Takes the part out of the design", **GRAY)
+
+
+def _with_part(arm: Manipulator, kind: str) -> Manipulator:
+    if kind in edits.SOLID_KINDS:
+        return edits.with_solid(arm, kind)
+    return edits.with_ring(arm) if kind == _NEW_RING else edits.with_actuator(arm, kind)
 
 
 def _add_matter(panel: Fields, part: Part) -> None:
@@ -241,37 +277,6 @@ def _base_and_loads(panel: Fields, unit: LengthUnit) -> None:
     panel.message = panel.kept(Line(panel.gui))
     off, about = lambda s: s.replace(design=s.free or s.design), "Gravity, payload and all forces"
     panel.change("Take all loads off", off, about, "design.loads", **GRAY)
-    follows = "design", "found.tip", "found.pointing", "found.posture"
-    rests = lambda state, found: tip_text(state, found) if state.design.loads else ()
-    panel.text(*follows, content=rests)
-    more = lambda s, _: ", ".join(other_loads(s.design))
-    act = lambda *known: [f"The design file also has: {more(*known)}."] * bool(more(*known))
-    panel.text("design", content=act)
-
-
-def other_loads(arm: Manipulator) -> list[str]:
-    """Loads of a design that have no field, in words."""
-    loads = arm.loads or _NONE
-    names = ("tip_moment", "follower_force", "follower_moment", "force_per_length")
-    others = [name.replace("_", " ") for name in names if any(getattr(loads, name))]
-    return others + [f"point loads ({len(loads.point_loads)})"] * bool(loads.point_loads)
-
-
-def setting_text(state: StudioState) -> str:
-    """Loads and base in words, where they are not those of an upright arm that bears its weight."""
-    base, told = state.design.base, list[str]()
-    for name, (label, unit, _, _) in _LOADS.items():
-        if getattr(state.design.loads or _NONE, name) != getattr(Loads(), name):
-            value, known = load_field(name).read(state), name == "gravity" and gravity_name(state)
-            text = f"({', '.join(f'{v:g}' for v in value)})" if name != "payload" else f"{value:g}"
-            unit = unit or shown_parameters.typed_unit(state.design).name
-            told.append(f"gravity {known}" if known else f"{label} {text} {unit}")
-    told += other_loads(state.design)
-    way = base.points if isinstance(base.points, str) else ""
-    told += [f"base {_WAYS[way]}"] * (way != "up")
-    told += [f"base at {state.design.length_unit.place(base.position)}"] * any(base.position)
-    told += [f"base turned by {math.degrees(base.turn):g}°"] * bool(base.turn)
-    return ", ".join(told)
 
 
 def gravity_name(state: StudioState) -> str:
@@ -282,41 +287,30 @@ def gravity_name(state: StudioState) -> str:
 
 def base_field(name: str) -> Attribute:
     """Position in the unit of lengths that are typed, or turn in degrees."""
-    size = lambda arm: shown_parameters.typed_unit(arm).size
-    scale = lambda arm: math.radians(1.0) if name == "turn" else size(arm)
-    read = lambda arm: _over(getattr(arm.base, name), scale(arm))
-    moved = lambda arm, value: arm.base.replace(**{name: _times(value, scale(arm))})
-    return of_design(read, lambda arm, value: arm.replace(base=moved(arm, value)))
+    moved = lambda arm, value: arm.replace(base=arm.base.replace(**{name: value}))
+    size = math.radians(1.0) if name == "turn" else 0.0
+    return in_unit(lambda arm: getattr(arm.base, name), moved, size)
 
 
 def load_field(name: str) -> Attribute:
     """A load as it is typed; other loads stay, and without any the arm has no loads."""
     label, symbol, size, _ = _LOADS[name]
     low = 0.0 if name == "payload" else -_MOST
-    scale = lambda arm: size or shown_parameters.typed_unit(arm).size
 
     def write(arm: Manipulator, value: Any) -> Manipulator:
         unit = symbol or shown_parameters.typed_unit(arm).name
+        scale = size or shown_parameters.typed_unit(arm).size
         for number in value if isinstance(value, tuple) else (value,):
-            if not low <= number <= _MOST:
+            if not low <= number / scale <= _MOST:
                 allowed = f"{low:,.0f} to {_MOST:,.0f} {unit}"
-                raise InvalidInput(label, f"{number:g} {unit}", allowed)
-        loads = (arm.loads or _NONE).replace(**{name: _times(value, scale(arm))})
+                raise InvalidInput(label, f"{number / scale:g} {unit}", allowed)
+        loads = (arm.loads or _NONE).replace(**{name: value})
         try:
             return arm.replace(loads=None if loads == _NONE else loads)
         except InvalidDesign as error:
             raise _in_words(error) from None
 
-    return of_design(lambda arm: _over(getattr(arm.loads or _NONE, name), scale(arm)), write)
-
-
-def _times(value: Any, scale: float) -> Any:
-    return vector(scale * v for v in value) if isinstance(value, tuple) else scale * value
-
-
-def _over(value: Any, scale: float) -> Any:
-    over = lambda number: number if scale == 1.0 else float(f"{number / scale:.10g}")
-    return vector(map(over, value)) if isinstance(value, tuple) else over(value)
+    return in_unit(lambda arm: getattr(arm.loads or _NONE, name), write, size)
 
 
 def _in_words(error: InvalidDesign) -> InvalidDesign:

@@ -4,29 +4,32 @@ from __future__ import annotations
 
 import tempfile
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.obstacles import Obstacle
 from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.export.clouds import CLOUD_FILES
 from softreach.export.surfaces import SURFACE_FILES
+from softreach.geometry.meshes import MeshFile
 from softreach.plot.coloring import draw_figure_key
 from softreach.plot.style import inked
 from softreach.rod.kinematics import configuration
-from softreach.studio.captions import legend_text, picture_text, reach_text
+from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.fields import GRAY, Change, Fields, file_text
 from softreach.studio.markup import Swatch
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.scene.camera import FINER
 from softreach.studio.scene.colors import sample_values
 from softreach.studio.scene.scene import in_slice
+from softreach.studio.scene.solids import solid_surfaces
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState, design_of_text
-from softreach.studio.tabs.design import setting_text
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -38,8 +41,8 @@ Write = Callable[[Session, Path], object]
 _ABOUT = {
     "data": "The design alone, which the command line reads too; all samples of the cloud; the "
     "exact boundary of the reachable set; or the arm as bent. Lengths are in the unit of the page",
-    "picture": "The scene as it is seen, with legend and design; three views and an oblique one of "
-    "the points that are shown; or one web page with the scene, which turns without the studio",
+    "picture": "The scene as it is seen, with legend and design; or one web page with the scene, "
+    "which turns without the studio",
 }
 _PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
 """Of a light page and of a dark one."""
@@ -56,7 +59,8 @@ def export(panel: Fields) -> None:
         state = lambda: session.state_now().to_json().encode()
         keep = lambda: session.send("softreach-studio.json", state)
         panel.button("Save this work", keep, about)
-        read = lambda file: session.restore(saved(file.name, file.content))
+        own = session.start.state.design.surroundings
+        read = lambda file: session.restore(saved(file.name, file.content, own))
         hint = "A state (.json) or a design (.toml) that was saved"
         panel.upload("Load state or design", read, hint, **GRAY)
     for folder, kind in (("design and data", "data"), ("pictures", "picture")):
@@ -70,14 +74,25 @@ def export(panel: Fields) -> None:
             panel.button(f"Save {kind}", save, "As a file of this type")
 
 
-def saved(name: str, content: bytes) -> Change:
-    """The change to the state in a file that was saved, or to the design of a TOML file."""
+def saved(name: str, content: bytes, own: Sequence[Obstacle] = ()) -> Change:
+    """The change to the state in a file, or to the design of a TOML; it may name `own` meshes."""
     text = file_text(name, content)
     if name.lower().endswith(".toml"):
         design = design_of_text(text, name)
+        _check_meshes(design, own)
         return lambda state: state.replace(design=design)
     state = StudioState.from_json(text)
+    for arm in filter(None, (state.design, state.reference)):
+        _check_meshes(arm, own)
     return lambda _: state
+
+
+def _check_meshes(arm: Manipulator, own: Sequence[Obstacle]) -> None:
+    known = {each.region for each in own}
+    for region in (each.region for each in arm.surroundings):
+        if isinstance(region, MeshFile) and region not in known:
+            allowed = "part of the text, as other files are not sent along"
+            raise InvalidInput("mesh", region.path, allowed, "load it on the tab Parts")
 
 
 def content_of(session: Session, name: str, write: Write) -> bytes:
@@ -116,18 +131,6 @@ def _write_arm(session: Session, path: Path) -> None:
     export_arm(arm, shape, path, unit=arm.length_unit)
 
 
-def _write_views(session: Session, path: Path) -> None:
-    """Three views and an oblique one of the points that are shown, in their colors."""
-    from softreach import plot
-    from softreach.plot.style import pyplot
-
-    arm, (cloud, color) = session.state.design, _shown(session)
-    shape = configuration(arm, session.state.activation)
-    figure = plot.plot_views(cloud, arm, shape, color=color)
-    plot.save_figure(figure, path)
-    pyplot().close(figure)
-
-
 def _write_page(session: Session, path: Path) -> None:
     """A web page to be turned: the boundary or the points that are shown, and the arm as it is."""
     from softreach import plot
@@ -135,6 +138,7 @@ def _write_page(session: Session, path: Path) -> None:
     reach, state, (cloud, color) = _reach(session), session.state, _shown(session)
     is_surface = reach.has_surface and state.appearance.surface and not state.appearance.cloud
     shown = [reach.exact if is_surface else cloud, configuration(state.design, state.activation)]
+    shown += solid_surfaces(state.design)
     unit, caption = state.design.length_unit.name, ". ".join(_caption(state, reach))
     page = plot.plot_3d(shown, color=color, unit=unit, caption=caption)
     path.write_text(page.html, encoding="utf-8")
@@ -161,8 +165,7 @@ def _write_picture(session: Session, path: Path) -> None:
         scene = scene[max(0, seen[0] - FINER * _EDGE) : seen[-1] + FINER * _EDGE]
     height, width = (size / FINER for size in scene.shape[:2])
     room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
-    texts = *_caption(state, reach), picture_text(session.found, reach, state.appearance)
-    lines = [line for text in texts for line in textwrap.wrap(text, room)]
+    lines = [line for text in _caption(state, reach) for line in textwrap.wrap(text, room)]
     above, below = _KEY if key is not None else 0, 2 * _EDGE + _LINE * len(lines)
     total, (paper, ink) = above + height + below, _PAPER_AND_INK[state.appearance.dark]
     size = width / _DPI, total / _DPI
@@ -176,15 +179,14 @@ def _write_picture(session: Session, path: Path) -> None:
 
 
 def _caption(state: StudioState, reach: Reach) -> list[str]:
-    """Numbers and marks of a reach, its design, base and loads, and how hard each bundle pulls."""
+    """Numbers and marks of a reach, its design, and how hard each bundle pulls."""
     numbers, marks = (
         "".join(part for part in parts if not isinstance(part, Swatch)).strip()
         for parts in (reach_text(reach), legend_text(reach, free=False))
     )
     values = ", ".join(f"{c.label} {c.shown:g}" for c in slider_parameters(state.design))
     pulls = ", ".join(f"{value:.3g}" for value in state.activation)
-    parts = values, f"L = {state.design.length:g} m", setting_text(state)
-    design = f"{'; '.join(filter(None, parts))}. Activation ({pulls})."
+    design = f"{values}; L = {state.design.length:g} m. Activation ({pulls})."
     return [*filter(None, (numbers, marks, design))]
 
 
@@ -202,7 +204,6 @@ FILES: Mapping[str, Mapping[str, tuple[str, Write]]] = {
     },
     "picture": {
         "as it is seen (.png)": ("studio.png", _write_picture),
-        "four views (.png)": ("reachability.png", _write_views),
         "web page (.html)": ("reachability.html", _write_page),
     },
 }

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.export.clouds import path_csv
 from softreach.inverse.path import Drag, PathStatus, end_text, track_path
 from softreach.inverse.request import positions_in
@@ -20,17 +21,21 @@ from softreach.studio.fields import GRAY, Attribute, Fields, attempt, attribute
 from softreach.studio.found import Found, Lag, Pull
 from softreach.studio.jobs import Given, Job, Learned, Results
 from softreach.studio.scene.drag import DragBall
-from softreach.studio.scene.scene import DARK, MARK, MOST_BUNDLES, pieces
+from softreach.studio.scene.scene import DARK, MARK, pieces
 from softreach.studio.session import Session
 from softreach.studio.shown_parameters import three_digits
 from softreach.studio.state import MOUSE, StudioState, TipPath, rod_of, solvable_rod, vector
-from softreach.studio.widgets import TypedField, vector_kind
+from softreach.studio.widgets import TextKind, TypedField, numbers_in, vector_kind
+from softreach.studio.work import all_cores
 from softreach.support.errors import InvalidInput
+from softreach.support.quantity import five_digits
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
     from viser import UploadedFile
+
+    from softreach.inverse import Solution
 
 _DRAG_HINT = (
     "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
@@ -41,11 +46,19 @@ _MOST = 40  # sliders: a page with hundreds takes minutes to build
 _HERE = "\N{CHECK MARK} "
 _NEAR = 1e-4  # of the ranges of activations, within which the arm is in a solution
 _POINTS = 24  # of the straight line to each place that is clicked
+_OUT_OF_REACH = {1: "out of reach", 3: "reached only where the arm touches something"}
 _FAMILY = 6  # shapes offered where infinitely many reach the target
 _DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
 _RESIDUAL = 1e-8  # [L]
-_STEP = 0.05  # [s] between points that are played
+_STEP, _FRAMES = 0.05, 41  # [s] between points that are played; points of a planned path
 _TARGET, _END, _NEAREST = 0.012, 0.014, 0.008  # radii [L]: smaller than the ball on the tip
+_WAY = 0.15  # length of the line along the direction that is wanted [L]
+_DIRECTION = TextKind(
+    "three numbers, or nothing",
+    lambda text: numbers_in(text, 3, "", 1.0) if text.strip() else (),
+    lambda way: ", ".join(map(five_digits, way)),
+)
+_ABOUT_DIRECTION = "Where the tip should point at the target, as x, y, z; empty for anywhere"
 _PALE = (240, 175, 205)  # of a path, where the arm does not follow it
 
 
@@ -62,7 +75,6 @@ def drag(panel: Fields) -> None:
     def place(state: StudioState, found: Found) -> None:
         arm, look, lag = state.design, state.appearance, found.lag
         grasped = look.mouse == "tip" and look.arm and rod_of(arm).box.dimension > 0
-        grasped = grasped and found.sample is None  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
         clear = state.path is not None
         ball.move(found.tip if grasped else None, radius, dark=look.dark, clear=clear)
@@ -75,7 +87,7 @@ def drag(panel: Fields) -> None:
             return [f"This branch ends {gap} short of the pointer."] if gap else []
         return [_DRAG_HINT]
 
-    follows = "design", "appearance", "path", "found.tip", "found.sample", "found.lag"
+    follows = "design", "appearance", "path", "found.tip", "found.lag"
     panel.follow(*follows, show=place)
     panel.text("design", "appearance.mouse", "found.lag", content=text)
 
@@ -109,8 +121,7 @@ def _sliders(panel: Fields, ends: Sequence[tuple[str, float, float]]) -> None:
         around = three_digits(low, -1), three_digits(high)  # the state keeps to the bounds
         panel.slider(label, around, step, at, hint)
     if (hidden := len(ends) - _MOST) > 0:
-        drawn = "" if len(ends) <= MOST_BUNDLES else "; no bundle is drawn"
-        panel.say(f"{hidden} more bundles have no slider here{drawn}.")
+        panel.say(f"{hidden} more bundles have no slider here.")
 
 
 def _slider_ends(state: StudioState, _: Found) -> list[tuple[str, float, float]]:
@@ -142,19 +153,23 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
             field.value = tuple(unit.of(np.array(state.target)).tolist())
 
     panel.follow("target", show=follow)
-    some = lambda _, found: found.answer is not None and len(found.answer) > 0
-    panel.anew("activations that reach it", "found.answer", build=_solutions, shown=some)
+    panel.typed("direction", attribute("direction"), _ABOUT_DIRECTION, lambda *_: _DIRECTION)
+    panel.typed("within [deg]", attribute("cone"), "Angle from that direction that is allowed")
+    present = lambda state: state.replace(direction=tuple(session.found.pointing.round(4).tolist()))
+    panel.change("As it points now", present, "Keeps the direction of the tip", **GRAY)
+    known = lambda _, found: found.answer is not None
+    panel.anew("activations", "found.answer", build=_solutions, shown=known)
     about, off = "Takes target and solutions away", lambda state: state.replace(target=None)
     panel.change("Clear the target", off, about, "target", **GRAY)
 
 
 def _solutions(panel: Fields, _: object) -> None:
-    """A button for each solution; that of the one that the arm is in is green."""
+    """A button for each solution, or for the nearest; the one that the arm is in is green."""
     answer = panel.session.found.answer
-    for row in answer.activations if answer is not None else ():
+    for row in _shapes(answer) if answer is not None else ():
         text = ", ".join(f"{value:.4g}" for value in row)
         act = lambda row=row: take(panel.session, row)
-        button = panel.button(text, act, "Moves the arm to this solution")
+        button = panel.button(text, act, "Moves the arm there")
 
         def mark(state: StudioState, _: Found, row: Any = row, button: Any = button) -> None:
             scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
@@ -167,8 +182,16 @@ def _solutions(panel: Fields, _: object) -> None:
 
 
 def take(session: Session, activation: Any) -> None:
-    """Move the arm to a solution."""
-    session.update(lambda state: state.replace(activation=tuple(activation.tolist())))
+    """Move the arm to a solution; with surroundings on a way on which it touches nothing."""
+    goal = tuple(activation.tolist())
+    if _plans(session.state.design):
+        session.learn({"goal": goal})
+    else:
+        session.update(lambda state: state.replace(activation=goal))
+
+
+def _plans(arm: Manipulator) -> bool:
+    return bool(arm.surroundings) and arm.loads is None
 
 
 def _answer_text(state: StudioState, found: Found) -> list[str]:
@@ -177,16 +200,25 @@ def _answer_text(state: StudioState, found: Found) -> list[str]:
     arm, unit = state.design, state.design.length_unit
     place = place_text(answer.target / arm.length, arm)
     if not len(answer):
-        certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
+        certain = _OUT_OF_REACH.get(answer.status, "not reached, perhaps out of reach")
         near = place_text(answer.nearest / arm.length, arm)
-        gap = unit.rounded(answer.gap, digits=".3g")
-        return [f"{place} is {certain}. Nearest: {near}, {gap} away."]
+        gap, off = unit.rounded(answer.gap, digits=".3g"), _angle_text(answer.direction_gap)
+        return [f"{place} is {certain}. Nearest: {near}, position error {gap}{off}."]
     count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
     return [
-        f"{count} {place} to {unit.rounded(answer.residuals.max(), digits='.1e')}. Press one "
-        f"({', '.join(arm.input_names)}) to move the arm there, or click its shape; the one with a "
-        "check mark is where it is."
+        f"{count} {place}, position error {unit.rounded(answer.residuals.max(), digits='.1e')}"
+        f"{_angle_text(answer.direction_errors.max())}. Press one "
+        f"({', '.join(arm.input_names)}) to move the arm there; it is at the one with a check mark."
     ]
+
+
+def _angle_text(angle: float) -> str:
+    return "" if math.isnan(angle) else f", direction error {math.degrees(angle):.3g}°"
+
+
+def _shapes(answer: Solution) -> np.ndarray:
+    """The activations that reach the target, or those that bring the tip nearest to it."""
+    return answer.activations if len(answer) else answer.nearest_activation[None]
 
 
 def path(panel: Fields) -> None:
@@ -217,10 +249,13 @@ def path(panel: Fields) -> None:
                 if (track := _track(session.state, session.found)) is not None:
                     session.send("path.csv", path_csv(track).encode)
 
-            panel.button("Save the path (CSV)", save, "with its activations")
+            tracked = lambda *known: _track(*known) is not None
+            panel.button("Save the path (CSV)", save, "with its activations", tracked)
 
 
 def _path_text(state: StudioState, found: Found) -> list[str]:
+    if state.path is not None and state.path.activations:
+        return ["A planned path, along which the arm touched nothing."]
     track = _track(state, found)
     text = "following ..." if track is None else end_text(track, state.design.length_unit)
     return [text] * (state.path is not None)
@@ -235,6 +270,8 @@ def _track(state: StudioState, found: Found) -> xr.Dataset | None:
 
 def _followed(state: StudioState, found: Found) -> np.ndarray:
     """Activations at the points of the path as far as the arm follows it, shape (k, bundles)."""
+    if state.path is not None and state.path.activations:
+        return np.array(state.path.activations)
     if (track := _track(state, found)) is None:
         return np.empty((0, len(state.activation)))
     return track.activation.values[track.status.values == PathStatus.FOLLOWED]
@@ -274,11 +311,16 @@ def _solve(given: Given) -> Sequence[Learned]:
         return [Learned({"answer": None})]
     solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
-    answers = solve_inverse(state.design, [state.target], near=near, family=_FAMILY, from_rest=True)
-    answer = answers[0]
+    options: dict[str, Any] = {"near": near, "family": _FAMILY, "from_rest": True}
+    options["free"] = bool(state.design.surroundings)
+    if state.direction:
+        options |= {"direction": state.direction, "cone": math.radians(state.cone)}
+    answer = solve_inverse(state.design, [state.target], **options)[0]
     if given.found.takes_nearest and len(answer):
         distance = np.linalg.norm(answer.activations - state.activation, axis=1)
         best = tuple(answer.activations[np.argmin(distance)].tolist())
+        if _plans(state.design):
+            return [Learned({"answer": answer, "takes_nearest": False, "goal": best})]
         change = lambda now: now.replace(activation=best)
     return [Learned({"answer": answer, "takes_nearest": False}, change)]
 
@@ -294,8 +336,11 @@ def _draw_answer(given: Given) -> None:
     if not len(answer):
         scene.lines("/gap", pieces(np.stack([target, nearest])), MARK, 0.004)
         scene.api.add_icosphere("/gap/nearest", _NEAREST, DARK, position=nearest)
-    shapes = answer.activations if len(answer) else answer.nearest_activation[None]
-    for k, activation in enumerate(shapes):
+    if (way := np.array(given.state.direction)).any():
+        end = _WAY * way / np.linalg.norm(way)  # from the target, under which its node is
+        scene.lines("/target/way", np.array([[np.zeros(3), end]]), MARK, 0.008)
+        scene.api.add_icosphere("/target/way/end", _NEAREST, MARK, position=end)
+    for k, activation in enumerate(_shapes(answer)):
         scene.draw_arm(design, activation.tolist(), f"/ghosts/{k}")
 
 
@@ -331,7 +376,7 @@ def _follow_tip(given: Given) -> Results:
 def _follow(given: Given) -> Results:
     path = given.state.path
     yield Learned({"track": None})
-    if path is not None:
+    if path is not None and not path.activations:
         rod = solvable_rod(given.state.design)
         fits = path.start is not None and len(path.start) == rod.box.bundles
         start = rod.box.clip(np.array(path.start)) if fits else None
@@ -355,9 +400,30 @@ def _draw_path(given: Given) -> None:
         scene.lines(f"/path/{name}", pieces(line / length), color, 0.006)
 
 
+def _move_to_goal(given: Given) -> Results:
+    """Along a planned path to an activation; where there is none, the reader is told."""
+    from softreach.inverse import plan
+
+    arm, goal = given.state.design, given.found.goal
+    if goal is None or len(goal) != arm.inputs:
+        return
+    with all_cores:
+        planned = plan(arm, given.state.activation, goal).activation.values
+    ways = np.append(0.0, np.cumsum(np.abs(np.diff(planned, axis=0)).sum(axis=1)))
+    even = np.linspace(0.0, ways[-1], _FRAMES)
+    rows = np.stack([np.interp(even, ways, each) for each in planned.T], axis=1)
+    path = TipPath.through(rod_of(arm).tips(rows), activations=rows)
+    yield Learned(change=lambda now: now.replace(path=path) if now.design == arm else now)
+    yield from _played(given, rows, 0)
+
+
 def _play(given: Given) -> Results:
     path, activations = given.state.path, _followed(given.state, given.found)
     start = path.at if path is not None and path.at < len(activations) - 1 else 0
+    yield from _played(given, activations, start)
+
+
+def _played(given: Given, activations: np.ndarray, start: int) -> Results:
     for point in range(start, len(activations)):
         given.check()
         yield Learned(change=lambda now, k=point: _at_point(now, activations, k))
@@ -376,9 +442,11 @@ _AIM: Any = {"wanted": "target", "makes": "answer takes_nearest", "draws": "/gho
 _OF_PATH: dict[str, Any] = {"wanted": "path", "makes": "track", "doing": "following the path"}
 JOBS = (
     # The activations that reach the target, and their shapes
-    Job("inverse", "design target", _solve, _draw_answer, **_AIM),
+    Job("inverse", "design target direction cone", _solve, _draw_answer, **_AIM),
     # The arm follows its dragged tip on its branch; where that rests, every branch is looked for
     Job("drag", "found.pull", _follow_tip, makes="pull lag"),
     Job("path", "design path.points path.start", _follow, _draw_path, **_OF_PATH),
     Job("play", "", _play),
+    # The arm moves to a solution between what is around it
+    Job("goal", "found.goal", _move_to_goal, wanted="found.goal", doing="planning a free path"),
 )

@@ -1,24 +1,21 @@
-"""Status above all tabs, looks of a tab, and the plots beside its scene."""
+"""Status above all tabs, looks of a tab, and the section beside its scene."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from softreach.studio import markup
-from softreach.studio.captions import legend_text, loaded_share, reach_text
+from softreach.studio.captions import clearance_text, legend_text, loaded_share, reach_text
 from softreach.studio.fields import Attribute, Fields, attribute
-from softreach.studio.figures import Picture, swept_parameter
 from softreach.studio.found import Found
 from softreach.studio.markup import Part, Strong
 from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.colors import color_names, key_html, shown_color
 from softreach.studio.session import Session
-from softreach.studio.shown_parameters import slider_parameters, three_digits
+from softreach.studio.shown_parameters import three_digits
 from softreach.studio.state import AXES, StudioState
 from softreach.studio.tabs.goals import verdict_text
 from softreach.support.units import UNITS, LengthUnit
@@ -35,22 +32,14 @@ _TOGGLES = {
     "arm": ("arm", "The body and its bundles in the present activation"),
     "surface": ("exact surface", "Boundary of all that the tip reaches, without sampling"),
     "cloud": ("cloud", "Tips of sampled activations"),
+    "free": ("free samples alone", "Of the cloud only what touches none of the surroundings"),
     "half": ("half of the cloud", "Cuts away the half in front of the arm"),
     "dark": ("dark page", "Light on dark"),
 }
-_PLOTS_HINT = (
-    "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
-    "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
+_ABOUT_SECTION = (
+    "The reachable set in the plane of the slice, or y = 0: its boundary, and how many activations "
+    "reach each place; in a window beside the scene, on a phone below this sheet"
 )
-_ABOUT_SWEEP = "Volume of designs that differ from this one in one parameter, computed as you look"
-_PLOTS = {
-    "section": (
-        "section",
-        "The reachable set in the plane of the slice (tab View; without a slice y = 0): its "
-        "boundary, and how many activations reach each place",
-    ),
-    "sweep": ("V against parameter", _ABOUT_SWEEP),
-}
 _WIDTH = 380  # pixels
 _NOTHING = np.zeros((1, 1, 4), np.uint8)
 
@@ -60,7 +49,7 @@ def status(panel: Fields) -> None:
     session, numbers = panel.session, list[Any]()
     known = "design", "found.reach", "found.free", "found.check", "found.key", "found.refusal"
     panel.follow(*known, show=lambda *now: numbers.__setitem__(slice(None), _numbers(*now)))
-    panel.html(*known, *_WORK, content=lambda *_: _status(session, *numbers))
+    panel.html(*known, "found.clearance", *_WORK, content=lambda *_: _status(session, *numbers))
     act = lambda: (session.cancel if session.busy else session.resume)()
     cancel = panel.button(_CANCEL, act, _ABOUT_CANCEL, visible=False)
 
@@ -104,7 +93,8 @@ def _numbers(state: StudioState, found: Found) -> tuple[list[Part], list[str]]:
 def _status(session: Session, numbers: list[Part], below: list[str]) -> str:
     work = _work(session)
     first = [*numbers, f" · {work}" * bool(work)] if numbers else [session.found.refusal or work]
-    return markup.status(markup.paragraph(*first), *below)
+    near = markup.paragraph(*clearance_text(session.state, session.found))
+    return markup.status(markup.paragraph(*first), near, *below)
 
 
 def is_behind(session: Session) -> bool:
@@ -154,20 +144,13 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     panel.slider(unit.label("center"), (-end, end), 0.01 * end, at, "Middle of the slab")
 
 
-def plots(panel: Fields) -> None:
-    """Check boxes in the tab; a folder for each plot in the window."""
-    panel.say(_PLOTS_HINT)
-    for name, (label, hint) in _PLOTS.items():
-        panel.checkbox(label, attribute(f"appearance.{name}"), hint)
-    about = "What changes in the plot of V against a parameter"
-    offered = lambda state: {s.name: s.label for s in slider_parameters(state.design)} or {"": ""}
-    read = lambda state: one.name if (one := swept_parameter(state)) is not None else ""
-    swept = Attribute(read, lambda state, name: state.showing(sweep=True, swept=name))
-    panel.dropdown("parameter", offered, swept, about)
+def section(panel: Fields) -> None:
+    """A check box in the tab, and the section in a window beside the scene."""
+    panel.checkbox("section", attribute("appearance.section"), _ABOUT_SECTION)
     window = panel.gui.add_panel(visible=False)
 
     def place(state: StudioState, _: Found) -> None:
-        shown = state.appearance.section or state.appearance.sweep
+        shown = state.appearance.section
         if shown and not window.visible:
             window.visible = True
             window.dock_left()  # a page forgets where a hidden window was
@@ -175,25 +158,19 @@ def plots(panel: Fields) -> None:
         window.visible = shown
 
     panel.follow("appearance", show=place)
-    with window.add_tab("Figures"):
-        for name in _PLOTS:
-            _figure(panel, name)
-
-
-def _figure(panel: Fields, name: str) -> None:
-    known: Callable[[Found], Picture | None] = attrgetter(name)
-
-    def draw(_: StudioState, found: Found) -> None:
-        if (picture := known(found)) is not None:
-            image.image, image.visible = picture.image, True
-
-    def text(state: StudioState, found: Found) -> tuple[str, ...]:
-        if (picture := known(found)) is None:
-            return ("computing ...",)
-        before = " · of the design before, computing ..."
-        return (picture.text, before * (picture.arm != state.design))
-
-    with panel.folder(_PLOTS[name][0], f"appearance.{name}"):
+    with window.add_tab("Figures"), panel.folder("section", "appearance.section"):
         image = panel.gui.add_image(_NOTHING, format="png", visible=False)
-        panel.follow(f"found.{name}", show=draw)
-        panel.text("design", f"found.{name}", content=text)
+
+        def draw(_: StudioState, found: Found) -> None:
+            if (picture := found.section) is not None:
+                image.image, image.visible = picture.image, True
+
+        panel.follow("found.section", show=draw)
+        panel.text("design", "found.section", content=_section_text)
+
+
+def _section_text(state: StudioState, found: Found) -> tuple[str, ...]:
+    if (picture := found.section) is None:
+        return ("computing ...",)
+    before = " · of the design before, computing ..."
+    return (picture.text, before * (picture.arm != state.design))
