@@ -49,7 +49,7 @@ class TriangleTree(NamedTuple):
 
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
         face, table = np.empty(len(points), np.int64), (*self,)
-        points = np.ascontiguousarray(points)
+        points = np.require(points, requirements="CW")  # types that are compiled already
 
         def fill(b: slice) -> None:
             room = np.empty(STACK, np.int64)
