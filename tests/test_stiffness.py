@@ -337,7 +337,7 @@ def by_six_neighbors(arm: Manipulator, name: str, cube: Array, tol: float, step:
     return np.tensordot(shifts.weights, tips, 1)
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(arms())
 def test_two_neighbors_in_equal_steps_tell_what_six_of_finer_steps_tell(arm):
     free = arm.bounds[:, 1] > arm.bounds[:, 0]

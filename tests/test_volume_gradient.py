@@ -140,21 +140,6 @@ def test_the_signed_volume_grows_at_a_bound_by_what_the_face_sweeps():
     assert signed_volume(rod).value * swept > 0
 
 
-@pytest.mark.parametrize("name", ["lower", *large("revolution")])
-def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
-    arm = designs.minimal_trunk(np.radians(75), np.radians(3))
-    found = volume_gradient(arm, name)
-    assert found.route == "raster"
-
-    def raster(arm):
-        return rasterized_set(as_tip_map(arm), 60, 0.01, 1e-2).volume
-
-    h = 2e-2 * find_parameter(arm, name).value(arm)
-    expected = difference(arm, {name: h}, raster) / h
-    assert abs(found.volume[0] - expected) < 2.0 * found.volume_error[0]
-    assert found.volume_error[0] < 0.02 * abs(found.volume[0])
-
-
 def test_at_the_end_of_a_range_the_derivative_is_that_of_the_side_that_exists():
     straight = designs.minimal_trunk(np.radians(108), 0.0).with_bounds((-0.9, -0.3))
     found = volume_gradient(straight, "taper")

@@ -203,14 +203,6 @@ def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
     assert redundant.multiplicity == {}
 
 
-def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
-    fine = solid(redundant.arm, accuracy=1e-2, cell=redundant.grid.attrs["cell"] / 2)
-    assert abs(fine.volume - redundant.volume) < redundant.volume_error
-    assert abs(fine.convex_volume - redundant.convex_volume) < redundant.convex_volume_error
-    assert "count" not in fine.grid
-    assert np.isnan([fine.fold_volume, fine.fold_volume_error, fine.multiplicity_error]).all()
-
-
 def test_two_free_bundles_sweep_an_area(trunk):
     arm = trunk.with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
     sheet = reachable_set(arm)

@@ -64,11 +64,13 @@ def random_fold(rng: np.random.Generator, kappa: float = 0.7) -> Fold:
 def mesh_of(f: Quadratic, cells: int) -> ActivationMesh:
     """The mesh of a map of the box [-1, 1]³."""
     axis = np.linspace(-1.0, 1.0, cells + 1)
-    gamma = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    gamma = (
+        np.stack(np.meshgrid(axis, axis, axis, indexing="ij")).reshape(3, -1).T
+    )  # as the library
     least = np.stack(np.meshgrid(*[np.arange(cells)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
     corner = (least + corner_bits(3)) @ np.array([(cells + 1) ** 2, cells + 1, 1])
-    slope = f.slopes(gamma)
-    tip, error, remainder = f.values(gamma), np.empty(len(corner)), np.empty(len(corner))
+    tip, slope = map(np.ascontiguousarray, (f.values(gamma), f.slopes(gamma)))
+    error, remainder = np.empty((2, len(corner)))
     interpolation_errors(gamma, tip, slope, corner, error, remainder)
     change = np.abs(slope[corner] - slope[corner[:, :1]]).sum(axis=(1, 2, 3))
     error += ROUNDING

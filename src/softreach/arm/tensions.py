@@ -100,7 +100,7 @@ class LengthLaw:
         """
         from softreach.kernels.box.complementarity import complementary  # loads Numba
 
-        tension, taut = np.empty_like(excess), np.empty(excess.shape, np.int8)
+        tension, taut = np.empty(excess.shape), np.empty(excess.shape, np.int8)
         solved = np.empty(len(excess), np.int8)
         matrix, excess = np.ascontiguousarray(matrix), np.ascontiguousarray(excess)
         complementary(matrix, excess, tension, taut, solved)

@@ -288,6 +288,7 @@ def _free() -> Iterator[object]:
     yield _hulls()
     yield ZBuffer(Extent(0, 1, 0, 1), 4).draw_triangles(np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
     yield _calibration()
+    yield _clearance(arm)
     yield sr.tip_jacobian(arm, [[-1.0, 0.0, -0.4]])
     yield sr.tip_jacobian(hanging, [[-1.0, 0.0, -0.4]])
     yield sr.configuration(arm, [-1.0, 0.0, -0.4])
@@ -300,6 +301,8 @@ def _free() -> Iterator[object]:
     yield sr.reachable_set(redundant, accuracy=0.1)
     yield sr.solve_inverse(redundant, [target], near=[-0.5] * 4)
     yield sr.solve_inverse(redundant, [target])
+    yield sr.solve_inverse(redundant, [target], direction=(0.0, 0.0, 1.0))
+    yield sr.reached_cells(arm, 100, cell=0.1)
     yield sr.track_path(redundant, path)
 
 
@@ -315,6 +318,14 @@ def _calibration() -> None:
     places = np.array([[0.0, 0.0, 0.2], [0.01, 0.0, 0.2], [0.0, 0.01, 0.2]])
     data |= {f"{axis}_m": values for axis, values in zip("xyz", places.T, strict=True)}
     sr.calibrate(arm, data, free=["pose.x"], rivals=False)
+
+
+def _clearance(arm: sr.Manipulator) -> None:
+    corners = [[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.0], [2.0, 0.0, 1.0]]
+    stone = sr.requirements.Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    floor = sr.requirements.HalfSpace((0, 0, -0.1), (0, 0, 1))
+    around = tuple(sr.arm.Obstacle(region=each) for each in (stone, floor))
+    sr.rod.compute_clearance(arm.replace(surroundings=around), [[-1.0, 0.0, -0.4]])
 
 
 def _hulls() -> None:

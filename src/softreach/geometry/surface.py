@@ -64,7 +64,8 @@ class TriangleTree(NamedTuple):
         from softreach.kernels.room.triangles import nearest_triangles
 
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        face, points = np.empty(len(points), np.int64), np.ascontiguousarray(points)
+        face = np.empty(len(points), np.int64)
+        points = np.require(points, requirements="CW")  # types that are compiled already
 
         def fill(b: slice) -> None:
             room = np.empty((STACK, 2))
