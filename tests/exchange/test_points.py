@@ -114,7 +114,6 @@ def test_points_are_drawn(tmp_path):
         ("a.csv", "", "a table in CSV"),
         ("a.csv", "1,2,3\n1,2,a\n", "column z = .*: must be numbers"),
         ("a.npy", "no array", "a table in CSV"),
-        ("a.xyz", "1 2 3\n", "a file name ending in .csv"),
     ],
 )
 def test_what_holds_no_points_is_refused_in_one_line(tmp_path, name, text, message):

@@ -50,6 +50,9 @@ def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
 
 
 Whole = Annotated[int, _read_by(quantity.read_whole_number, "a whole number such as 20000 or 2e4")]
+Angle = Annotated[
+    float, _read_by(partial(quantity.read_quantity, unit="rad"), "an angle such as 5deg or 0.1rad")
+]
 Number = Annotated[float, _read_by(quantity.read_number, "a finite number such as 0.5 or 1e-3")]
 
 

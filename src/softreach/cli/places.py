@@ -1,6 +1,5 @@
 """`softreach solve`, `track`, `plan`, `equilibria`: activations that lead to places, and back."""
 
-import math
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,7 +13,7 @@ from softreach.cli.options import UNCHANGED, Changes, Signed, Whole, design_from
 from softreach.support.errors import InvalidInput, NotPossible, Range
 from softreach.support.files.formats import TABLES
 from softreach.support.files.text import write_text
-from softreach.support.quantity import numbers_in, read_quantity
+from softreach.support.quantity import numbers_in
 from softreach.support.units import TYPED, read_length
 
 
@@ -26,7 +25,7 @@ def solve(
     targets: Path | None = None,
     within: str | None = None,
     direction: Signed = None,
-    cone: str | None = None,
+    cone: options.Angle | None = None,
     markers: Annotated[list[str] | None, Parameter(name="--marker")] = None,
     family: Whole | None = None,
     changes: Changes = UNCHANGED,
@@ -64,17 +63,15 @@ def solve(
     else:
         points = options.points_in("targets", targets, arm)
     distance = partial(read_length, length=arm.length), f"a length in m, or with {TYPED}, L"
-    reach = read_as("within", "0" if within is None else within, *distance, Range(0.0))
+    near = read_as("within", "0" if within is None else within, *distance, Range(0.0))
     count = 1 if family is None else family
     wanted = None if direction is None else numbers_in(direction, 3)
     if direction is not None and wanted is None:
         raise InvalidInput("direction", direction or "''", "three comma-separated numbers x,y,z")
-    turn = partial(read_quantity, unit="rad"), "an angle from 0deg to 180deg, in deg or rad"
-    angle = read_as("cone", "0" if cone is None else cone, *turn, Range(0.0, math.pi))
     pairs = options.pairs_in("marker", markers, "NAME=x,y,z, such as elbow=80mm,0,120mm")
     places = {k: position_in(f"marker {k}", x, arm.length) for k, x in pairs.items()}
-    goals: Any = {"direction": wanted, "cone": angle, "markers": places, "marker_within": reach}
-    solutions = sr.solve_inverse(arm, points, within=reach, family=count, **goals)
+    goals: Any = {"direction": wanted, "markers": places, "marker_within": near, "within": near}
+    solutions = sr.solve_inverse(arm, points, cone=cone or 0.0, family=count, **goals)
     if json:
         lengths = ("target", "residuals", "nearest", "gap", "gap_bound")
         lengths += ("marker_errors", "marker_gaps")

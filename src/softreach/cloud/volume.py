@@ -183,14 +183,13 @@ def compare(hull: Hull, other: Hull) -> xr.Dataset:
     """
     import xarray as xr
 
-    solids = hull.solid, other.solid
-    low, high = np.stack([solid.bounds for solid in solids], axis=1)
+    low, high = np.stack([each.solid.bounds for each in (hull, other)], axis=1)
     low, widths = low.max(axis=0), (high.min(axis=0) - low.max(axis=0)).clip(0.0)
     places = low + widths * sample_cube("sobol", _PLACES, 3)
     is_shared = hull.contains(places) & other.contains(places)
     box, share = float(widths.prod()), float(is_shared.mean())
-    ways = zip(solids, (other, hull), strict=True)
-    back, out = (float(solid.distance(each.vertices).max().clip(0.0)) for solid, each in ways)
+    ways = (hull, other), (other, hull)
+    back, out = (float(x.solid.distance(y.vertices).max().clip(0.0)) for x, y in ways)
     numbers = {
         "volume_of_other": (other.volume, "m3"),
         "overlap": (box * share, "m3"),

@@ -1,7 +1,6 @@
 """Points of other programs and of measurements: places, without a design."""
 
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from softreach.support.units import as_unit
 __all__ = ["read_points"]
 
 POINT_FILES = (".csv", ".txt", ".parquet", ".pq", ".ply", ".npy")
-"""Suffixes of files that are read."""
+"""Suffixes of files that the command line takes for points."""
 
 
 def read_points(path: str | PathLike[str], *, unit: str | None = None) -> Dataset:
@@ -27,7 +26,7 @@ def read_points(path: str | PathLike[str], *, unit: str | None = None) -> Datase
     (n, 3). With two columns, x and y, the points lie in the plane z = 0.
 
     Args:
-        path: A file .csv, .txt, .parquet, .ply or .npy.
+        path: A file .parquet, .ply or .npy; any other is read as CSV.
         unit: Of the numbers where the columns do not name it: "m" if left out, "cm", "mm" or "in".
 
     Returns:
@@ -40,10 +39,8 @@ def read_points(path: str | PathLike[str], *, unit: str | None = None) -> Datase
     """
     import xarray as xr
 
-    file = Path(as_path("path", path))
-    if file.suffix.lower() not in POINT_FILES:
-        raise InvalidInput("path", str(file), f"a file name ending in {', '.join(POINT_FILES)}")
-    table = read_table(read_bytes("path", file, MOST), str(file))
+    name = as_path("path", path)
+    table = read_table(read_bytes("path", name, MOST), name)
     columns = tip_columns(table.columns, "m", "")
     units = {split_unit(column)[3].lower() for column in columns}
     if len(units) > 1:
@@ -53,9 +50,6 @@ def read_points(path: str | PathLike[str], *, unit: str | None = None) -> Datase
     for axis, column in enumerate(columns):
         places[:, axis] = counted.size * numbers_of(table, column)
     about = {"units": "m", "unit_of_file": counted.name}
-    of_sample, none = ("sample", "bundle"), np.empty((len(places), 0))
-    variables = {
-        "tip": (("sample", "axis"), places, about),
-        "activation": (of_sample, none),
-    }
+    none = ("sample", "bundle"), np.empty((len(places), 0))
+    variables = {"tip": (("sample", "axis"), places, about), "activation": none}
     return xr.Dataset(variables, {"axis": list(AXES), "bundle": np.empty(0, str)})

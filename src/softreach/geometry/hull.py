@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.geometry.surface import (
-    compact_surface,
-    enclosed_volume,
-    parted,
-    surface_area,
-    unit_scale,
-)
+from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area, unit_scale
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 from softreach.support.lazy import lazy
 from softreach.support.quantity import quantity
@@ -24,8 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.geometry.meshes import Mesh
-
-_ROUNDING = 1e-12  # of its size, by which a place may be beyond a surface
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -67,13 +59,13 @@ class Hull:
         Raises:
             NotPossible: There is no volume.
         """
-        size = float(np.ptp(self.vertices, axis=0).max(initial=0.0))
-        return self.solid.distance(places) <= _ROUNDING * size
+        return self.solid.distance(places) <= 1e-12 * np.abs(self.vertices).max()
 
     @lazy
     def solid(self) -> Mesh:
         """The space inside."""
         from softreach.geometry.meshes import Mesh
+        from softreach.geometry.surface import parted
 
         vertices, faces = parted(self.vertices, self.faces)
         return Mesh(vertices, faces.astype(np.int64))

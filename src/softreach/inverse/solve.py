@@ -311,13 +311,11 @@ def _solutions(
 
 def _meeting(prepared: PreparedMap, request: Request, roots: Roots) -> Mask:
     """Mask of the roots that meet the goals beside the position of the tip."""
-    meet = np.ones(len(roots.target), bool)
-    if request.direction is not None:
-        meet = _direction_errors(prepared, request, roots) <= request.direction_tol
+    off = _direction_errors(prepared, request, roots)  # NaN where no direction is wanted
     least = max(request.residual, prepared.whole.tol * prepared.whole.length)
     enough = [max(request.marker_within.get(name, 0.0), least) for name in request.markers]
     errors = marker_errors(prepared.tip_map, request, roots.target, roots.gamma)
-    return meet & (errors <= enough).all(axis=1)
+    return ~(off > request.direction_tol) & (errors <= enough).all(axis=1)
 
 
 def _direction_errors(prepared: PreparedMap, request: Request, roots: Roots) -> Array:

@@ -303,8 +303,8 @@ class _Reader(RegionReader):
         if file is not None:
             try:
                 place = self._beside(as_text("file", file), "places_m")
-                content = read_bytes("file", place, MOST)
-                values["places"] = np.array(positions_in(content, file, self.length))
+                places = positions_in(read_bytes("file", place, MOST), file, self.length)
+                values["places"] = np.array(places)
             except InvalidInput as error:
                 allowed = f"must be {error.allowed} ({error.name} = {error.value})"
                 values["places"] = self._refuse(f"{path}.file", file, allowed)

@@ -298,12 +298,7 @@ def _to_tolerance(tip_map: TipMap, tol: float) -> TipMap:
 
 @lru_cache(maxsize=64)
 def at_marker(tip_map: TipMap, name: str) -> ArmMap:
-    """The same map of another marker in place of the tip.
-
-    Raises:
-        InvalidInput: The arm has no such marker.
-        NotPossible: The map is not that of an arm straight from rest.
-    """
+    """The same map of a marker in place of the tip; that of postures straight from rest alone."""
     known, device = as_tip_map(tip_map), "cpu" if tip_map.device == "cpu" else "cuda"
     rod = _known_rod(known.rod.arm.at_point(name), known.tol, device)
     if type(rod) is not type(known.rod):
