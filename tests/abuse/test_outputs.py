@@ -43,7 +43,7 @@ def things(trunk):
     plt.close(figure)
 
 
-TABLES = ("ply", "csv", "parquet", "npz", "mat", "vtu")
+TABLES = ("ply", "csv", "parquet", "npz", "vtu")
 CLOUD, MESH = (lambda things: (export_cloud, things["cloud"])), lambda _: (export_mesh, TETRAHEDRON)
 WRITERS = {
     "cloud.zarr": lambda things: (sr.save_cloud, things["cloud"]),
