@@ -65,7 +65,7 @@ class TriangleTree(NamedTuple):
 
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
         face = np.empty(len(points), np.int64)
-        points = np.require(points, requirements="CW")  # types that are compiled already
+        points = np.require(points, requirements=["C", "W"])  # types that are compiled already
 
         def fill(b: slice) -> None:
             room = np.empty((STACK, 2))
