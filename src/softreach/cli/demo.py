@@ -321,6 +321,8 @@ def _calibration() -> None:
 
 
 def _clearance(arm: sr.Manipulator) -> None:
+    import numpy as np
+
     corners = np.array([2.0, 0.0, 0.0]) + [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     stone = sr.requirements.Mesh(corners, faces)
