@@ -45,7 +45,7 @@ def left_over(folder, *known):
 
 
 def test_a_cloud_is_a_tidy_table_of_one_row_a_sample(cloud, expected):
-    table = sr.cloud_table(cloud)
+    table = sr.export.cloud_table(cloud)
     assert list(table.columns) == COLUMNS
     for name, values in expected.items():
         np.testing.assert_array_equal(table[name], values)

@@ -52,7 +52,7 @@ def errors_without_a_limit_of_time(arm, path, start):
 def test_a_path_is_followed_within_rates_and_bounds_nearly_as_without_a_limit_of_time(arm):
     gamma = activations_of_path(arm)
     path = PUSHED * sr.tip_positions(arm, gamma)
-    tracker = sr.models.Tracker(arm, rate=RATE, period=PERIOD, start=gamma[0])
+    tracker = sr.Tracker(arm, rate=RATE, period=PERIOD, start=gamma[0])
     steps = [tracker.step(target) for target in path[1:]]
     x = np.array([gamma[0], *(step.activations for step in steps)])
     assert np.abs(np.diff(x, axis=0)).max() <= RATE * PERIOD * (1 + 1e-12)
@@ -69,7 +69,7 @@ def test_a_path_is_followed_within_rates_and_bounds_nearly_as_without_a_limit_of
 @both
 def test_where_the_path_is_in_reach_every_step_ends_on_it(arm):
     gamma = activations_of_path(arm, steps=1000)[:150]
-    tracker = sr.models.Tracker(arm, start=gamma[0])
+    tracker = sr.Tracker(arm, start=gamma[0])
     away = [tracker.step(target).distance for target in sr.tip_positions(arm, gamma)[1:]]
     assert np.quantile(away, 0.95) < 1e-5 * arm.length
     assert max(away) < 1e-3 * arm.length
@@ -77,7 +77,7 @@ def test_where_the_path_is_in_reach_every_step_ends_on_it(arm):
 
 @both
 def test_a_step_says_how_the_tip_moves_and_yields(arm):
-    tracker = sr.models.Tracker(arm, start=np.full(6, 1.0))
+    tracker = sr.Tracker(arm, start=np.full(6, 1.0))
     step = tracker.step(tracker.step([0.0, 0.1, 0.1]).tip + [0.0, 0.0, 0.001])
     at = step.activations[None]
     slopes = as_tip_map(arm).tips_and_slopes(at)[1][0]
@@ -85,13 +85,13 @@ def test_a_step_says_how_the_tip_moves_and_yields(arm):
     tracker.step([0.1, 0.1, 0.1])  # what is read later is of the step
     exact = sr.stiffness.tip_compliance(arm, at)[0]
     np.testing.assert_allclose(step.compliance, exact, atol=1e-6 * np.abs(exact).max())
-    assert sr.models.Tracker(sr.designs.minimal_trunk()).step([0.3, 0.0, 0.5]).compliance is None
+    assert sr.Tracker(sr.designs.minimal_trunk()).step([0.3, 0.0, 0.5]).compliance is None
 
 
 @both
 def test_out_of_reach_the_tip_comes_as_near_as_it_can_and_the_step_says_so(arm):
     target = np.array([0.35, 0.1, 0.2 if arm is FREE else -0.2])
-    tracker = sr.models.Tracker(arm, start=np.full(6, 0.5))
+    tracker = sr.Tracker(arm, start=np.full(6, 0.5))
     steps = [tracker.step(target) for _ in range(60)]
     tips = sr.tip_positions(arm, arm.bounds[:, 1] * np.random.default_rng(0).random((20_000, 6)))
     nearest = np.linalg.norm(tips - target, axis=1).min()
@@ -106,7 +106,7 @@ def test_out_of_reach_the_tip_comes_as_near_as_it_can_and_the_step_says_so(arm):
 def test_a_direction_is_reached_together_with_a_place(arm):
     gamma = np.array([[1.0, 2.0, 0.5, 2.0, 0.5, 1.0]])
     motion = as_tip_map(arm).tip_motions(gamma)
-    tracker = sr.models.Tracker(arm, start=np.full(6, 1.0))
+    tracker = sr.Tracker(arm, start=np.full(6, 1.0))
     for _ in range(40):
         step = tracker.step(motion.tips[0], 3.0 * motion.directions[0])
     assert step.reached
@@ -116,7 +116,7 @@ def test_a_direction_is_reached_together_with_a_place(arm):
 def test_an_arm_under_loads_goes_on_along_its_branch():
     """As the library continues postures in many small steps, where some ways would snap."""
     column = sr.designs.three_tendon_robot().replace(loads=sr.Loads(payload=0.1))
-    tracker, here = sr.models.Tracker(column, start=[1.0, 0.0, 0.0]), as_tip_map(column)
+    tracker, here = sr.Tracker(column, start=[1.0, 0.0, 0.0]), as_tip_map(column)
     snaps, x = 0, tracker.activations[None]
     for angle in np.linspace(0.0, np.pi, 20):
         step = tracker.step([0.05 * np.cos(angle), 0.05 * np.sin(angle), 0.1])
@@ -130,7 +130,7 @@ def test_an_arm_under_loads_goes_on_along_its_branch():
 def test_a_step_takes_as_long_as_a_few_tips_with_their_slopes(arm, most):
     """4.5 and 1.2 times as long, on their own thread, as other programs run beside."""
     gamma, tip_map = activations_of_path(arm, steps=1000)[:150], as_tip_map(arm)
-    path, tracker = sr.tip_positions(arm, gamma), sr.models.Tracker(arm, start=gamma[0])
+    path, tracker = sr.tip_positions(arm, gamma), sr.Tracker(arm, start=gamma[0])
     times = np.empty((2, len(path)))
     for k, target in enumerate(path):
         begin = time.thread_time()
@@ -144,7 +144,7 @@ def test_a_step_takes_as_long_as_a_few_tips_with_their_slopes(arm, most):
 
 def test_narrower_bounds_are_kept_and_a_measured_state_is_gone_on_from():
     bounds = np.array([[0.5, 2.0]] * 6)
-    tracker = sr.models.Tracker(FREE, bounds=bounds)
+    tracker = sr.Tracker(FREE, bounds=bounds)
     np.testing.assert_allclose(tracker.activations, 0.5)
     for _ in range(30):
         x = tracker.step([0.3, 0.0, 0.1]).activations
@@ -160,7 +160,7 @@ def test_tendons_that_are_slack_at_the_start_are_pulled_in():
         for k, angle in enumerate(np.arange(3) * 2.0 * np.pi / 3.0)
     ]
     arm = sr.designs.three_chamber_arm().replace(actuators=tuple(cables))
-    tracker, target = sr.models.Tracker(arm), sr.tip_positions(arm, [[0.008, 0.002, 0.006]])[0]
+    tracker, target = sr.Tracker(arm), sr.tip_positions(arm, [[0.008, 0.002, 0.006]])[0]
     assert any(tracker.step(target).reached for _ in range(40))
 
 
@@ -176,13 +176,13 @@ REFUSED = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_be_is_refused_in_a_line(name):
     with pytest.raises(sr.InvalidInput, match=f"^{name}"):
-        sr.models.Tracker(FREE, **REFUSED[name])
+        sr.Tracker(FREE, **REFUSED[name])
 
 
 def test_a_target_is_a_place_and_dead_zones_are_refused():
-    tracker = sr.models.Tracker(FREE)
+    tracker = sr.Tracker(FREE)
     for wrong in ([1.0, 2.0], [[0.0, 0.0, 0.1]] * 2, [np.nan, 0.0, 0.0]):
         with pytest.raises(sr.InvalidInput, match=r"^target"):
             tracker.step(wrong)
     with pytest.raises(sr.NotPossible, match="dead zones"):
-        sr.models.Tracker(FREE.replace(drives=(DRIVE,)))
+        sr.Tracker(FREE.replace(drives=(DRIVE,)))

@@ -17,9 +17,9 @@ from .cloud import volume as volume
 from .cloud.cells import reached_cells as reached_cells
 from .cloud.redundancy import activation_distance as activation_distance
 from .cloud.volume import concave_hull as concave_hull, convex_hull as convex_hull
-from .export import cloud_table as cloud_table
 from .inverse import path as path, solve_inverse as solve_inverse
 from .inverse.path import track_path as track_path
+from .models import Tracker as Tracker
 from .optimization import search as search
 from .requirements import Requirements as Requirements, check as check
 from .rod import configuration as configuration, describe as describe, equilibria as equilibria
