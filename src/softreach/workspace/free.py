@@ -80,8 +80,9 @@ class FreeMotions:
             raise InvalidInput(name, activations, allowed)
         value, which, _ = self.at(box.clip(gamma))
         if not value[0] > self.error:
-            least = f"its clearance to {self.clearance.names[which[0]]} is {value[0]:.2g} m"
-            raise NotPossible(f"at {name} the arm is not free: {least}, less the margin")
+            least = f"{self.margin + value[0]:.2g} m to {self.clearance.names[which[0]]}"
+            wanted = f" and must exceed {self.margin:.2g} m" if self.margin else ""
+            raise NotPossible(f"at {name} the arm is not free: its clearance is {least}{wanted}")
         return box.clip(gamma)[0]
 
     @lazy
