@@ -5,7 +5,7 @@ import typing
 import pytest
 
 from softreach.cli.app import app
-from softreach.cli.options import Changes, Number, Sampling, Whole
+from softreach.cli.options import Angle, Changes, Number, Sampling, Whole
 from softreach.support.quantity import read_whole_number
 from tests.abuse.refusals import refusal_of
 
@@ -121,8 +121,9 @@ def _readers(hint, meanings=()):
 
 
 def test_every_number_on_the_command_line_has_the_one_reader():
-    readers = {int: typing.get_args(Whole)[1], float: typing.get_args(Number)[1]}
+    readers = {int: {typing.get_args(Whole)[1]}}
+    readers[float] = {typing.get_args(kind)[1] for kind in (Number, Angle)}
     for function in (*_commands(), Changes, Sampling):
         for name, hint in typing.get_type_hints(function, include_extras=True).items():
             for kind, meanings in _readers(hint):
-                assert name == "return" or readers[kind] in meanings, (function, name)
+                assert name == "return" or readers[kind].intersection(meanings), (function, name)

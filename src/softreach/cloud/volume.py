@@ -179,10 +179,14 @@ def compare(hull: Hull, other: Hull) -> xr.Dataset:
         most, `farthest` and `farthest_of_other` [m].
 
     Raises:
+        InvalidInput: One is no hull.
         NotPossible: One has no volume.
     """
     import xarray as xr
 
+    for name, each in (("hull", hull), ("other", other)):
+        if not isinstance(each, Hull):
+            raise InvalidInput(name, type(each).__name__, "a Hull, such as of concave_hull(points)")
     low, high = np.stack([each.solid.bounds for each in (hull, other)], axis=1)
     low, widths = low.max(axis=0), (high.min(axis=0) - low.max(axis=0)).clip(0.0)
     places = low + widths * sample_cube("sobol", _PLACES, 3)

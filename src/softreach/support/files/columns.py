@@ -24,10 +24,7 @@ MOST = 1000 * MEGABYTE  # bytes of a table
 
 _SIZES = {x.lower(): (u, s) for u in ("m", "N", "Pa") for x, s in sizes_in(u).items()}
 _SIZES |= {"gf": ("N", 9.80665e-3), "mbar": ("Pa", 1e2), "psi": ("Pa", 6894.757293168361)}
-_SIZES |= {
-    "percent": ("1", 1e-2),
-    "over_length": ("L", 1.0),
-}  # suffixes in small letters: SI unit, size
+_SIZES |= {"percent": ("1", 1e-2), "over_length": ("L", 1.0)}  # in small letters: SI unit, size
 _UNIT = re.compile(r"(.*?)\s*[\[(](.*)[\])]|(.+?)_(over_length|[^_]*)")
 _PLACE = re.compile(r"(?P<head>.*?)_?(?P<axis>[xyz])(?P<number>\d*)", re.IGNORECASE)
 _TIPS = ("", "tip", "position", "point")  # starts of the columns of a tip
@@ -88,7 +85,8 @@ def _vertices(stream: io.BytesIO) -> Array:
 
 def _lines(text: str) -> list[str]:
     """Lines of CSV without comments, from a header on; spaces may stand for commas."""
-    plain = (line if '"' in line else line.partition("#")[0] for line in text.splitlines())
+    rows = (line for line in text.splitlines() if not line.lstrip().startswith("#"))
+    plain = (row if '"' in row else row.partition("#")[0] for row in rows)
     lines = [line for line in plain if line.strip()]
     if lines and "," not in lines[0]:
         lines = [",".join(line.split()) for line in lines]
@@ -106,9 +104,8 @@ def _refuse_ragged(lines: list[str], name: str) -> None:
     for k, row in enumerate(rows):
         if not count <= len(row) <= len(head):
             given = counted(len(row), "cell")
-            raise InvalidInput(
-                f"row {k} of {Path(name).name}", given, f"{count}, as in its first row"
-            )
+            place = f"row {k} of {Path(name).name}"
+            raise InvalidInput(place, given, f"{count}, as in its first row")
 
 
 def place_columns(columns: Iterable[str], *units: str) -> dict[str, dict[str, str]]:
