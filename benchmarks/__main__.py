@@ -26,6 +26,7 @@ PARTS = (
     "loads",
     "search",
     "inverse",
+    "clearance",
     "atlas",
     "studio",
 )
