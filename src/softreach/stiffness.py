@@ -22,14 +22,6 @@ from softreach.support.errors import InvalidDesign, InvalidInput
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "PrincipalCompliances",
-    "cloud_compliance",
-    "principal_compliances",
-    "stiffness_along",
-    "tip_compliance",
-]
-
 
 def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
     """∂r/∂F: how a tip yields to a small force on it that keeps its direction.

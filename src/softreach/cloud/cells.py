@@ -28,8 +28,6 @@ from softreach.support.progress import Progress, bar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["reached_cells"]
-
 _PILOT = 1 << 16  # samples by which the grid is laid
 _MARGIN = 0.02  # of L, of the grid around them
 _ON_CPU, _ON_GPU = 1 << 18, 1 << 30  # samples at a time; their numbers within are of 32 bits

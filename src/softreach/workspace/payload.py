@@ -21,8 +21,6 @@ from softreach.workspace.reach import ACCURACIES, reachable_set
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["LargestPayload", "PayloadCurve", "payload_curve"]
-
 _USUAL = (0.0, 0.5, 1.0, 2.0, 4.0)  # payloads over the one that bends the arm by about a third
 _DOUBLINGS = 6  # of the largest payload, in search of one that is too heavy
 
