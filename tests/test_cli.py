@@ -94,7 +94,7 @@ class TestDesign:
         assert facts["bundle_names"] == list(arm.bundle_names)
         np.testing.assert_allclose(facts["helical_angle_deg"], np.degrees(known.helical_angles))
         np.testing.assert_allclose(facts["revolution_deg"], [-108, 108, 0])
-        assert facts["outer_radius_at_tip_m"] == pytest.approx(known.tip_radius)
+        assert facts["outer_radius_at_tip_m"] == pytest.approx(arm.profile.radius(arm.length))
         assert any("|γ| = 1.67" in warning for warning in facts["warnings"])
 
     def test_stiffness_weight_and_ranges_are_those_of_the_library(self, folder, printed):

@@ -22,7 +22,7 @@ from softreach.rod.kinematics import tip_jacobian, tip_positions
 from softreach.rod.rest import rest
 from softreach.rod.rods import as_tip_map, free_bundles
 from softreach.rod.tip_map import TipStatus
-from softreach.stiffness import principal_compliances, stiffness_along, tip_compliance
+from softreach.stiffness import principal_compliances, tip_compliance
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
 from softreach.workspace import reachable_set
@@ -109,16 +109,6 @@ def test_a_force_along_a_principal_direction_moves_the_tip_along_its_partner():
         expected = axes.values[..., None] * axes.displacements
         np.testing.assert_allclose(moved, expected, atol=1e-12)
         assert (np.diff(axes.values, axis=1) <= 0).all()
-
-
-def test_stiffness_along_a_principal_direction_is_one_over_its_compliance():
-    found = tip_compliance(rubber(TRUNK, LOADS["gravity"]), GAMMA)
-    axes = principal_compliances(found)
-    for k in range(3):
-        along = stiffness_along(found, 7.0 * axes.displacements[:, k])
-        np.testing.assert_allclose(along, 1.0 / axes.values[:, k], rtol=1e-5)
-    with pytest.raises(InvalidInput, match="longer than 0"):
-        stiffness_along(found, (0.0, 0.0, 0.0))
 
 
 def test_a_cloud_has_the_compliance_of_each_sample_and_none_where_nothing_rests():

@@ -105,10 +105,10 @@ def test_out_of_reach_the_tip_comes_as_near_as_it_can_and_the_step_says_so(arm):
 @both
 def test_a_direction_is_reached_together_with_a_place(arm):
     gamma = np.array([[1.0, 2.0, 0.5, 2.0, 0.5, 1.0]])
-    motion = as_tip_map(arm).tip_motions(gamma)
+    (tip,), _, (direction,), _ = as_tip_map(arm).tip_motions(gamma)
     tracker = sr.Tracker(arm, start=np.full(6, 1.0))
     for _ in range(40):
-        step = tracker.step(motion.tips[0], 3.0 * motion.directions[0])
+        step = tracker.step(tip, 3.0 * direction)
     assert step.reached
     assert step.angle < 1e-6
 

@@ -25,8 +25,6 @@ from softreach.support.progress import Progress, as_progress
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Stop", "blocked_force"]
-
 _Best = tuple[Array, Grown, float, bool]  # Start, end, error of the tip, whether it settles
 _MEANINGS = " ".join(f"{stop.value}={stop.name.lower()}" for stop in Stop)
 

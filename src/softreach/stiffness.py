@@ -16,19 +16,11 @@ from softreach.rod.rods import as_tip_map, of_tip
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
-from softreach.support.arrays import Array, as_directions, as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = [
-    "PrincipalCompliances",
-    "cloud_compliance",
-    "principal_compliances",
-    "stiffness_along",
-    "tip_compliance",
-]
 
 
 def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
@@ -93,30 +85,14 @@ def principal_compliances(compliance: ArrayLike) -> PrincipalCompliances:
     Raises:
         InvalidInput: Another shape.
     """
-    matrices = _checked_compliance(compliance)
+    matrices = as_floats("compliance", compliance)
+    if matrices.ndim != 3 or matrices.shape[1:] != (3, 3):
+        raise InvalidInput("compliance.shape", matrices.shape, "of shape (n, 3, 3)")
     known = np.isfinite(matrices).all(axis=(1, 2))
     values = np.full((len(matrices), 3), np.nan)
     left, right = np.full((2, len(matrices), 3, 3), np.nan)
     left[known], values[known], right[known] = np.linalg.svd(matrices[known])
     return PrincipalCompliances(values, np.swapaxes(left, 1, 2), right)
-
-
-def stiffness_along(compliance: ArrayLike, direction: ArrayLike) -> Array:
-    """Force along a direction per displacement along it, 1/(d·Cd) [N/m], shape (n,).
-
-    The tip is free to give way sideways. Infinite where it does not yield at all.
-
-    Args:
-        compliance: As of `tip_compliance` [m/N], shape (n, 3, 3).
-        direction: d, of any length, shape (3,) or (n, 3).
-
-    Raises:
-        InvalidInput: Another shape, or a direction without length.
-    """
-    matrices = _checked_compliance(compliance)
-    d = as_directions("direction", direction, len(matrices))
-    with np.errstate(divide="ignore"):
-        return 1.0 / np.einsum("na,nab,nb->n", d, matrices, d)
 
 
 def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
@@ -159,13 +135,6 @@ def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
         {"axis": list(AXES), "force": list(AXES)},
         cloud.attrs,
     )
-
-
-def _checked_compliance(compliance: ArrayLike) -> Array:
-    matrices = as_floats("compliance", compliance)
-    if matrices.ndim != 3 or matrices.shape[1:] != (3, 3):
-        raise InvalidInput("compliance.shape", matrices.shape, "of shape (n, 3, 3)")
-    return matrices
 
 
 def yielding_rod(rod: TipMap) -> LoadedRod:

@@ -48,11 +48,12 @@ def _results(device):
     for name, arm in _arms().items():
         tip_map = as_tip_map(arm, device=device)
         gamma = tip_map.box.from_cube(np.random.default_rng(5).random((FEW, arm.inputs)))
-        motions, whole = tip_map.tip_motions(gamma), tip_map.box.widths
-        results[f"{name} tips"], results[f"{name} directions"] = motions.tips, motions.directions
+        tips, slopes, directions, rotations = tip_map.tip_motions(gamma)
+        whole = tip_map.box.widths
+        results[f"{name} tips"], results[f"{name} directions"] = tips, directions
         results[f"{name} positions"] = sr.tip_positions(arm, gamma, device=device)
-        results[f"{name} slopes"] = motions.slopes * whole  # over the range of each bundle
-        results[f"{name} rotations"] = motions.rotations * whole
+        results[f"{name} slopes"] = slopes * whole  # over the range of each bundle
+        results[f"{name} rotations"] = rotations * whole
         results[f"{name} slopes alone"] = tip_map.tips_and_slopes(gamma)[1] * whole
         results[f"{name} jacobian"] = sr.tip_jacobian(arm, gamma, device=device) * whole
     cloud = sr.compute_cloud(_arms()["held"], FEW, sampler="counter", device=device)

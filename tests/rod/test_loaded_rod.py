@@ -173,8 +173,8 @@ def test_stiff_arms_approach_the_free_one_as_one_over_their_stiffness():
 @of_kinds
 def test_slopes_and_turns_are_the_differences_of_tips_and_frames(loads):
     found = loaded(loads, 1e-10)
-    motions = found.tip_motions(GAMMA)
-    np.testing.assert_allclose(motions.tips, found.tips(GAMMA), atol=1e-11)
+    tips, slopes, tangents, rotations = found.tip_motions(GAMMA)
+    np.testing.assert_allclose(tips, found.tips(GAMMA), atol=1e-11)
 
     def pose(gamma):
         """Directors of the tip, and its place."""
@@ -182,9 +182,9 @@ def test_slopes_and_turns_are_the_differences_of_tips_and_frames(loads):
         return np.concatenate([frames.directors[:, 0], frames.position], axis=1)
 
     directors, changes = pose(GAMMA)[:, :3], differences(pose, GAMMA)
-    np.testing.assert_allclose(motions.slopes, changes[:, 3], atol=2e-8)
-    np.testing.assert_allclose(motions.directions, directors[:, 2], atol=1e-9)
-    expected = np.cross(motions.rotations[:, None], directors[..., None], axis=2)
+    np.testing.assert_allclose(slopes, changes[:, 3], atol=2e-8)
+    np.testing.assert_allclose(tangents, directors[:, 2], atol=1e-9)
+    expected = np.cross(rotations[:, None], directors[..., None], axis=2)
     np.testing.assert_allclose(changes[:, :3], expected, atol=1e-7)
 
 

@@ -23,8 +23,6 @@ from softreach.support.arguments import as_instance, as_text, plain
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, did_you_mean
 from softreach.support.quantity import read_quantity, unit_names
 
-__all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "parameters"]
-
 PartKey = tuple[str | int, ...]
 """("profile",), ("rings", 0, "material"), ("core",), ("actuators", "left"), ("loads",), ..."""
 

@@ -19,7 +19,7 @@ from softreach.atlas.reading import a_store, contents, open_atlas, over_length
 from softreach.atlas.space import Command, DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
 from softreach.rod.rods import check_device
-from softreach.rod.tip_map import Device, check_tol, no_equilibrium_message
+from softreach.rod.tip_map import Device, check_tol, no_equilibrium
 from softreach.sampling import check_sampler
 from softreach.support import errors, parallel
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_instance, as_number, plain
@@ -165,7 +165,7 @@ def _finish(store: AtlasStore, index: int, needed: Intermediates, values: Values
         return _fail(store, index, error)
     stable, why = needed.stable, ""
     if not stable.any():
-        why = no_equilibrium_message(len(stable))
+        why = str(no_equilibrium(len(stable)).value)
     store.write(index, values, tips, UNSTABLE if why else DONE, why)
     return index, ""
 

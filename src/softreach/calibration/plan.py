@@ -52,12 +52,6 @@ class PosePlan:
         """Names of the free numbers."""
         return self.free.names
 
-    @property
-    def log_determinant(self) -> float:
-        """ln det JᵀJ in the scales of the numbers, which the plan makes large [-]."""
-        scale = self.free.scale
-        return float(np.linalg.slogdet(self.information * np.outer(scale, scale))[1])
-
     def sigma(self, noise: float) -> dict[str, float]:
         """Standard deviations to expect of the numbers, in their units.
 

@@ -28,8 +28,6 @@ from softreach.support.progress import Progress, bar
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["reached_cells"]
-
 _PILOT = 1 << 16  # samples by which the grid is laid
 _MARGIN = 0.02  # of L, of the grid around them
 _ON_CPU, _ON_GPU = 1 << 18, 1 << 30  # samples at a time; their numbers within are of 32 bits
@@ -180,7 +178,8 @@ def _on_gpu(t: _Tallies, n: int, seed: int, progress: Progress) -> None:
     check_device_memory(t.counts.nbytes + t.sums.nbytes)
     rod = t.tip_map.rod
     assert isinstance(rod, CudaRod)
-    given = (_table_of_cube(t.tip_map, rod.packed), rod.offset, _rows_of_pose(t.tip_map))
+    pose = np.concatenate([t.tip_map.pose.rotation.T, [t.tip_map.pose.position]])
+    given = (_table_of_cube(t.tip_map, rod.packed), rod.offset, pose)
     table, start, pose = map(cuda.to_device, given)
     about = [cuda.to_device(values) for values in (t.weights, t.place, t.shape)]
     counts, sums = cuda.to_device(t.counts), cuda.to_device(t.sums)
@@ -211,8 +210,3 @@ def _table_of_cube(tip_map: ArmMap, packed: Array) -> Array:
     gamma = tip_map.inputs.activations(ends)
     columns, rest = packed[..., :-1] @ (gamma[1:] - gamma[0]).T, packed[..., :-1] @ gamma[0]
     return np.concatenate([columns, (packed[..., -1] + rest)[..., None]], axis=-1)
-
-
-def _rows_of_pose(tip_map: ArmMap) -> Array:
-    """The axes of the base and its place [m], shape (4, 3)."""
-    return np.concatenate([tip_map.pose.rotation.T, [tip_map.pose.position]])

@@ -28,15 +28,6 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "QUANTILES",
-    "QUANTITIES",
-    "curvature_statistics",
-    "distal_stations",
-    "stream_statistics",
-]
-
-
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Minimum, quartiles, maximum and the middle nine tenths."""
 

@@ -20,8 +20,6 @@ from softreach.support.errors import InvalidInput, Range
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["capability_map", "dexterity", "sight", "solution_measure"]
-
 Signs = NDArray[np.int8]
 
 _EVEN = ("uniform", "sobol")  # a grid has too many points on its faces

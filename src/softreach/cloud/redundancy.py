@@ -20,13 +20,6 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "RedundancySummary",
-    "activation_distance",
-    "redundancy_summary",
-    "tip_density",
-]
-
 _SHARES = (0.05, 0.25, 0.75, 0.95)
 THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
 _VOLUMES = ("measured_volume", "occupied_volume")

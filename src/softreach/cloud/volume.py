@@ -22,8 +22,6 @@ from softreach.support.errors import InvalidInput, warn
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Hull", "compare", "concave_hull", "convex_hull", "unreachability", "volume_curve"]
-
 DEFAULT_RADIUS = 0.05  # of the arm's length
 SPACINGS = 3.0  # a smaller ball falls through between the points
 SPARSE = 0.6  # of the spacing that points would have if they filled their convex hull

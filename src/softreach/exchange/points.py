@@ -12,8 +12,6 @@ from softreach.support.files.text import read_bytes
 from softreach.support.lazy import Dataset
 from softreach.support.units import as_unit
 
-__all__ = ["read_points"]
-
 POINT_FILES = (".csv", ".txt", ".parquet", ".pq", ".ply", ".npy")
 """Suffixes of files that the command line takes for points."""
 

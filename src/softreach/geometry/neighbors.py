@@ -13,9 +13,6 @@ from softreach.support.arrays import Array, Index, as_points, check_finite
 
 BLOCK = 1 << 14  # queries that one thread takes at a time
 _CELLS = 2.0 ** (kernels.PLACE_BITS - 1)  # along an axis; the other half of keys is for windows
-_CUBES = 128  # along an axis, at most, to find what is near a few queries
-_FEW = 1.0 / 500  # queries to a point, below which that pays
-_MANY = 100_000  # points, from which on it does
 _SLACK = 2.0**-20  # of a cell or a radius, far above the rounding of a key
 _SMALLEST = 1e-290  # width of a cell
 
@@ -32,10 +29,8 @@ def mean_value_distance(
     points, values = as_points("points", points, any_scale=True), check_finite("values", values)
     if len(points) == 0:
         return np.empty(0), np.empty(0, np.intp)
-    columns, near = _Columns(points, float(radius)), slice(None)
-    if queries is not None and len(points) >= _MANY and len(queries) < _FEW * len(points):
-        near = columns.near(points, points[queries])
-    order, cloud = columns.sorted_sample(points[near], values[near])
+    columns = _Columns(points, float(radius))
+    order, cloud = columns.sorted_sample(points, values)
     if queries is None:
         return _means(cloud, columns, cloud, order)
     order, chosen = columns.sorted_sample(points[queries], values[queries])
@@ -75,21 +70,6 @@ class _Columns:
         order = np.empty(len(keys), np.int64)
         kernels.stable_order(keys, order)
         return order, _Sample(keys[order], _taken(points, order), _taken(values.T, order))
-
-    def near(self, points: Array, queries: Array) -> Index:
-        """Points that lie in the cubes around those of queries; all others are too far away."""
-        corner, extent = self.low, points.max(axis=0)[self.axes] - self.low
-        width = np.maximum(extent / _CUBES, max(self.margin, _SMALLEST))
-        shape = tuple((extent / width).astype(np.int64) + 3)
-        mask = np.zeros(shape, bool)
-        x, y, z = ((queries[:, self.axes] - corner) / width + 1.0).astype(np.int64).T
-        for i, j, k in np.ndindex(3, 3, 3):
-            mask[x + i - 1, y + j - 1, z + k - 1] = True
-        cubes = np.zeros(len(points), np.int64)
-        for axis, size, low, edge in zip(self.axes, shape, corner, width, strict=True):
-            cubes *= size
-            cubes += ((points[:, axis] - low) / edge + 1.0).astype(np.int64)
-        return np.flatnonzero(mask.ravel()[cubes])
 
 
 def _means(

@@ -57,7 +57,8 @@ class Region(ABC):
         from softreach.kernels.room.shapes import signed_distances  # designs are read without Numba
 
         distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        signed_distances(self.kind, _padded(self.numbers), points, distance, gradient)
+        numbers = np.pad(self.numbers, (0, room.NUMBERS - len(self.numbers)))
+        signed_distances(self.kind, numbers, points, distance, gradient)
         return distance, gradient
 
     @abstractmethod
@@ -343,10 +344,6 @@ def _across(axis: Array) -> Array:
     first /= np.linalg.norm(first)
     across: Any = np.stack([first, np.cross(axis, first)])
     return across
-
-
-def _padded(numbers: Array) -> Array:
-    return np.pad(numbers, (0, room.NUMBERS - len(numbers)))
 
 
 def as_triple(name: str, value: object) -> Triple:

@@ -148,15 +148,20 @@ def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
     return points[used], number[faces]
 
 
-def without_flakes(surface: Surface, error: float) -> Surface:
-    """A closed surface without the smallest parts that add up to less than an error [m³]."""
+def components(pairs: Faces | Index, size: int) -> Index:
+    """Number of the connected component of each of so many nodes, of pairs that are linked."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
+    graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
+    return connected_components(graph, directed=False)[1]
+
+
+def without_flakes(surface: Surface, error: float) -> Surface:
+    """A closed surface without the smallest parts that add up to less than an error [m³]."""
     vertices, faces = surface.vertices, surface.faces
-    n, starts, ends = len(vertices), faces[:, :2].ravel(), faces[:, 1:].ravel()
-    near = coo_array((np.ones(len(starts), bool), (starts, ends)), shape=(n, n))
-    count, part = connected_components(near, directed=False)
+    part = components(faces[:, [0, 1, 1, 2]].reshape(-1, 2), len(vertices))
+    count = part.max(initial=0) + 1
     if count <= 1:
         return surface
     a, b, c = np.moveaxis((vertices - vertices.mean(axis=0))[faces], 1, 0)

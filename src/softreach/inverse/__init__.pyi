@@ -2,7 +2,6 @@ from . import path as path
 from .directions_at import directions_at as directions_at
 from .path import PathStatus as PathStatus
 from .planning import plan as plan
-from .prepared import PreparedMap as PreparedMap
 from .prepared import prepared_map as prepared_map
 from .solutions import Solution as Solution
 from .solutions import Solutions as Solutions

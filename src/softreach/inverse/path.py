@@ -29,8 +29,6 @@ from softreach.workspace.search import CLOSELY, nearest_tips
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["PathStatus", "track_path"]
-
 _LONGEST = 0.1  # predicted change of activation in one substep, in ranges
 _SHORTEST = 1e-10  # substep at which a branch is at its end, in L
 _SHORTEST_TORN = 1e-7  # the same where stability is lost: there the tip moves without limit

@@ -226,16 +226,6 @@ class Solutions(Sequence[Solution]):
         own["statuses"] = np.where(touches, Status.IN_CONTACT, self.statuses).astype(np.int8)
         return replace(self, offsets=np.cumsum([0, *counts]), **own)
 
-    def in_units_of(self, measures: Array) -> Self:
-        """The same solutions, their activations multiplied by these; (bundles,)."""
-        if (measures == 1.0).all():
-            return self
-        return replace(
-            self,
-            activations=self.activations * measures,
-            nearest_activations=self.nearest_activations * measures,
-        )
-
     @property
     def counts(self) -> Index:
         """Number of activations found for each target, shape (t,)."""

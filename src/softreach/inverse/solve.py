@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -165,7 +166,9 @@ def solve_inverse(
         solve, size = _by_branches, _BRANCH_BLOCK if request.is_of_place else _BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
-    solutions = solutions.in_units_of(measures)
+    nearest = solutions.nearest_activations * measures
+    every = solutions.activations * measures
+    solutions = replace(solutions, activations=every, nearest_activations=nearest)
     return _free_of(solutions, prepared, preferred, most) if free else solutions
 
 

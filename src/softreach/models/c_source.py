@@ -139,9 +139,9 @@ def _formulas(rows: int) -> str:
     """Exponent of a step, how it moves points and turns directions, and its derivative."""
     sizes = {"v": rows, "t": rows, "w": 6, "x": 6, "p": 3}
     parts = {  # what they change comes last
-        "exponent": (_exponent, "v", "w"),
+        "exponent": (lambda v: exponent(*_nodes(v)), "v", "w"),
         "move": (act, "wp", "p"),
-        "turn": (_turn, "wp", "p"),
+        "turn": (lambda w, d: act((*w[:3], 0.0, 0.0, 0.0), d), "wp", "p"),
         "column": (_column, "vtwx", "x"),
     }
     text = ""
@@ -159,14 +159,6 @@ def _nodes(v):
         node_twist(v[4], v[5], v[6], v[7], lengths[1]),
         node_twist(v[8], v[9], v[10], v[11], lengths[2]),
     )
-
-
-def _exponent(v):
-    return exponent(*_nodes(v))
-
-
-def _turn(w, d):
-    return act((w[0], w[1], w[2], 0.0, 0.0, 0.0), d)
 
 
 def _column(v, t, w, x):

@@ -1,27 +1,18 @@
 """Requirements of an arm: places, regions, bounds; met or missed, and by how much."""
 
-from softreach.geometry.meshes import Mesh
-from softreach.geometry.regions import Box, Cylinder, HalfSpace, Region, Sphere, Tube
-from softreach.requirements.checks import Check, Coverage, check
-from softreach.requirements.findings import Finding, quick_excess
-from softreach.requirements.parts import Keep, Limits, Target
-from softreach.requirements.requirements import Requirements
-
-__all__ = [
-    "Box",
-    "Check",
-    "Coverage",
-    "Cylinder",
-    "Finding",
-    "HalfSpace",
-    "Keep",
-    "Limits",
-    "Mesh",
-    "Region",
-    "Requirements",
-    "Sphere",
-    "Target",
-    "Tube",
-    "check",
-    "quick_excess",
-]
+from softreach.geometry.meshes import Mesh as Mesh
+from softreach.geometry.regions import Box as Box
+from softreach.geometry.regions import Cylinder as Cylinder
+from softreach.geometry.regions import HalfSpace as HalfSpace
+from softreach.geometry.regions import Region as Region
+from softreach.geometry.regions import Sphere as Sphere
+from softreach.geometry.regions import Tube as Tube
+from softreach.requirements.checks import Check as Check
+from softreach.requirements.checks import Coverage as Coverage
+from softreach.requirements.checks import check as check
+from softreach.requirements.findings import Finding as Finding
+from softreach.requirements.findings import quick_excess as quick_excess
+from softreach.requirements.parts import Keep as Keep
+from softreach.requirements.parts import Limits as Limits
+from softreach.requirements.parts import Target as Target
+from softreach.requirements.requirements import Requirements as Requirements

@@ -5,7 +5,6 @@ from .kinematics import configuration as configuration
 from .kinematics import marker_positions as marker_positions
 from .kinematics import tip_jacobian as tip_jacobian
 from .kinematics import tip_positions as tip_positions
-from .loaded.all_equilibria import AllEquilibria as AllEquilibria
 from .loaded.all_equilibria import equilibria as equilibria
 from .loaded.rod import LoadedRod as LoadedRod
 from .loaded.solver import Equilibria as Equilibria
@@ -14,11 +13,5 @@ from .rods import as_tip_map as as_tip_map
 from .rods import free_bundles as free_bundles
 from .summary import DesignSummary as DesignSummary
 from .summary import describe as describe
-from .tip_map import Frames as Frames
-from .tip_map import Held as Held
-from .tip_map import Shapes as Shapes
-from .tip_map import Strains as Strains
 from .tip_map import TipMap as TipMap
-from .tip_map import TipMotions as TipMotions
-from .tip_map import TipOutputs as TipOutputs
 from .tip_map import TipStatus as TipStatus

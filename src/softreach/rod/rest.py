@@ -10,8 +10,6 @@ from softreach.rod.tip_map import TipStatus
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
-__all__ = ["Rest", "rest"]
-
 
 @dataclass(frozen=True)
 class Rest:

@@ -46,12 +46,6 @@ class DesignSummary:
     """α of each architecture where it begins [rad]."""
     revolutions: Array
     """Ω of each architecture [rad]."""
-    base_radius: float
-    """R2(0) [m]."""
-    tip_radius: float
-    """R2(L) [m]."""
-    radius_ratio: float
-    """R1/R2 [-]."""
     taper_ratio: float
     """R2(0)/R2(L) [-]."""
     extension: tuple[float, float]
@@ -75,8 +69,6 @@ class DesignSummary:
     without E or ρ."""
     lacking: tuple[str, ...]
     """Properties to give so that the numbers above are known."""
-    breakpoints: tuple[float, ...]
-    """Z inside (0, L) where profile or actuators are not smooth [m]."""
     validity: tuple[str, ...]
     """Limit of the linear law of each kind of actuator."""
     warnings: tuple[str, ...]
@@ -99,18 +91,18 @@ class DesignSummary:
         arm, measured = self.arm, self.arm.section.measured
         given = () if measured is None else fields_of(Measured).items()
         found = [x.meaning for k, x in given if getattr(measured, k) != default_of(Measured, k)]
-        pieces = enumerate(arm.rigid_pieces)
+        pieces, (base, tip) = enumerate(arm.rigid_pieces), arm.profile.radius([0.0, arm.length])
         rows: Rows = {
             "bundles": (arm.bundles, ""),
             "bundle names": (list(arm.bundle_names), ""),
             "helical angle": (to_degrees(self.helical_angles), "deg"),
             "revolution": (to_degrees(self.revolutions), "deg"),
             "length": (arm.length, "m"),
-            "outer radius at base": (self.base_radius, "m"),
-            "outer radius at tip": (self.tip_radius, "m"),
+            "outer radius at base": (float(base), "m"),
+            "outer radius at tip": (float(tip), "m"),
             "base to tip ratio": (self.taper_ratio, ""),
-            "inner to outer radius": (self.radius_ratio, ""),
-            "breakpoints": (list(self.breakpoints), "m"),
+            "inner to outer radius": (arm.section.inner_ratio, ""),
+            "breakpoints": (list(arm.breakpoints), "m"),
             **{f"station {name}": (z, "m") for name, z in arm.stations.items()},
             **{f"rigid piece {k}": (list(each.span(arm.length)), "m") for k, each in pieces},
             "markers": ([marker.name for marker in arm.markers], ""),
@@ -171,7 +163,7 @@ def describe(arm: Manipulator) -> DesignSummary:
         bundles                  ...
     """
     check_extension(a_manipulator("arm", arm))
-    base_radius, tip_radius = (float(arm.profile.radius(z)) for z in (0.0, arm.length))
+    base, tip = arm.profile.radius([0.0, arm.length])
     body, bending, alone = (arm.profile, arm.section), _bending(arm), list(_alone(arm))
     bent = [(each.gentlest, each.sharpest.value) for each in map(bending_over_bounds, alone)]
     limits = (f"{part.default_name}: {part.validity}" for part in arm.actuators if part.validity)
@@ -179,16 +171,12 @@ def describe(arm: Manipulator) -> DesignSummary:
         arm=arm,
         helical_angles=np.array([_angle_at_start(fiber, arm) for fiber in arm.fibers]),
         revolutions=np.array([fiber.revolution_on(*body) for fiber in arm.fibers]),
-        base_radius=base_radius,
-        tip_radius=tip_radius,
-        radius_ratio=arm.section.inner_ratio,
-        taper_ratio=base_radius / tip_radius,
+        taper_ratio=float(base / tip),
         extension=extension_range(arm),
         curvature=(bending.least * arm.length, bending.largest * arm.length),
         bundle_extension=np.array([extension_range(each) for each in alone]).reshape(-1, 2),
         bundle_bending=np.array(bent).reshape(-1, 2),
         bundle_strain=line_strains(arm),
-        breakpoints=arm.breakpoints,
         validity=tuple(dict.fromkeys(limits)),
         warnings=design_warnings(arm),
         **_of_matter(arm),

@@ -290,11 +290,14 @@ class TipMap(ABC):
         """
         return self._filled(activations, "twists")
 
-    def tip_motions(self, activations: ArrayLike) -> TipMotions:
-        """Positions and directions of the tips with their derivatives."""
+    def tip_motions(self, activations: ArrayLike) -> tuple[Array, Array, Array, Array]:
+        """Tips and their derivatives as `tips_and_slopes` has them, tangents and their turn.
+
+        Tangents d3 [-] have shape (n, 3), and the turns ω [rad] of ∂d3/∂γ = ω × d3 shape
+        (n, 3, bundles).
+        """
         filled = self._filled(activations, "slopes", "directions", "twists")
-        tips, slopes, directions, twists = filled
-        return TipMotions(tips, slopes, directions, twists[:, 3:])
+        return *filled[:3], filled[3][:, 3:]
 
     def tip_directions(self, activations: ArrayLike) -> Array:
         """Tangents d3 of the tips [-], shape (n, 3)."""
@@ -415,19 +418,6 @@ class TipOutputs(NamedTuple):
     """Tangents d3 [-], shape (n, 3)."""
 
 
-class TipMotions(NamedTuple):
-    """Positions and directions of tips with their derivatives along each activation."""
-
-    tips: Array
-    """Tips r [m], shape (n, 3)."""
-    slopes: Array
-    """∂r/∂γ [m], shape (n, 3, bundles)."""
-    directions: Array
-    """Tangents d3 [-], shape (n, 3)."""
-    rotations: Array
-    """ω [rad], shape (n, 3, bundles): ∂d3/∂γ = ω × d3."""
-
-
 def drop(lost: NDArray[np.intp], status: Status | None, *values: Array | None) -> None:
     """Make rows NaN, and give them the status `NO_EQUILIBRIUM`."""
     for some in values:
@@ -461,12 +451,7 @@ def check_tol(tol: float) -> float:
     return as_number("tol", tol, Range(SMALLEST_TOL, unit="(in L)"))
 
 
-def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> str:
-    """The sentence "none of 9 activations tried has a stable equilibrium"."""
-    return f"none of {tried} activations tried has {sought}"
-
-
 def no_equilibrium(tried: int, sought: str = "a stable equilibrium") -> InvalidLoads:
     """Error of loads under which none of so many activations has what is sought."""
-    missing = no_equilibrium_message(tried, sought)
+    missing = f"none of {tried} activations tried has {sought}"
     return InvalidLoads("loads", missing, f"light enough for {sought}", "lighten the load")

@@ -9,9 +9,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple, Self
 
-__all__ = ["Fault", "InvalidDesign", "InvalidInput", "MissingExtra", "NotPossible", "NotWritten"]
-__all__ += ["Range", "SoftreachError", "SoftreachWarning"]
-
 _LONGEST = 300  # characters of a value that an error shows
 
 

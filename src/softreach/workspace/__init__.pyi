@@ -2,9 +2,6 @@ from . import payload as payload
 from .free import free_set as free_set
 from .gradient import VolumeGradient as VolumeGradient
 from .gradient import volume_gradient as volume_gradient
-from .image import Image as Image
-from .image import Lattice as Lattice
 from .reach import reachable_set as reachable_set
 from .reachable import ReachableSet as ReachableSet
 from .reachable import Surface as Surface
-from .sheets import Sheets as Sheets

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
+from softreach.geometry.surface import components
 from softreach.kernels.rod.linear_response import WEIGHTS
 from softreach.rod.clearance import ClearanceMap, Clearances
 from softreach.rod.free import FreeRod
@@ -32,7 +33,7 @@ from softreach.support.arrays import Array, Index, Mask, over
 from softreach.support.errors import InvalidInput, NotPossible
 from softreach.support.lazy import lazy
 from softreach.support.memory import check_memory
-from softreach.workspace.grid import LiftedGrid, components
+from softreach.workspace.grid import LiftedGrid
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.measure import covered_volume
 

@@ -13,11 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import binary_dilation
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
+from softreach.geometry.surface import components
 from softreach.kernels.image.activation_mesh import corner_steps
 from softreach.kernels.image.raster import stretches
 from softreach.rod.inputs import ActivationBox
@@ -278,12 +277,6 @@ def _edges(held: Held, states: Index, corners: Index) -> tuple[Index, Array]:
     numbers = np.zeros_like(states)
     numbers[row, corner] = group
     return numbers, np.where(np.isnan(tips), at_others, tips)
-
-
-def components(pairs: Index, size: int) -> Index:
-    """Number of the connected component of each of so many nodes, of pairs that are linked."""
-    graph = coo_array((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(size, size))
-    return connected_components(graph, directed=False)[1]
 
 
 def _means(places: Array, number: Index, size: int) -> Array:

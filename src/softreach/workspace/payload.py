@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.schema import provenance
 from softreach.support.arguments import as_number
-from softreach.support.arrays import Array, as_floats
+from softreach.support.arrays import Array, as_floats, over
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
@@ -20,8 +20,6 @@ from softreach.workspace.reach import ACCURACIES, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["LargestPayload", "PayloadCurve", "payload_curve"]
 
 _USUAL = (0.0, 0.5, 1.0, 2.0, 4.0)  # payloads over the one that bends the arm by about a third
 _DOUBLINGS = 6  # of the largest payload, in search of one that is too heavy
@@ -157,19 +155,11 @@ class PayloadCurve:
         """Volumes and shares with their errors over `payload` [kg]."""
         import xarray as xr
 
-        numbers = {
-            "payload": (self.payloads, "kg", "payload"),
-            "volume": (self.volumes, "m3", "reachable volume"),
-            "volume_error": (self.volume_errors, "m3", "error of the reachable volume"),
-            "share": (self.shares, "1", "share of the volume without payload"),
-            "share_error": (self.share_errors, "1", "error of the share"),
-            "lost_share": (self.lost_shares, "1", "share of the activation box left out"),
-        }
-        variables = {
-            name: ("payload", values, {"units": unit, "long_name": meaning})
-            for name, (values, unit, meaning) in numbers.items()
-        }
-        return xr.Dataset(variables, attrs={**provenance(self.arm), "accuracy": self.accuracy})
+        shares = {"share": self.shares, "share_error": self.share_errors}
+        volumes = {"volume": self.volumes, "volume_error": self.volume_errors}
+        values = over("payload", "kg", payload=self.payloads) | over("payload", "m3", **volumes)
+        values |= over("payload", "1", **shares, lost_share=self.lost_shares)
+        return xr.Dataset(values, attrs={**provenance(self.arm), "accuracy": self.accuracy})
 
     def __repr__(self) -> str:
         first = quantity(self.volumes[0], "m³", self.volume_errors[0])

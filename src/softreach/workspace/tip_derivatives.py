@@ -145,10 +145,8 @@ class Shifts:
 
     def _weights(self, kept: Index | slice) -> Array:
         """Of the derivative at 0 by polynomials through some of the offsets."""
-        powers, weights = (
-            np.vander(self.offsets[kept], increasing=True).T,
-            np.zeros_like(self.offsets),
-        )
+        powers = np.vander(self.offsets[kept], increasing=True).T
+        weights = np.zeros_like(self.offsets)
         weights[kept] = np.linalg.solve(powers, np.eye(len(powers))[1]) / self.step
         return weights
 
