@@ -255,7 +255,7 @@ def _look(given: Given) -> None:
     scene.axes.turn(position, given.camera.focal)
     tip = found.tip if look.mouse == "tip" and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
-    scene.see_through_arm(hides)
+    scene.see_through_arm(found.sample is not None or hides)
 
 
 def _compute_beside(given: Given, name: str) -> Results:
@@ -295,7 +295,7 @@ _OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
 _IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
 _AROUND: Any = {"wanted": "design.surroundings", "draws": "/surroundings"}
 _PLANE = "appearance.slice.axis appearance.slice.center"
-_EYE = "appearance.half appearance.arm appearance.mouse found.tip"
+_EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next

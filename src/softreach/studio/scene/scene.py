@@ -226,9 +226,10 @@ class Scene:
         arm: Manipulator,
         activation: Sequence[float],
         path: str = "/arm",
+        length: float | None = None,
         rod: TipMap | None = None,
     ) -> Array:
-        """The body, its fibers and markers; returns the tip [L], shape (3,).
+        """The body, its fibers and markers, over a length [m]; returns the tip, shape (3,).
 
         Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
@@ -237,7 +238,7 @@ class Scene:
             stations = np.union1d(stations, arm.pointed.station_at("station", arm.length))
         frames = with_unstable(rod or solvable_rod(arm)).frames([activation], stations)
         line = Centerline(z=stations, position=frames.position[0], directors=frames.directors[0])
-        return self._draw_line(arm, line, path)
+        return self._draw_line(arm, line, path, length or arm.length)
 
     def draw_rest(self, state: StudioState) -> None:
         """The straight arm, if it is at rest, and a box around where it may go."""
@@ -245,17 +246,17 @@ class Scene:
         line = Centerline.unactivated(np.linspace(0.0, arm.length, _STATIONS), arm.base)
         bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
         if look.arm and not (bent or arm.drives or arm.markers):
-            self._draw_line(arm, line, "/arm")
+            self._draw_line(arm, line, "/arm", arm.length)
         around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
         self.axes.draw(around, line.position / arm.length, arm=arm)
 
-    def _draw_line(self, arm: Manipulator, line: Centerline, path: str) -> Array:
+    def _draw_line(self, arm: Manipulator, line: Centerline, path: str, length: float) -> Array:
         centers, radii = line.position, arm.profile.radius(line.z)
         if np.isnan(centers).any():
             self.remove(path)
             return np.full(3, np.nan)
-        markers = marker_points(arm.markers, line) / arm.length
-        end, tip = -1, centers[-1] / arm.length
+        markers = marker_points(arm.markers, line) / length
+        end, tip = -1, centers[-1] / length
         if arm.pointed is not None:
             end = int(np.searchsorted(line.z, arm.pointed.station_at("station", arm.length)))
             tip = markers[arm.markers.index(arm.pointed)]
@@ -264,7 +265,7 @@ class Scene:
         skins = [arm_surface(arm, line, _SIDES)]
         if arm.bundles <= MOST_BUNDLES:
             skins += bundle_skins(arm, line, lift=_LIFT, step=_ACROSS)
-        corners = [(skin.vertices / arm.length).astype(np.float32) for skin in skins]
+        corners = [(skin.vertices / length).astype(np.float32) for skin in skins]
         known = self._arms.get(path)
         if known is not None and known.arm is arm:
             handles = known.meshes
@@ -272,7 +273,7 @@ class Scene:
                 handle.vertices = vertices
         else:
             self.remove(path)
-            ghost, faces = path.startswith("/ghosts"), [skin.faces for skin in skins]
+            ghost, faces = path.startswith(("/ghosts", "/sample")), [skin.faces for skin in skins]
             clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
             colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
             add = partial(self.api.add_mesh_simple, side="double", **_SHADOWLESS)
@@ -281,10 +282,10 @@ class Scene:
                 add(f"{path}/{k}", v, f.astype(np.uint32), color=color, opacity=opacity)
                 for k, (v, f, color, opacity) in parts
             ]
-        self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
+        self._arms[path] = _Arm(arm, handles, centers / length, radii / length)
         self.dots(f"{path}/markers", markers, DARK, MARKER)
         if arm.pointed is not None:
-            self.lines(f"{path}/tool", np.array([[centers[end] / arm.length, tip]]), DARK, _TOOL)
+            self.lines(f"{path}/tool", np.array([[centers[end] / length, tip]]), DARK, _TOOL)
         return tip
 
     def see_through_arm(self, clear: bool) -> None:

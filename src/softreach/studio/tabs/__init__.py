@@ -16,7 +16,7 @@ TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
     "Move": (move.drag, move.activation, move.target, move.path),
     "View": (view.view, view.section),
     "Compare": (compare.compare,),
-    "Goals": (goals.needs,),
+    "Goals": (goals.needs, goals.measured),
     "Export": (export.export,),
 }
 JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)  # every kind of work that a tab has done for it

@@ -75,6 +75,7 @@ def drag(panel: Fields) -> None:
     def place(state: StudioState, found: Found) -> None:
         arm, look, lag = state.design, state.appearance, found.lag
         grasped = look.mouse == "tip" and look.arm and rod_of(arm).box.dimension > 0
+        grasped = grasped and found.sample is None  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
         clear = state.path is not None
         ball.move(found.tip if grasped else None, radius, dark=look.dark, clear=clear)
@@ -87,7 +88,7 @@ def drag(panel: Fields) -> None:
             return [f"This branch ends {gap} short of the pointer."] if gap else []
         return [_DRAG_HINT]
 
-    follows = "design", "appearance", "path", "found.tip", "found.lag"
+    follows = "design", "appearance", "path", "found.tip", "found.sample", "found.lag"
     panel.follow(*follows, show=place)
     panel.text("design", "appearance.mouse", "found.lag", content=text)
 
