@@ -38,7 +38,7 @@ def test_nothing_follows_from_no_change(state):
 def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(trunk):
     bare, other = StudioState(design=trunk), changed(trunk, {"taper": 0.01})
     full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk, needs=NEEDS)
-    full = full.showing(section=True)
+    full = full.showing(section=True, sweep="taper")
     shown = {"reach", "slopes", "cloud", "surface", "arm", "axes", "camera", "theme", "drag"}
     aimed = bare.replace(target=(0.1, 0.0, 0.8)).showing(section=True, surface=False)
     changes = [
@@ -55,9 +55,9 @@ def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(t
         (bare, bare.replace(reference=trunk), {"reference"}),
         (bare, bare.replace(design=other), {"reach", "slopes", "arm"}),
         (bare, bare.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))), set()),
-        (full, full.replace(design=other), {"reach", "slopes", "arm", "inverse", "needs"}),
+        (full, full.replace(design=other), {"reach", "slopes", "arm", "inverse", "needs", "sweep"}),
         (full, full.showing(slice=Slice(axis="x")), {"cloud", "reference", "surface", "section"}),
-        (full, full.showing(section=False), {"section"}),
+        (full, full.showing(section=False, sweep=""), {"sweep", "section"}),
         (full, full.replace(target=None), {"inverse"}),
         (full, full.replace(reference=None, needs=""), {"reference", "needs"}),
     ]

@@ -54,6 +54,7 @@ class Found:
     check_refusal: str = ""  # reason why it cannot be judged
     part: int = 0  # number of the part whose numbers are typed, in the list of parts
     section: Picture | None = None  # of the reachable set by the plane of the slice
+    sweep: Picture | None = None  # volumes of designs that differ in one parameter
     track: xr.Dataset | None = None  # result of `track_path` for the path
 
     @property

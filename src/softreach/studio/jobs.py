@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.geometry.rays import is_behind
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.figures import section_picture, volume_slopes
+from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Clearance, Found, Known, in_session, is_alike
 from softreach.studio.reach import (
     Quality,
@@ -196,6 +196,12 @@ def _cut(given: Given) -> Results:
         yield Learned({"section": section_picture(reach, given.state.appearance.slice)})
 
 
+def _sweep(given: Given) -> Results:
+    if (parameter := swept_parameter(given.state)) is not None:
+        for picture in sweep_pictures(given.state.design, parameter, given.quality):
+            yield Learned({"sweep": picture})
+
+
 def _draw_arm(given: Given) -> Mapping[str, Any]:
     state, scene, held = given.state, given.scene, given.found.held
     if not state.appearance.arm:
@@ -306,6 +312,7 @@ SCENE_JOBS = (
     # The exact boundary
     Job("surface", _OF_SURFACE, _color_surface, _draw_surface, **_IF_SHOWN),
     Job("section", f"found.reach {_PLANE}", _cut, wanted="appearance.section"),
+    Job("sweep", f"{DESIGN} appearance.sweep", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
     # The solids around the arm, and how near it is to them
     Job("clearance", "design activation", _compute_clearance, _draw_surroundings, **_AROUND),
