@@ -248,6 +248,9 @@ def _draw_surroundings(given: Given) -> None:
 
 def _wait(given: Given) -> Results:
     time.sleep(_PAUSE)
+    while given.camera.keep_width():
+        given.check()
+        time.sleep(_PAUSE)
     yield Learned()
 
 
