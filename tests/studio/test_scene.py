@@ -118,13 +118,13 @@ def test_a_body_is_clear_only_where_it_hides_a_bundle():
     assert opacity("fiber") == [None] * 4
 
 
-def test_markers_are_dots_in_a_body_that_is_clear_and_lengths_are_over_the_one_that_is_given():
+def test_markers_are_dots_in_a_body_that_is_clear():
     offset = Marker(name="camera", station=0.03, offset=(0.0, 0.01, 0.002))
     arm, meshes = MADE_ARMS["fiber"]().replace(markers=(offset, Marker(name="tip"))), Meshes()
     scene, pulled = Scene(meshes), 0.2 * arm.bounds.sum(axis=1)
     for activation in (np.zeros(arm.bundles), pulled):
-        tip = scene.draw_arm(arm, activation.tolist(), length=0.5)
-        places = marker_positions(arm, activation)[0] / 0.5
+        tip = scene.draw_arm(arm, activation.tolist())
+        places = marker_positions(arm, activation)[0] / arm.length
         np.testing.assert_allclose(meshes.added["/arm/markers"].points, places, atol=1e-4)
         np.testing.assert_allclose(places[1], tip, atol=1e-4)
     assert 0 < meshes.added["/arm/0"].opacity < 1

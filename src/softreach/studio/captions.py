@@ -17,16 +17,8 @@ from softreach.studio.scene.colors import FAINT
 from softreach.studio.state import StudioState
 from softreach.support.units import LengthUnit, as_unit
 
-UNREACHABILITY = (
-    "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
-    "1 − V / V of the hull"
-)
-_SIZES = {
-    "volume": "Volume of all places that the tip reaches, its error beside it",
-    "area": "Area of all places that the tip reaches, its error beside it",
-    "length": "Length of the curve that the tip reaches, its error beside it",
-    "point": "All activations are held: the tip is at one place",
-}
+UNREACHABILITY = "UNR [%]: share of the convex hull of all tips that no activation reaches"
+_ABOUT_SIZE = "Volume, area or length of all places that the tip reaches, its error beside it"
 _FINEST = 1e-6  # [L^power]: the error of a size that is told at least
 _GAP = "\N{EN SPACE} "
 _MARKS = {
@@ -76,7 +68,7 @@ def reach_text(reach: Reach, share: str = "") -> list[Part]:
     """The numbers of a reach in one line; `share` says how its size compares with another."""
     parts: list[Part] = []
     if reach.size is not None:
-        parts += [Term(size_text(reach.size, reach.arm), _SIZES[reach.size.name]), f"{share} · "]
+        parts += [Term(size_text(reach.size, reach.arm), _ABOUT_SIZE), f"{share} · "]
     if not math.isnan(reach.unreachability):
         parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
     if reach.exact is not None and reach.exact.lost_share:

@@ -121,7 +121,7 @@ class NumberedBox:
 
     def __init__(self, api: SceneApi) -> None:
         self._api, self._lock = api, threading.RLock()
-        self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+        self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])  # of most clouds
         self._unit, self._scale = LengthUnit("L", 1.0), 1.0  # of the numbers, and L in it
         self._camera: tuple[Array, float] = np.array([50.0, -80.0, 30.0]), np.inf
         self._drawn: object = None  # what the numbers were drawn for

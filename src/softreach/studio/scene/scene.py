@@ -53,8 +53,6 @@ _TOOL = 0.006  # thickness of the line from a section to the point that counts a
 MARKER = 0.016  # edge of the dot of a marker [L]
 _USUAL, _POINT, _POINTS = 1 << 17, 0.007, (0.003, 0.01)  # points of a cloud, and their edges [L]
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
-_AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
-"""Corners around most clouds, seen from the base [L]."""
 
 
 class _Arm(NamedTuple):
@@ -109,6 +107,13 @@ class Scene:
             self.remove(path)
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
+
+    def _add_mesh(
+        self, path: str, vertices: Array, faces: Any, color: Color, opacity: Any, **look: Any
+    ) -> Any:
+        corners, triangles = vertices.astype(np.float32), faces.astype(np.uint32)
+        look |= {"color": color, "opacity": opacity, "side": "double", **_SHADOWLESS}
+        return self.api.add_mesh_simple(path, corners, triangles, **look)
 
     def look(self, ahead: Array | None, base: Array) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
@@ -198,17 +203,9 @@ class Scene:
         if keys != [key for key, _ in self._solids]:
             self.remove("/surroundings")
             surfaces = [(one.vertices / arm.length, one.faces) for one in solid_surfaces(arm)]
-            add = partial(self.api.add_mesh_simple, side="double", flat_shading=True, **_SHADOWLESS)
-            nodes = (
-                add(
-                    f"/surroundings/{k}",
-                    v.astype(np.float32),
-                    f.astype(np.uint32),
-                    opacity=_SOLID,
-                    color=_AROUND,
-                )
-                for k, (v, f) in enumerate(surfaces)
-            )
+            look: Any = {"color": _AROUND, "opacity": _SOLID, "flat_shading": True}
+            add = partial(self._add_mesh, **look)
+            nodes = [add(f"/surroundings/{k}", *each) for k, each in enumerate(surfaces)]
             self._solids = list(zip(keys, nodes, strict=True))
         for k, (_, node) in enumerate(self._solids):
             color = _TOUCHED if k == touched else _AROUND
@@ -226,10 +223,9 @@ class Scene:
         arm: Manipulator,
         activation: Sequence[float],
         path: str = "/arm",
-        length: float | None = None,
         rod: TipMap | None = None,
     ) -> Array:
-        """The body, its fibers and markers, over a length [m]; returns the tip, shape (3,).
+        """The body, its fibers and markers; returns the tip [L], shape (3,).
 
         Without equilibrium nothing is drawn, and the tip is NaN; `rod` is of another posture.
         """
@@ -238,7 +234,7 @@ class Scene:
             stations = np.union1d(stations, arm.pointed.station_at("station", arm.length))
         frames = with_unstable(rod or solvable_rod(arm)).frames([activation], stations)
         line = Centerline(z=stations, position=frames.position[0], directors=frames.directors[0])
-        return self._draw_line(arm, line, path, length or arm.length)
+        return self._draw_line(arm, line, path)
 
     def draw_rest(self, state: StudioState) -> None:
         """The straight arm, if it is at rest, and a box around where it may go."""
@@ -246,12 +242,12 @@ class Scene:
         line = Centerline.unactivated(np.linspace(0.0, arm.length, _STATIONS), arm.base)
         bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
         if look.arm and not (bent or arm.drives or arm.markers):
-            self._draw_line(arm, line, "/arm", arm.length)
-        around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
+            self._draw_line(arm, line, "/arm")
+        around = arm.base.to_world(arm.length * np.array(self.axes.corners)) / arm.length
         self.axes.draw(around, line.position / arm.length, arm=arm)
 
-    def _draw_line(self, arm: Manipulator, line: Centerline, path: str, length: float) -> Array:
-        centers, radii = line.position, arm.profile.radius(line.z)
+    def _draw_line(self, arm: Manipulator, line: Centerline, path: str) -> Array:
+        length, centers, radii = arm.length, line.position, arm.profile.radius(line.z)
         if np.isnan(centers).any():
             self.remove(path)
             return np.full(3, np.nan)
@@ -276,12 +272,8 @@ class Scene:
             ghost, faces = path.startswith(("/ghosts", "/sample")), [skin.faces for skin in skins]
             clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
             colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
-            add = partial(self.api.add_mesh_simple, side="double", **_SHADOWLESS)
             parts = enumerate(zip(corners, faces, colors, clear, strict=True))
-            handles = [
-                add(f"{path}/{k}", v, f.astype(np.uint32), color=color, opacity=opacity)
-                for k, (v, f, color, opacity) in parts
-            ]
+            handles = [self._add_mesh(f"{path}/{k}", *part) for k, part in parts]
         self._arms[path] = _Arm(arm, handles, centers / length, radii / length)
         self.dots(f"{path}/markers", markers, DARK, MARKER)
         if arm.pointed is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,7 +60,6 @@ def needs(panel: Fields) -> None:
     """Needs of the design, and what it misses of them."""
     session, gui = panel.session, panel.gui
     with panel.folder("requirements"):
-        panel.say("Say what the arm is for: what it misses is shown while you change it.")
         about = "A place for the tip, a box for the arm at these places, or a limit"
         kind = gui.add_dropdown("add", tuple(_EMPTY), hint=about)
         field = gui.add_text("numbers", "", hint="Numbers with commas between them")
@@ -225,13 +223,8 @@ def _unused(kind: str, parts: Sequence[Target | Keep]) -> str:
 
 # Measured poses
 
-_ABOUT_LOAD = (
-    "A table with a column for each input and three for each marker, each with its unit: "
-    "tension1_N, tip_x_mm"
-)
-_ABOUT_SAMPLE = (
-    "Moves the arm to the inputs of a sample. Large dots were measured, small ones are predicted"
-)
+_ABOUT_LOAD = "Columns of inputs and of x, y, z of markers, with units: tension1_N, tip_x_mm"
+_ABOUT_SAMPLE = "Moves the arm to its inputs: large dots were measured, small ones are predicted"
 _ABOUT_FIT = "Finds the numbers with which predicted markers come nearest to measured ones"
 _FREE = {
     "pose": "pose of the base",
@@ -421,21 +414,15 @@ def _draw_sample(given: Given) -> None:
         scene.remove("/sample/arm")
     else:
         same = given.state.replace(design=sample.arm).activation
-        scene.draw_arm(sample.arm, same, "/sample/arm", design.length)
+        scene.draw_arm(sample.arm, same, "/sample/arm")
 
 
 def _fit(given: Given) -> Results:
-    bench, steps = given.found.bench, count(1)
-    if bench is None:
+    if (bench := given.found.bench) is None:
         return
-
-    def progress(_: int) -> None:
-        given.check()
-        given.report(f"calibrating, step {next(steps)}")
-
+    progress = lambda _: given.check()
     with no_warnings():
         result = calibrate(given.state.design, bench.data, free=bench.free, progress=progress)
-    given.check()
     yield Learned({"bench": replace(bench, result=result)})
 
 

@@ -37,10 +37,7 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
 
-_DRAG_HINT = (
-    "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
-    "solutions."
-)
+_DRAG_HINT = "Drag the ball on the tip, or an arrow: the arm follows on its branch of solutions."
 _KINDS = {"N": "tension", "Pa": "pressure"}  # kinds of inputs by their units
 _MOST = 40  # sliders: a page with hundreds takes minutes to build
 _HERE = "\N{CHECK MARK} "
@@ -82,15 +79,10 @@ def drag(panel: Fields) -> None:
         ends = None if lag is None else (lag.wanted, lag.dragged.tip / arm.length)
         ball.show_lag(ends, _gap(state, found))
 
-    def text(state: StudioState, found: Found) -> list[str]:
-        gap = _gap(state, found)
-        if gap or state.appearance.mouse != "tip":
-            return [f"This branch ends {gap} short of the pointer."] if gap else []
-        return [_DRAG_HINT]
-
     follows = "design", "appearance", "path", "found.tip", "found.sample", "found.lag"
     panel.follow(*follows, show=place)
-    panel.text("design", "appearance.mouse", "found.lag", content=text)
+    hint = lambda state, _: [_DRAG_HINT] * (state.appearance.mouse == "tip")
+    panel.text("appearance.mouse", content=hint)
 
 
 def _gap(state: StudioState, found: Found) -> str:
@@ -165,7 +157,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
 
 
 def _solutions(panel: Fields, _: object) -> None:
-    """A button for each solution, or for the nearest; the one that the arm is in is green."""
+    """A button for each solution, or for the nearest; a check mark is at the one that the arm is in."""
     answer = panel.session.found.answer
     for row in _shapes(answer) if answer is not None else ():
         text = ", ".join(f"{value:.4g}" for value in row)
@@ -177,7 +169,7 @@ def _solutions(panel: Fields, _: object) -> None:
             is_here = len(scales) == len(row)  # else it is of a design before
             is_here = is_here and bool((np.abs(row - state.activation) <= _NEAR * scales).all())
             label = button.label.removeprefix(_HERE)
-            button.color, button.label = "green" * is_here or None, _HERE * is_here + label
+            button.label = _HERE * is_here + label
 
         panel.follow("design", "activation", show=mark)
 

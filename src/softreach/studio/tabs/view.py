@@ -14,7 +14,7 @@ from softreach.studio.captions import clearance_text, legend_text, loaded_share,
 from softreach.studio.fields import Attribute, Fields, attribute
 from softreach.studio.figures import Picture, swept_parameter
 from softreach.studio.found import Found
-from softreach.studio.markup import Part, Strong
+from softreach.studio.markup import Part, Term
 from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.colors import color_names, key_html, shown_color
 from softreach.studio.session import Session
@@ -24,8 +24,7 @@ from softreach.studio.tabs.goals import verdict_text
 from softreach.support.units import UNITS, LengthUnit
 
 _HISTORY_HINT = (
-    "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
-    "reset to what the studio was opened on. The view stays."
+    "Ctrl+Z, Ctrl+Shift+Z; Reset leads to what the studio was opened on. The view stays."
 )
 _NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
@@ -39,11 +38,9 @@ _TOGGLES = {
     "half": ("half of the cloud", "Cuts away the half in front of the arm"),
     "dark": ("dark page", "Light on dark"),
 }
-_ABOUT_SECTION = (
-    "The reachable set in the plane of the slice, or y = 0: its boundary, and how many activations "
-    "reach each place; in a window beside the scene, on a phone below this sheet"
-)
+_ABOUT_SECTION = "What is reached in the plane of the slice, or y = 0, and by how many activations"
 _ABOUT_SWEEP = "Volume of designs that differ from this one in this parameter alone"
+_ABOUT_OLD = "The numbers of the present design are not known yet"
 _WIDTH = 380  # pixels
 _NOTHING = np.zeros((1, 1, 4), np.uint8)
 
@@ -89,7 +86,7 @@ def _numbers(state: StudioState, found: Found) -> tuple[list[Part], list[str]]:
     words = "; ".join(reach.notes if reach.fine else ())
     notes: list[Part] = [f"{words[:1].upper()}{words[1:]}."] * bool(words)
     below = legend_text(reach, free=found.free is not None), refusal, notes
-    before = [Strong("of the design before: ")] * (reach.arm != state.design)
+    before = [Term("of the design before: ", _ABOUT_OLD)] * (reach.arm != state.design)
     numbers = [*before, *reach_text(reach, loaded_share(found, state.design))]
     return numbers, [*lines, key_html(found.key), *(markup.paragraph(*parts) for parts in below)]
 
