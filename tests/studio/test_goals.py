@@ -174,66 +174,59 @@ NOISE = 2e-4 * np.random.default_rng(4).standard_normal((20, 2, 3))
 PLACES = marker_positions(REAL, INPUTS) + NOISE
 
 
-@pytest.fixture
-def bench(session) -> Session:
-    session.update(lambda state: state.replace(design=MARKED, activation=()))
-    session.end_step()
-    return session
-
-
 def shown(session, number=0, inputs=INPUTS) -> None:
     """Load measured poses, and bring the arm to one of them."""
     columns = table(PLACES, inputs, NAMES, MARKERS).items()
     data = read_measurements(MARKED, {name.removesuffix("_N"): [*row] for name, row in columns})
     bench = Bench(data=data, arm=MARKED, number=number, free=("pose", "taper"))
-    session.update(bench.posed)
+    session.update(lambda state: bench.posed(state.replace(design=MARKED)))
     session.learn({"bench": bench})
     session.settle()
 
 
-def test_dots_stand_where_the_markers_of_a_pose_are_and_were_measured(bench):
+def test_dots_stand_where_the_markers_of_a_pose_are_and_were_measured(session):
     for number in (0, 7):
-        shown(bench, number)
+        shown(session, number)
         predicted = marker_positions(MARKED, INPUTS[number])[0]
         for name, places in (("measured", PLACES[number]), ("predicted", predicted)):
-            dots = drawn(bench, f"/sample/{name}").points
+            dots = drawn(session, f"/sample/{name}").points
             np.testing.assert_allclose(dots, places / MARKED.length, atol=1e-5)
-        lines = drawn(bench, "/sample/residuals").points
+        lines = drawn(session, "/sample/residuals").points
         np.testing.assert_allclose(lines[:, 0], PLACES[number] / MARKED.length, atol=1e-5)
         distances = np.linalg.norm(PLACES[number] - predicted, axis=1)
-        np.testing.assert_allclose(bench.found.sample.distances, distances, atol=1e-9)
-    markers = drawn(bench, "/arm/markers").points
+        np.testing.assert_allclose(session.found.sample.distances, distances, atol=1e-9)
+    markers = drawn(session, "/arm/markers").points
     np.testing.assert_allclose(markers, predicted / MARKED.length, atol=1e-3)
 
 
-def test_a_pose_is_shown_only_while_the_arm_has_its_inputs_and_its_markers(bench):
-    shown(bench)
-    bench.update(lambda state: state.replace(activation=()))
-    bench.settle()
-    assert drawn(bench, "/sample/measured") is None
-    bench.step(back=True)
-    bench.settle()
-    assert drawn(bench, "/sample/measured") is not None
-    bench.update(lambda state: state.replace(design=MARKED.replace(markers=())))
-    bench.settle()
-    assert drawn(bench, "/sample/measured") is None
+def test_a_pose_is_shown_only_while_the_arm_has_its_inputs_and_its_markers(session):
+    shown(session)
+    session.update(lambda state: state.replace(activation=()))
+    session.settle()
+    assert drawn(session, "/sample/measured") is None
+    session.step(back=True)
+    session.settle()
+    assert drawn(session, "/sample/measured") is not None
+    session.update(lambda state: state.replace(design=MARKED.replace(markers=())))
+    session.settle()
+    assert drawn(session, "/sample/measured") is None
 
 
-def test_inputs_beyond_the_bounds_have_their_markers_predicted_as_they_are(bench):
+def test_inputs_beyond_the_bounds_have_their_markers_predicted_as_they_are(session):
     far = INPUTS.copy()
     far[0] = (0.5, 0.0, 0.0)
-    shown(bench, inputs=far)
-    assert bench.state.activation == (0.0, 0.0, 0.0)
+    shown(session, inputs=far)
+    assert session.state.activation == (0.0, 0.0, 0.0)
     straight = marker_positions(MARKED, (0.0, 0.0, 0.0))[0] / MARKED.length
-    assert np.abs(drawn(bench, "/sample/predicted").points - straight).max() > 0.01
+    assert np.abs(drawn(session, "/sample/predicted").points - straight).max() > 0.01
 
 
-def test_a_calibrated_arm_belongs_to_the_design_that_the_fit_began_with(bench):
-    shown(bench)
-    bench.follow("fit")
-    bench.settle()
-    fit = bench.found.bench
+def test_a_calibrated_arm_belongs_to_the_design_that_the_fit_began_with(session):
+    shown(session)
+    session.follow("fit")
+    session.settle()
+    fit = session.found.bench
     assert fit.fitted(MARKED) == fit.result.arm
     assert fit.fitted(changed(MARKED, {"taper": 0.02})) is None
-    assert np.nanmax(bench.found.sample.distances) < 2e-3
-    assert drawn(bench, "/sample/arm/0") is not None
+    assert np.nanmax(session.found.sample.distances) < 2e-3
+    assert drawn(session, "/sample/arm/0") is not None

@@ -4,7 +4,6 @@ import threading
 from itertools import permutations
 
 import numpy as np
-from hypothesis import given
 
 from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
@@ -18,7 +17,6 @@ from softreach.studio.tabs import JOBS
 from softreach.studio.work import Latest
 from softreach.support.errors import InvalidInput
 from tests.studio.sockets import page
-from tests.studio.test_state import states
 
 NEEDS = Requirements(payloads=(0.0,)).to_toml()
 NOTHING = Found()
@@ -28,11 +26,6 @@ def stale(old, new, before=NOTHING, after=NOTHING):
     """Names of the jobs that follow from a change."""
     given = None if old is None else Known(old, before)
     return {job.name for job in what_follows(JOBS, given, Known(new, after))}
-
-
-@given(states())
-def test_nothing_follows_from_no_change(state):
-    assert stale(state, state) == set()
 
 
 def test_each_change_makes_stale_what_depends_on_it_and_is_shown_or_taken_away(trunk):

@@ -33,7 +33,7 @@ def test_every_control_has_a_tooltip_with_its_meaning(tab):
     thumb = tab.slider("extent σ [deg]")
     tab.center(thumb)
     thumb.hover()
-    meaning = tab.page.get_by_text("the angle of the cross-section")
+    meaning = tab.page.get_by_text("angular extent of a bundle")
     meaning.wait_for()
     box, panel = meaning.bounding_box(), tab.page.locator("[data-softreach]").bounding_box()
     assert box["x"] + box["width"] < panel["x"]  # it covers no row
@@ -169,11 +169,8 @@ def test_plots_follow_the_slice_and_the_design(tab):
     cut = Slice(axis="z", center=0.5, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut))
     tab.choose("V against", "taper φ [deg]")
-
-    def sources() -> set[str]:
-        images = tab.page.locator("img[src^=blob]").all()
-        return {image.get_attribute("src") for image in images}
-
+    images = tab.page.locator("img[src^=blob]")
+    sources = lambda: {image.get_attribute("src") for image in images.all()}
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
     tab.page.get_by_text("values make no design").wait_for()
     pictures = sources()

@@ -157,7 +157,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
 
 
 def _solutions(panel: Fields, _: object) -> None:
-    """A button for each solution, or for the nearest; a check mark is at the one that the arm is in."""
+    """A button for each solution, or for the nearest; one with a check mark is the present one."""
     answer = panel.session.found.answer
     for row in _shapes(answer) if answer is not None else ():
         text = ", ".join(f"{value:.4g}" for value in row)
