@@ -166,11 +166,13 @@ def test_plots_follow_the_slice_and_the_design(tab):
     tab.page.get_by_label("section", exact=True).check()
     tab.page.get_by_text("y = 0 m: ").wait_for()
     assert tab.page.locator("img[src^=blob]").first.evaluate("image => image.naturalWidth") > 600
-    cut = Slice(axis="z", center=0.5, thickness=0.1)
-    tab.session.update(lambda s: s.showing(slice=cut))
+    tab.session.update(lambda s: s.showing(slice=Slice(axis="z", center=0.5, thickness=0.1)))
     tab.choose("V against", "taper φ [deg]")
     images = tab.page.locator("img[src^=blob]")
-    sources = lambda: {image.get_attribute("src") for image in images.all()}
+
+    def sources() -> set[str]:
+        return {image.get_attribute("src") for image in images.all()}
+
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
     tab.page.get_by_text("values make no design").wait_for()
     pictures = sources()

@@ -108,11 +108,9 @@ class Scene:
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
 
-    def _add_mesh(
-        self, path: str, vertices: Array, faces: Any, color: Color, opacity: Any, **look: Any
-    ) -> Any:
-        corners, triangles = vertices.astype(np.float32), faces.astype(np.uint32)
-        look |= {"color": color, "opacity": opacity, "side": "double", **_SHADOWLESS}
+    def _add_mesh(self, path: str, vertices: ArrayLike, faces: ArrayLike, **look: Any) -> Any:
+        corners, triangles = np.asarray(vertices, np.float32), np.asarray(faces, np.uint32)
+        look |= {"side": "double", **_SHADOWLESS}
         return self.api.add_mesh_simple(path, corners, triangles, **look)
 
     def look(self, ahead: Array | None, base: Array) -> None:
@@ -273,7 +271,10 @@ class Scene:
             clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
             colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
             parts = enumerate(zip(corners, faces, colors, clear, strict=True))
-            handles = [self._add_mesh(f"{path}/{k}", *part) for k, part in parts]
+            handles = [
+                self._add_mesh(f"{path}/{k}", v, f, color=color, opacity=opacity)
+                for k, (v, f, color, opacity) in parts
+            ]
         self._arms[path] = _Arm(arm, handles, centers / length, radii / length)
         self.dots(f"{path}/markers", markers, DARK, MARKER)
         if arm.pointed is not None:
