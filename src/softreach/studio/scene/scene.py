@@ -201,8 +201,7 @@ class Scene:
         if keys != [key for key, _ in self._solids]:
             self.remove("/surroundings")
             surfaces = [(one.vertices / arm.length, one.faces) for one in solid_surfaces(arm)]
-            look: Any = {"color": _AROUND, "opacity": _SOLID, "flat_shading": True}
-            add = partial(self._add_mesh, **look)
+            add = partial(self._add_mesh, color=_AROUND, opacity=_SOLID, flat_shading=True)
             nodes = [add(f"/surroundings/{k}", *each) for k, each in enumerate(surfaces)]
             self._solids = list(zip(keys, nodes, strict=True))
         for k, (_, node) in enumerate(self._solids):

@@ -77,18 +77,13 @@ def drag(panel: Fields) -> None:
         clear = state.path is not None
         ball.move(found.tip if grasped else None, radius, dark=look.dark, clear=clear)
         ends = None if lag is None else (lag.wanted, lag.dragged.tip / arm.length)
-        ball.show_lag(ends, _gap(state, found))
+        short = lag.dragged.gap if lag is not None else 0.0
+        ball.show_lag(ends, arm.length_unit.rounded(short, digits=".3g") if short else "")
 
     follows = "design", "appearance", "path", "found.tip", "found.sample", "found.lag"
     panel.follow(*follows, show=place)
     hint = lambda state, _: [_DRAG_HINT] * (state.appearance.mouse == "tip")
     panel.text("appearance.mouse", content=hint)
-
-
-def _gap(state: StudioState, found: Found) -> str:
-    """How far the arm lags behind the pointer; "" where it does not."""
-    short = found.lag.dragged.gap if found.lag is not None else 0.0
-    return state.design.length_unit.rounded(short, digits=".3g") if short else ""
 
 
 def activation(panel: Fields) -> None:
