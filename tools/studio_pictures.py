@@ -57,8 +57,6 @@ def studio_section(tab: Tab) -> None:
     tab.session.update(lambda state: state.showing(section=True))
     tab.settle()
     tab.page.get_by_text("one closed curve").wait_for()
-    tab.page.wait_for_timeout(1000)  # until the page has told how narrow the scene is
-    tab.session.look_from("oblique")
 
 
 def studio_compare(tab: Tab) -> None:

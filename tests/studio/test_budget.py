@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from softreach import reachable_set, tip_positions
 from softreach.arm.parameters import changed
 from softreach.geometry.surface import section_area
 from softreach.studio import figures
@@ -18,7 +19,7 @@ from softreach.studio.reach import Quality, Reach, stages
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import MOST_POINTS, Slice, TipPath
 from softreach.studio.work import Budget, Dropped, OverBudget, all_cores
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, SoftreachError
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -161,9 +162,24 @@ def test_a_bar_never_leaves_its_track_and_its_text_is_no_markup():
     assert "<b>" not in html
 
 
-# The section beside the scene and paths of the tip, as values
+# Plots beside the scene and paths of the tip, as values
 
 QUICK = Quality(coarse_level=10, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.02, tol=1e-4)
+
+
+def test_a_sweep_has_the_volumes_of_the_designs_and_none_where_there_is_no_design(trunk):
+    parameter = next(each for each in slider_parameters(trunk) if each.name == "taper")
+    volumes = dict(figures.swept_volumes(trunk, parameter, QUICK))
+    assert next(iter(volumes)) == 2.0  # of the design itself
+    for taper, volume in volumes.items():
+        if volume is None:
+            with pytest.raises(SoftreachError):
+                tip_positions(changed(trunk, {"taper": np.radians(taper)}), [[0, 0, 0]])
+        else:
+            made = changed(trunk, {"taper": np.radians(taper)})
+            exact = reachable_set(made, accuracy=QUICK.coarse_accuracy, tol=QUICK.tol)
+            assert volume == (exact.volume, exact.volume_error)
+    assert None in volumes.values()
 
 
 def test_the_areas_of_sections_sum_up_to_the_volume(trunk):

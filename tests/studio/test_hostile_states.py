@@ -47,6 +47,7 @@ HOSTILE = {
     "50 MB.json": " " * 50_000_000,
     "mouse.json": look_with(mouse=["tip"]),
     "section.json": look_with(section=1),
+    "sweep.json": look_with(sweep=None),
     "huge level.json": look_with(level=10**4000),
     "digits.json": '{"softreach_studio": 2, "activation": ' + "9" * 5000 + "}",
     "infinite activation.json": state_with(activation=[float("inf")] * 3),

@@ -1,4 +1,4 @@
-"""Four journeys through the page: what a person does there, and what is seen of it."""
+"""Five journeys through the page: what a person does there, and what is seen of it."""
 
 import re
 
@@ -7,9 +7,12 @@ import pytest
 
 import softreach as sr
 from softreach.arm import designs
+from softreach.rod.kinematics import marker_positions
 from softreach.studio.captions import size_text
 from softreach.support import palette
+from tests.calibration.arms import table
 from tests.studio.tab import like
+from tests.studio.test_goals import INPUTS, MARKED, MARKERS, NAMES, PLACES
 
 ORANGE = (0.92, 0.35, 0.0)
 """Color of targets and of measured markers."""
@@ -164,3 +167,33 @@ def test_requirements_are_seen_met_and_missed_and_follow_a_slider(tab):
     page.get_by_text("place 2: reached").wait_for()
     tab.press("Undo")
     page.get_by_text("place 2: missed by").wait_for()
+
+
+def test_measured_poses_are_stepped_through_fitted_to_and_the_fit_applied(tab, tmp_path):
+    page = tab.page
+    columns = table(PLACES, INPUTS, NAMES, MARKERS)
+    rows = np.column_stack(list(columns.values()))
+    bench = written(tmp_path / "bench.csv", rows, [key.removesuffix("_N") for key in columns])
+    MARKED.save(tmp_path / "arm.toml")
+
+    tab.show_surface(False)
+    tab.open("Export")
+    tab.upload("Load state or design", tmp_path / "arm.toml")
+    tab.settle()
+    tab.open("Goals")
+    tab.unfold("measured poses")
+    tab.upload("Load measured poses (CSV)", bench)
+    page.get_by_text("bench.csv: 20 samples of half, tool").wait_for()
+    assert like(tab.pixels(), ORANGE) > 20
+    tab.slider("sample").press("ArrowRight")
+    half, tool = 1e3 * np.linalg.norm(PLACES[1] - marker_positions(MARKED, INPUTS[1])[0], axis=1)
+    page.get_by_text(f"half {half:.3g} mm, tool {tool:.3g} mm").wait_for()
+    page.get_by_label("taper φ", exact=True).check()
+    tab.press("Fit")
+    page.get_by_text("20 fitted").first.wait_for()
+    tab.press("Apply")
+    tab.settle()
+    assert tab.session.state.design.profile.taper == pytest.approx(0.012, abs=3e-4)
+    tab.press("Undo")
+    tab.settle()
+    assert tab.session.state.design == MARKED

@@ -185,13 +185,6 @@ def test_only_parameters_that_differ_have_rows_with_their_change_where_both_are_
         assert [row.title for row in rows] == ["volume [m³]", "UNR [%]", "taper φ [deg]"]
 
 
-def test_volumes_are_compared_in_liters_from_one_liter_on():
-    arm = designs.lce_arm().replace(display_unit="mm")
-    for liters, title, now in ((0.5, "volume [mL]", 500), (1.2, "volume [liters]", 1.2)):
-        row, *_ = compared((arm, reach(4e-4)), (arm, reach(1e-3 * liters)))
-        assert (row.title, row.now) == (title, pytest.approx(now))
-
-
 def test_digits_of_volumes_and_of_their_change_follow_the_errors():
     kept, now = reach(0.691648, 2e-5, 0.311592), reach(0.6926257, 3e-4, 1.311592)
     table = comparison_html((TRUNK, kept), (TRUNK, now))

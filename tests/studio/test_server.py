@@ -54,15 +54,6 @@ def socket_of(server, **options):
     return connect(address, subprotocols=[version], max_size=None, **options)
 
 
-def test_a_page_from_elsewhere_gets_no_data(server):
-    from websockets.exceptions import InvalidStatus
-
-    with socket_of(server) as ours:
-        assert ours.recv(timeout=600)
-    with pytest.raises(InvalidStatus, match="403"):
-        socket_of(server, origin="https://elsewhere.example")
-
-
 @pytest.mark.parametrize(
     ("host", "named"),
     [("localhost:80", True), ("[::1]:80", True), ("a b", False), ("x; script-src *", False)],

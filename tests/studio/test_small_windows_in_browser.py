@@ -1,4 +1,4 @@
-"""Everything can be reached and read in the window of a phone."""
+"""Everything can be reached and read in the window of a phone, and beside docked plots."""
 
 import numpy as np
 import pytest
@@ -99,7 +99,7 @@ def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
         tab.open(name)
         tab.wait(lambda: not tab.page.evaluate(LACKING), f"controls of {name} are named")
     inside = sr.tip_positions(tab.session.state.design, [[-0.5, -0.4, -0.3]])[0]
-    tab.session.aim(inside)  # its button has another color
+    tab.session.aim(inside)
     for dark in (False, True):
         tab.session.update(lambda s, dark=dark: s.showing(dark=dark))
         tab.settle()
@@ -109,3 +109,28 @@ def test_controls_of_a_phone_have_names_and_room_and_letters_stand_out(opened):
     tab.session.update(lambda s: s.showing(dark=False).replace(target=None))
     tab.open("Design")
     assert tab.slider("taper φ [deg]").get_attribute("aria-label") == "taper φ [deg]"
+
+
+@pytest.mark.large
+def test_arm_and_numbers_stay_in_sight_where_the_scene_gets_narrow_and_wide_again(opened):
+    tab = opened("laptop")
+    wide = tab.page.locator("canvas").first.bounding_box()["width"]
+    before = tab.session.camera.actual()
+
+    def narrow(on: bool) -> None:
+        tab.open("View")
+        tab.page.get_by_label("section", exact=True).set_checked(on)
+
+    def in_sight() -> bool:
+        canvas = tab.page.locator("canvas").first.bounding_box()
+        points = [(0, 0, 0), (0, 0, 1.0), *(one.position for one in tab.labels())]
+        right = np.array([tab.projected(np.array(point))[0] for point in points]) * canvas["width"]
+        return canvas["width"] < wide and bool(((right > 0) & (right < canvas["width"])).all())
+
+    narrow(True)
+    tab.wait(in_sight, "arm and numbers are in sight")
+    narrow(False)
+    tab.wait(
+        lambda: np.allclose(tab.session.camera.actual().position, before.position, rtol=1e-2),
+        "the eye steps forth again",
+    )

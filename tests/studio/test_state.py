@@ -35,6 +35,7 @@ def states(draw: st.DrawFn) -> StudioState:
         surface=draw(st.booleans()),
         mouse=draw(st.sampled_from([*MOUSE])),
         section=draw(st.booleans()),
+        sweep=draw(st.sampled_from(["", "taper"])),
     )
     return StudioState(
         design=draw(arms() | st.just(LOADED)),

@@ -33,7 +33,7 @@ def test_every_control_has_a_tooltip_with_its_meaning(tab):
     thumb = tab.slider("extent σ [deg]")
     tab.center(thumb)
     thumb.hover()
-    meaning = tab.page.get_by_text("the angle of the cross-section")
+    meaning = tab.page.get_by_text("angular extent of a bundle")
     meaning.wait_for()
     box, panel = meaning.bounding_box(), tab.page.locator("[data-softreach]").bounding_box()
     assert box["x"] + box["width"] < panel["x"]  # it covers no row
@@ -161,21 +161,26 @@ def test_a_browser_without_webgl_says_why_there_is_no_scene(browser, studio):
 
 
 @pytest.mark.large
-def test_the_section_follows_the_slice_and_the_design(tab):
+def test_plots_follow_the_slice_and_the_design(tab):
     tab.open("View")
     tab.page.get_by_label("section", exact=True).check()
     tab.page.get_by_text("y = 0 m: ").wait_for()
-    picture = tab.page.locator("img[src^=blob]").first
-    assert picture.evaluate("image => image.naturalWidth") > 600
-    cut = Slice(axis="z", center=0.5, thickness=0.1)
-    tab.session.update(lambda s: s.showing(slice=cut))
+    assert tab.page.locator("img[src^=blob]").first.evaluate("image => image.naturalWidth") > 600
+    tab.session.update(lambda s: s.showing(slice=Slice(axis="z", center=0.5, thickness=0.1)))
+    tab.choose("V against", "taper φ [deg]")
+    images = tab.page.locator("img[src^=blob]")
+
+    def sources() -> set[str]:
+        return {image.get_attribute("src") for image in images.all()}
+
     tab.page.get_by_text("z = 0.5 m: ").wait_for()
-    before = picture.get_attribute("src")
+    tab.page.get_by_text("values make no design").wait_for()
+    pictures = sources()
     tab.open("Design")
     tab.drag("taper φ [deg]", -20)
     tab.settle()
-    assert tab.session.found.section.arm == tab.session.state.design
-    tab.wait(lambda: picture.get_attribute("src") != before, "the picture follows")
+    assert tab.session.found.sweep.arm == tab.session.found.section.arm == tab.session.state.design
+    tab.wait(lambda: not sources() & pictures, "both pictures follow")
 
 
 def test_a_bar_under_each_slider_says_how_the_volume_changes_and_fades_with_the_design(tab):

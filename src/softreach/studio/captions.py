@@ -15,18 +15,9 @@ from softreach.studio.markup import Bad, Part, Swatch, Term
 from softreach.studio.reach import Reach, Size
 from softreach.studio.scene.colors import FAINT
 from softreach.studio.state import StudioState
-from softreach.support.units import LengthUnit, as_unit
 
-UNREACHABILITY = (
-    "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
-    "1 − V / V of the hull"
-)
-_SIZES = {
-    "volume": "Volume of all places that the tip reaches, its error beside it",
-    "area": "Area of all places that the tip reaches, its error beside it",
-    "length": "Length of the curve that the tip reaches, its error beside it",
-    "point": "All activations are held: the tip is at one place",
-}
+UNREACHABILITY = "UNR [%]: share of the convex hull of all tips that no activation reaches"
+_ABOUT_SIZE = "Volume, area or length of all places that the tip reaches, its error beside it"
 _FINEST = 1e-6  # [L^power]: the error of a size that is told at least
 _GAP = "\N{EN SPACE} "
 _MARKS = {
@@ -48,20 +39,13 @@ def size_text(size: Size, arm: Manipulator) -> str:
     """Size with its error in the unit of the arm, to the first digit of the error."""
     if size.power == 0:
         return size.name
-    unit = size_unit(size, arm)
-    return f"{size.name} {unit.text(size.value, size.power, told_error(size, arm))}"
+    text = arm.length_unit.text(size.value, size.power, told_error(size, arm))
+    return f"{size.name} {text}"
 
 
 def told_error(size: Size, arm: Manipulator) -> float:
     """Error of a size as it is told: no smaller than a millionth of L, L² or L³."""
     return max(size.error, _FINEST * arm.length**size.power)
-
-
-def size_unit(size: Size, arm: Manipulator) -> LengthUnit:
-    """The unit of the arm; for volumes of a liter and more that of liters in place of mL."""
-    unit, liter = arm.length_unit, as_unit("cm")
-    large = size.power == 3 and size.value >= liter.scale(3)
-    return liter if large and unit.name == "mm" else unit
 
 
 def place_text(place: Iterable[float], arm: Manipulator, decimals: int = 4) -> str:
@@ -76,7 +60,7 @@ def reach_text(reach: Reach, share: str = "") -> list[Part]:
     """The numbers of a reach in one line; `share` says how its size compares with another."""
     parts: list[Part] = []
     if reach.size is not None:
-        parts += [Term(size_text(reach.size, reach.arm), _SIZES[reach.size.name]), f"{share} · "]
+        parts += [Term(size_text(reach.size, reach.arm), _ABOUT_SIZE), f"{share} · "]
     if not math.isnan(reach.unreachability):
         parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
     if reach.exact is not None and reach.exact.lost_share:
@@ -109,7 +93,7 @@ def loaded_share(found: Found, design: Manipulator) -> str:
     if reach.size is None or free.size is None or free.size.value <= 0:
         return ""
     share = f"{100 * reach.size.value / free.size.value:.0f} %"
-    whole = size_unit(free.size, design).rounded(free.size.value, free.size.power)
+    whole = design.length_unit.rounded(free.size.value, free.size.power)
     return f" under loads, {share} of {whole} without"
 
 

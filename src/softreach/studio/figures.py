@@ -1,25 +1,27 @@
-"""Figures in panels: a section of the reachable set, and bars of slopes."""
+"""Figures in panels: a section of the reachable set, volumes over a parameter, bars of slopes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import parameters
+from softreach.arm.parameters import changed, parameters
 from softreach.geometry.surface import plane_cut, section_area
 from softreach.picture.projection import View, plane_of
 from softreach.plot.reach import plot_slice
 from softreach.plot.style import inked
 from softreach.studio import markup
-from softreach.studio.reach import Quality, Reach
+from softreach.studio.reach import Quality, Reach, exact_set
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
-from softreach.studio.state import Slice
+from softreach.studio.state import Slice, StudioState
 from softreach.studio.widgets import unit_in
-from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores
+from softreach.studio.work import Budget, OverBudget, StaleCheck, all_cores, check_wanted
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
 from softreach.support.parallel import undivided
@@ -31,9 +33,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
-_LINE = "#2f6db5"
+_LINE, _HERE = "#2f6db5", "#d9731a"
 _INK = "#7d848b"  # legible on white and on black
-_SIZE, _DPI = (4.3, 4.6), 200  # [inch], about as wide as a panel; sharp with two pixels per point
+_WIDTH, _DPI = 4.3, 200  # [inch], about as wide as a panel; sharp with two pixels per point
+_VALUES, _SECONDS = 9, 10.0  # of a parameter beside that of the design, and [s] for each volume
 PART = 0.01  # part of the range of a slider over which the change of the volume is told
 NO_BAR = markup.bar(0.0, "\N{NO-BREAK SPACE}", "not known yet", faded=True)  # room for a bar
 _FINEST = 1e-3  # [%] of V: more digits tell nobody more
@@ -47,10 +50,10 @@ class Picture(NamedTuple):
     text: str  # its content in words
 
 
-def _axes() -> Axes:
+def _axes(height: float) -> Axes:
     from matplotlib.figure import Figure  # away from pyplot, which belongs to one thread
 
-    return Figure(figsize=_SIZE, dpi=_DPI, layout="constrained").subplots()
+    return Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained").subplots()
 
 
 def _pixels(ax: Axes) -> NDArray[np.uint8]:
@@ -87,7 +90,7 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
         curves = section_curves(reach, cut)
         solid = reach.exact if curves else None
         grid = solid.grid if solid is not None and solid.dimension == 3 else None
-    ax = _axes()
+    ax = _axes(4.6)
     if grid is not None:
         plot_slice(grid, ax=ax, view=view, at=at, unit=unit.name)
         (cells,) = ax.images
@@ -124,6 +127,58 @@ def _described(curves: list[Array], plane: Slice, arm: Manipulator) -> str:
     area = section_area(curves, "xyz".index(plane.axis)) * arm.length**2
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     return f"{parts}, {arm.length_unit.rounded(area, 2)}"
+
+
+def swept_parameter(state: StudioState) -> ShownParameter | None:
+    """The parameter that is chosen, the first for an unknown one; None for none."""
+    sliders = {slider.name: slider for slider in slider_parameters(state.design)}
+    name = state.appearance.sweep
+    return (sliders.get(name) or next(iter(sliders.values()), None)) if name else None
+
+
+def sweep_pictures(arm: Manipulator, slider: ShownParameter, quality: Quality) -> Iterator[Picture]:
+    """Volumes over the range of a slider, from the design's own value outwards, ever more."""
+    unit, known, missing = arm.length_unit, dict[float, tuple[float, float]](), 0
+    for value, volume in swept_volumes(arm, slider, quality):
+        if volume is None:
+            missing += 1
+        else:
+            known[value] = volume
+        ax, text = _axes(3.0), ""
+        if known:
+            row = sorted(known)
+            sizes, errors = unit.of(np.array([known[each] for each in row]), 3).T
+            ax.errorbar(row, sizes, errors, fmt=".-", capsize=2.0, color=_LINE)
+        if (here := known.get(slider.shown)) is not None:
+            ax.plot(slider.shown, unit.of(here[0], 3), "o", color=_HERE, zorder=3)
+            text = f"here V = {unit.text(here[0], 3, here[1])} at {slider.shown:g}"
+        ax.set(xlabel=slider.label, ylabel=unit.label("V", 3), xlim=slider.limits)
+        more = f" · {missing} values make no design or take too long" * bool(missing)
+        yield Picture(arm, _pixels(ax), text + more)
+
+
+def swept_volumes(
+    arm: Manipulator, slider: ShownParameter, quality: Quality
+) -> Iterator[tuple[float, tuple[float, float] | None]]:
+    """Values of a slider, nearest to its own first, and volumes with errors [m³], if known."""
+    low, high = slider.limits
+    even = np.linspace(low, high, _VALUES)
+    steps = np.clip(low + np.round((even - low) / slider.step) * slider.step, low, high)
+    values = {round(float(value), 9) for value in steps} | {slider.shown}
+    for value in sorted(values, key=lambda value: abs(value - slider.shown)):
+        check_wanted()
+        volume = None
+        with suppress(SoftreachError, OverBudget, MemoryError):
+            design = changed(arm.replace(surroundings=()), {slider.name: value * slider.scale})
+            volume = _volume(design, quality.coarse_accuracy, quality.tol)
+        yield value, volume
+
+
+@lru_cache(maxsize=512)
+def _volume(design: Manipulator, accuracy: float, tol: float) -> tuple[float, float]:
+    with all_cores:
+        exact = exact_set(design, accuracy, tol, Budget(check_wanted, _SECONDS))
+    return exact.volume, exact.volume_error
 
 
 class Slope(NamedTuple):

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
+from softreach.calibration.calibration import Calibration
+from softreach.calibration.measurements import Measurements
 from softreach.inverse import Solution
 from softreach.inverse.path import Drag, Dragged
 from softreach.plot.coloring import BundleKey, ScalarKey
@@ -46,10 +48,13 @@ class Found:
     drag: Drag | None = None  # what follows a dragged tip of the design
     lag: Lag | None = None  # how far the arm lags behind the pointer; None when nobody drags
     held: tuple[Manipulator, Dragged] | None = None  # an arm, and how the last drag left it
+    bench: Bench | None = None  # measured poses, and what was fitted to them
+    sample: Sample | None = None  # markers of the pose that is shown
     check: Check | None = None  # the design against its needs
     check_refusal: str = ""  # reason why it cannot be judged
     part: int = 0  # number of the part whose numbers are typed, in the list of parts
     section: Picture | None = None  # of the reachable set by the plane of the slice
+    sweep: Picture | None = None  # volumes of designs that differ in one parameter
     track: xr.Dataset | None = None  # result of `track_path` for the path
 
     @property
@@ -106,3 +111,42 @@ class Lag:
 
     wanted: Array
     dragged: Dragged
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """Measured poses, the pose that is shown, and what was fitted to them."""
+
+    data: Measurements
+    arm: Manipulator  # the design that they were read for
+    number: int = 0  # of the pose that is shown
+    free: tuple[str, ...] = ("pose",)  # numbers that a fit may change
+    result: Calibration | None = None
+
+    def fits(self, arm: Manipulator) -> bool:
+        """True of an arm with the inputs and the markers of the one that the data were read for."""
+        columns = lambda arm: (arm.input_names, arm.input_units, [m.name for m in arm.markers])
+        return columns(arm) == columns(self.arm)
+
+    def posed(self, state: StudioState) -> StudioState:
+        """The state with the inputs of the pose, as far as its bounds go."""
+        return state.replace(activation=tuple(self.data.inputs[self.number].tolist()))
+
+    def fitted(self, design: Manipulator) -> Manipulator | None:
+        """The calibrated arm; None without a fit that began with this design."""
+        result = self.result
+        return result.arm if result is not None and result.start == design else None
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Markers of a measured pose."""
+
+    measured: Array  # [m], shape (marker, 3)
+    predicted: Array  # of the calibrated arm, or of the design [m], shape (marker, 3)
+    arm: Manipulator  # the one that predicts
+
+    @property
+    def distances(self) -> Array:
+        """From measured to predicted markers [m], shape (marker,)."""
+        return np.linalg.norm(self.predicted - self.measured, axis=1)

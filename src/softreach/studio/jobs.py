@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.geometry.rays import is_behind
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.figures import section_picture, volume_slopes
+from softreach.studio.figures import section_picture, sweep_pictures, swept_parameter, volume_slopes
 from softreach.studio.found import Clearance, Found, Known, in_session, is_alike
 from softreach.studio.reach import (
     Quality,
@@ -196,6 +196,12 @@ def _cut(given: Given) -> Results:
         yield Learned({"section": section_picture(reach, given.state.appearance.slice)})
 
 
+def _sweep(given: Given) -> Results:
+    if (parameter := swept_parameter(given.state)) is not None:
+        for picture in sweep_pictures(given.state.design, parameter, given.quality):
+            yield Learned({"sweep": picture})
+
+
 def _draw_arm(given: Given) -> Mapping[str, Any]:
     state, scene, held = given.state, given.scene, given.found.held
     if not state.appearance.arm:
@@ -242,6 +248,9 @@ def _draw_surroundings(given: Given) -> None:
 
 def _wait(given: Given) -> Results:
     time.sleep(_PAUSE)
+    while given.camera.keep_width():
+        given.check()
+        time.sleep(_PAUSE)
     yield Learned()
 
 
@@ -255,7 +264,7 @@ def _look(given: Given) -> None:
     scene.axes.turn(position, given.camera.focal)
     tip = found.tip if look.mouse == "tip" and look.arm else None
     hides = tip is not None and is_behind(tip, position, *scene.spine)
-    scene.see_through_arm(hides)
+    scene.see_through_arm(found.sample is not None or hides)
 
 
 def _compute_beside(given: Given, name: str) -> Results:
@@ -295,7 +304,7 @@ _OF_SURFACE = f"found.reach appearance.dark {_LOOKS}"
 _IF_SHOWN: Any = {"wanted": "appearance.surface", "at_once": False}
 _AROUND: Any = {"wanted": "design.surroundings", "draws": "/surroundings"}
 _PLANE = "appearance.slice.axis appearance.slice.center"
-_EYE = "appearance.half appearance.arm appearance.mouse found.tip"
+_EYE = "appearance.half appearance.arm appearance.mouse found.tip found.sample"
 
 SCENE_JOBS = (
     # Cloud, volume and unreachability, coarse and then fine; each stage is drawn before the next
@@ -306,6 +315,7 @@ SCENE_JOBS = (
     # The exact boundary
     Job("surface", _OF_SURFACE, _color_surface, _draw_surface, **_IF_SHOWN),
     Job("section", f"found.reach {_PLANE}", _cut, wanted="appearance.section"),
+    Job("sweep", f"{DESIGN} appearance.sweep", _sweep, wanted="appearance.sweep"),
     Job("arm", "design activation appearance.arm", draw=_draw_arm, makes="tip posture"),
     # The solids around the arm, and how near it is to them
     Job("clearance", "design activation", _compute_clearance, _draw_surroundings, **_AROUND),

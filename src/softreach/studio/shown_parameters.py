@@ -43,15 +43,6 @@ _ONE_FOR_ALL = ("extent", "revolution", "lower", "upper")
 """Fields that have a slider of their own only where parts differ."""
 _AROUND_VALUE = ("lower", "upper", "young_modulus")
 """Fields of any magnitude: their sliders end at multiples of what the design has."""
-_MORE = {
-    "extent": "; σ is the angle of the cross-section that the bundle covers",
-    "offset": "; the angle around the axis at which the bundle starts at the base",
-    "revolution": "; the angle that a fiber turns around the axis from base to tip",
-    "taper": "; the angle between the axis and the side of the body",
-    "bundles": "; how many equal bundles stand around the axis, each with its own activation",
-    "lower": "; the most that a bundle contracts",
-    "upper": "; the most that a bundle extends",
-}
 _WORDS = {
     "L": "length",
     "R0/R2": "bore / outer radius",
@@ -142,9 +133,11 @@ def _on_slider(arm: Manipulator, parameter: Parameter, *, is_own: bool) -> Shown
     if (slider := slider or _around_value(arm, parameter)) is None:
         return None
     shown = _shown(arm, parameter, parameter.symbol, "", arm.length_unit)
-    more = f"{parameter.meaning}{_MORE.get(parameter.field, '')} (parameter {parameter.name})"
     label, low, high, step = slider
-    label, hint = label.replace("{owner}", parameter.owner), f"{shown.label}: {more}"
+    label, hint = (
+        label.replace("{owner}", parameter.owner),
+        f"{shown.label}: {parameter.meaning} (parameter {parameter.name})",
+    )
     return shown._replace(label=label, hint=hint, low=low, high=high, step=step)
 
 

@@ -125,7 +125,8 @@ class Appearance:
     arm: bool = True
     surface: bool = True  # the exact boundary of the reachable set
     mouse: str = "tip"  # use of the mouse in the scene, one of `MOUSE`; it turns the view besides
-    section: bool = False  # plot beside the scene, computed only while it is shown
+    section: bool = False  # plots beside the scene, each computed only while it is shown
+    sweep: str = ""  # parameter against which the volume is plotted; "" for none
     unit: str = ""  # of lengths, areas and volumes; "" for that of the design
 
     def __post_init__(self) -> None:

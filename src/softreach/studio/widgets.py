@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 Ends = tuple[float, float]
 _PRECISION = 12  # digits after the point that viser leaves of what a slider holds
-_UNAPPLIED = "Enter applies it."
 _UNIT_IN = re.compile(r"\[([^\]]+)\]$| / (L)$")
 
 
@@ -129,7 +128,6 @@ class TypedField:
         with self._form:
             self._text = gui.add_text(label, kind.text(value), hint=hint)
         self._message = Line(gui)
-        self._text.on_update(self._typed)
         self._form.on_submit(self._submitted)
 
     @property
@@ -161,11 +159,6 @@ class TypedField:
         self._text.remove()
         self._form.remove()
         self._message.remove()
-
-    def _typed(self, event: Any) -> None:
-        if event.client_id is not None:
-            unapplied = self._text.value != self._kind.text(self._value)
-            self._message.say(*((_UNAPPLIED,) if unapplied else ()))
 
     def _submitted(self, event: Any) -> None:
         text = self._text.value

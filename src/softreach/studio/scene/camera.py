@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,8 @@ VIEWS: dict[str, Array] = {
 """Directions from the middle to the camera."""
 UPRIGHT = 0.6  # aspect below which a window is that of a phone
 _PATIENCE = 30.0  # [s] for a picture
+_NARROWEST = 0.3  # aspect below which a page is only being laid out
+_LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _ROOM, _ROOM_UPRIGHT = 1.12, 1.22  # times what would just fill the picture, with its numbers
 _GRAY = 170, 170, 175  # of the axes
 
@@ -54,6 +57,9 @@ class TabCamera:
 
     def __init__(self, client: ClientHandle) -> None:
         self._client = client
+        self._aspect: float | None = None
+        self._latest: float | None = None
+        self._since = 0.0
 
     @property
     def aspect(self) -> float:
@@ -78,6 +84,27 @@ class TabCamera:
             shown = self._client.camera
             shown.position, shown.look_at = camera.position, camera.look_at
 
+    def keep_width(self) -> bool:
+        """Step back as the picture gets narrower, and forth again; True while the window changes.
+
+        A layout passes through widths that are gone before the page has heard of a step.
+        """
+        now = self.aspect
+        if now < _NARROWEST:
+            return False
+        if now != self._latest:
+            self._latest, self._since = now, time.monotonic()
+            return True
+        if self._aspect is None and time.monotonic() - self._since < _LAID_OUT:
+            return True
+        before, self._aspect = self._aspect or now, now
+        if (ratio := _half_sine(before) / _half_sine(now)) != 1.0:
+            camera = self.actual()
+            offset = ratio * np.subtract(camera.position, camera.look_at)
+            position = vector(camera.look_at + offset)
+            self.look_from(Camera(position=position, look_at=camera.look_at))
+        return False
+
     def picture(self) -> NDArray[np.uint8]:
         """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4)."""
         camera, client = self._client.camera, self._client
@@ -94,7 +121,7 @@ class NumberedBox:
 
     def __init__(self, api: SceneApi) -> None:
         self._api, self._lock = api, threading.RLock()
-        self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+        self._box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])  # of most clouds
         self._unit, self._scale = LengthUnit("L", 1.0), 1.0  # of the numbers, and L in it
         self._camera: tuple[Array, float] = np.array([50.0, -80.0, 30.0]), np.inf
         self._drawn: object = None  # what the numbers were drawn for

@@ -53,8 +53,6 @@ _TOOL = 0.006  # thickness of the line from a section to the point that counts a
 MARKER = 0.016  # edge of the dot of a marker [L]
 _USUAL, _POINT, _POINTS = 1 << 17, 0.007, (0.003, 0.01)  # points of a cloud, and their edges [L]
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
-_AROUND_ARM = (-0.6, -0.6, -0.4), (0.6, 0.6, 1.0)
-"""Corners around most clouds, seen from the base [L]."""
 
 
 class _Arm(NamedTuple):
@@ -109,6 +107,11 @@ class Scene:
             self.remove(path)
             return
         self.api.add_line_segments(path, pieces.astype(np.float32), color, thickness=thickness)
+
+    def _add_mesh(self, path: str, vertices: ArrayLike, faces: ArrayLike, **look: Any) -> Any:
+        corners, triangles = np.asarray(vertices, np.float32), np.asarray(faces, np.uint32)
+        look |= {"side": "double", **_SHADOWLESS}
+        return self.api.add_mesh_simple(path, corners, triangles, **look)
 
     def look(self, ahead: Array | None, base: Array) -> None:
         """Cut away the half in front of the base [L], seen as the camera looks along the ground.
@@ -198,17 +201,8 @@ class Scene:
         if keys != [key for key, _ in self._solids]:
             self.remove("/surroundings")
             surfaces = [(one.vertices / arm.length, one.faces) for one in solid_surfaces(arm)]
-            add = partial(self.api.add_mesh_simple, side="double", flat_shading=True, **_SHADOWLESS)
-            nodes = (
-                add(
-                    f"/surroundings/{k}",
-                    v.astype(np.float32),
-                    f.astype(np.uint32),
-                    opacity=_SOLID,
-                    color=_AROUND,
-                )
-                for k, (v, f) in enumerate(surfaces)
-            )
+            add = partial(self._add_mesh, color=_AROUND, opacity=_SOLID, flat_shading=True)
+            nodes = [add(f"/surroundings/{k}", *each) for k, each in enumerate(surfaces)]
             self._solids = list(zip(keys, nodes, strict=True))
         for k, (_, node) in enumerate(self._solids):
             color = _TOUCHED if k == touched else _AROUND
@@ -246,16 +240,16 @@ class Scene:
         bent = np.any(state.activation) or arm.loads is not None or arm.rest != STRAIGHT
         if look.arm and not (bent or arm.drives or arm.markers):
             self._draw_line(arm, line, "/arm")
-        around = arm.base.to_world(arm.length * np.array(_AROUND_ARM)) / arm.length
+        around = arm.base.to_world(arm.length * np.array(self.axes.corners)) / arm.length
         self.axes.draw(around, line.position / arm.length, arm=arm)
 
     def _draw_line(self, arm: Manipulator, line: Centerline, path: str) -> Array:
-        centers, radii = line.position, arm.profile.radius(line.z)
+        length, centers, radii = arm.length, line.position, arm.profile.radius(line.z)
         if np.isnan(centers).any():
             self.remove(path)
             return np.full(3, np.nan)
-        markers = marker_points(arm.markers, line) / arm.length
-        end, tip = -1, centers[-1] / arm.length
+        markers = marker_points(arm.markers, line) / length
+        end, tip = -1, centers[-1] / length
         if arm.pointed is not None:
             end = int(np.searchsorted(line.z, arm.pointed.station_at("station", arm.length)))
             tip = markers[arm.markers.index(arm.pointed)]
@@ -264,7 +258,7 @@ class Scene:
         skins = [arm_surface(arm, line, _SIDES)]
         if arm.bundles <= MOST_BUNDLES:
             skins += bundle_skins(arm, line, lift=_LIFT, step=_ACROSS)
-        corners = [(skin.vertices / arm.length).astype(np.float32) for skin in skins]
+        corners = [(skin.vertices / length).astype(np.float32) for skin in skins]
         known = self._arms.get(path)
         if known is not None and known.arm is arm:
             handles = known.meshes
@@ -272,19 +266,18 @@ class Scene:
                 handle.vertices = vertices
         else:
             self.remove(path)
-            ghost, faces = path.startswith("/ghosts"), [skin.faces for skin in skins]
+            ghost, faces = path.startswith(("/ghosts", "/sample")), [skin.faces for skin in skins]
             clear = [_GHOST] * len(skins) if ghost else _opacities(arm, len(skins))
             colors = [_BODY, *(eight_bit(bundle_color(k)) for k in range(len(skins) - 1))]
-            add = partial(self.api.add_mesh_simple, side="double", **_SHADOWLESS)
             parts = enumerate(zip(corners, faces, colors, clear, strict=True))
             handles = [
-                add(f"{path}/{k}", v, f.astype(np.uint32), color=color, opacity=opacity)
+                self._add_mesh(f"{path}/{k}", v, f, color=color, opacity=opacity)
                 for k, (v, f, color, opacity) in parts
             ]
-        self._arms[path] = _Arm(arm, handles, centers / arm.length, radii / arm.length)
+        self._arms[path] = _Arm(arm, handles, centers / length, radii / length)
         self.dots(f"{path}/markers", markers, DARK, MARKER)
         if arm.pointed is not None:
-            self.lines(f"{path}/tool", np.array([[centers[end] / arm.length, tip]]), DARK, _TOOL)
+            self.lines(f"{path}/tool", np.array([[centers[end] / length, tip]]), DARK, _TOOL)
         return tip
 
     def see_through_arm(self, clear: bool) -> None:

@@ -14,9 +14,9 @@ TABS: dict[str, tuple[Callable[[Fields], None], ...]] = {
     "Design": (design.design,),
     "Parts": (design.loads, design.tool, design.arm_parts),
     "Move": (move.drag, move.activation, move.target, move.path),
-    "View": (view.view, view.section),
+    "View": (view.view, view.plots),
     "Compare": (compare.compare,),
-    "Goals": (goals.needs,),
+    "Goals": (goals.needs, goals.measured),
     "Export": (export.export,),
 }
 JOBS = (*SCENE_JOBS, *move.JOBS, *goals.JOBS)  # every kind of work that a tab has done for it

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.studio import markup
-from softreach.studio.captions import size_unit, told_error
+from softreach.studio.captions import told_error
 from softreach.studio.fields import GRAY, Fields
 from softreach.studio.found import Found
 from softreach.studio.reach import Reach
@@ -99,7 +99,7 @@ def _reach_rows(kept: Candidate, now: Candidate) -> list[Row]:
     sizes = [reach.size if reach else None for reach in reaches]
     for name, latest in {size.name: size for size in sizes if size}.items():
         same = [size if size and size.name == name else None for size in sizes]
-        unit, power = size_unit(latest, arm), latest.power
+        unit, power = arm.length_unit, latest.power
         scale, title = (unit.scale(power), unit.label(name, power)) if power else (1.0, name)
         before, after = (size and size.value / scale for size in same)
         first, second = (size and told_error(size, arm) / scale for size in same)

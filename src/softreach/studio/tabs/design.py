@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -16,7 +15,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.section import material_names
 from softreach.arm.stations import Marker
 from softreach.studio import shown_parameters
-from softreach.studio.fields import GRAY, Attribute, Build, Fields, in_unit, of_design
+from softreach.studio.fields import GRAY, Attribute, Build, Fields, attribute, in_unit, of_design
 from softreach.studio.figures import NO_BAR, SlopeBar, slope_bars
 from softreach.studio.found import Found
 from softreach.studio.shown_parameters import Part, ShownParameter, part_parameters, parts
@@ -204,9 +203,7 @@ def _chosen(state: StudioState, found: Found) -> tuple[Mapping[str, Part], str, 
 def _part(panel: Fields, known: Mapping[str, Part], label: str) -> None:
     session, part, labels = panel.session, known[label], tuple(known)
     read = lambda found: min(found.part, len(labels) - 1)
-    chosen = Attribute(
-        read, lambda found, number: replace(found, part=number), "found", "found.part"
-    )
+    chosen = attribute("part")._replace(read=read, of="found", follows="found.part")
     panel.dropdown("edit", dict(enumerate(labels)), chosen, "The part whose numbers are below")
     own = part.ring is not None or part.solid is not None or bool(part.actuator)
     if own:

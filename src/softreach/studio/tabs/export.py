@@ -39,10 +39,8 @@ Write = Callable[[Session, Path], object]
 """Writes what a tab shows to a file, whose suffix chooses the format."""
 
 _ABOUT = {
-    "data": "The design alone, which the command line reads too; all samples of the cloud; the "
-    "exact boundary of the reachable set; or the arm as bent. Lengths are in the unit of the page",
-    "picture": "The scene as it is seen, with legend and design; or one web page with the scene, "
-    "which turns without the studio",
+    "data": "Design, all samples, exact boundary, or arm as bent, in the unit of the page",
+    "picture": "The scene as it is seen, with legend and design; or a web page that turns",
 }
 _PAPER_AND_INK = {False: ("white", "#222222"), True: ("#141414", "#dddddd")}
 """Of a light page and of a dark one."""

@@ -1,32 +1,38 @@
-"""What the arm is for: live requirements."""
+"""What the arm is for and what was measured on it: live requirements, poses and a fit to them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.calibration import calibrate
+from softreach.calibration.free_numbers import free_numbers
+from softreach.calibration.measurements import read_measurements
+from softreach.calibration.model import MarkerModel
 from softreach.requirements import Box, Check, Finding, Keep, Limits, Requirements, Target, check
 from softreach.requirements.checks import checked
 from softreach.requirements.parts import TOL
 from softreach.studio import markup
-from softreach.studio.fields import GRAY, Fields, file_text
-from softreach.studio.found import Found
+from softreach.studio.fields import GRAY, Attribute, Fields, file_text
+from softreach.studio.found import Bench, Found, Sample
 from softreach.studio.jobs import DESIGN, Given, Job, Learned, Results
 from softreach.studio.markup import Part, Swatch, Term
 from softreach.studio.scene.camera import add_label
-from softreach.studio.scene.scene import Scene, pieces
+from softreach.studio.scene.scene import DARK, MARK, MARKER, Scene, pieces
 from softreach.studio.session import Session
 from softreach.studio.state import StudioState, needs_of_text, requirements_of
 from softreach.studio.widgets import numbers_in
 from softreach.studio.work import rest
-from softreach.support.errors import InvalidInput, SoftreachError, no_warnings
+from softreach.support.errors import InvalidInput, SoftreachError, counted, no_warnings
+from softreach.support.files.columns import read_table
 from softreach.support.palette import MET, MISSED, eight_bit
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
-    pass
+    from viser import UploadedFile
 
 _EMPTY = {
     "place to reach": "x, y, z in {unit}; empty: where the tip is",
@@ -46,6 +52,7 @@ VERDICTS = {"met": eight_bit(MET), "missed": eight_bit(MISSED), "undecided": (20
 _BALL, _CROSS, _FINE, _BROAD = 0.034, 0.022, 0.004, 0.008  # of needs [L]
 _REGION = {"stay_inside": (70, 110, 170), "avoid": (135, 135, 140), "cover": (90, 150, 130)}
 _MOST_LABELS = 20  # more would hide each other
+_MEASURED = 0.03  # edge of a dot [L]
 _SIGNS = {"met": "\N{CHECK MARK}", "missed": "\N{MULTIPLICATION X}", "undecided": "?"}
 
 
@@ -53,7 +60,6 @@ def needs(panel: Fields) -> None:
     """Needs of the design, and what it misses of them."""
     session, gui = panel.session, panel.gui
     with panel.folder("requirements"):
-        panel.say("Say what the arm is for: what it misses is shown while you change it.")
         about = "A place for the tip, a box for the arm at these places, or a limit"
         kind = gui.add_dropdown("add", tuple(_EMPTY), hint=about)
         field = gui.add_text("numbers", "", hint="Numbers with commas between them")
@@ -215,6 +221,110 @@ def _unused(kind: str, parts: Sequence[Target | Keep]) -> str:
     return next(name for k in range(1, len(names) + 2) if (name := f"{kind} {k}") not in names)
 
 
+# Measured poses
+
+_ABOUT_LOAD = "Columns of inputs and of x, y, z of markers, with units: tension1_N, tip_x_mm"
+_ABOUT_SAMPLE = "Moves the arm to its inputs: large dots were measured, small ones are predicted"
+_ABOUT_FIT = "Finds the numbers with which predicted markers come nearest to measured ones"
+_FREE = {
+    "pose": "pose of the base",
+    "taper": "taper φ",
+    "revolution": "revolution Ω",
+    "*.offset": "offsets of bundles",
+    "*.young_modulus": "Young's moduli",
+}
+"""Numbers that a fit may change: name -> what the check box says."""
+
+
+def measured(panel: Fields) -> None:
+    """Measured poses: their markers over the arm, a fit to them, and the calibrated design."""
+    session = panel.session
+    with panel.folder("measured poses", expanded=False):
+        read = lambda file: _read_poses(session, file)
+        panel.upload("Load measured poses (CSV)", read, _ABOUT_LOAD)
+        panel.text("found.bench", content=_bench_text)
+        with panel.folder("samples", "found.bench"):
+            places = lambda bench: (bench.number, len(bench.data) - 1) if bench else (0, 1)
+            at = lambda _, found: places(found.bench)
+
+            def move(number: int) -> None:
+                if (bench := session.found.bench) is not None:
+                    _pose(session, replace(bench, number=number))
+
+            panel.steps("sample", "found.bench", at=at, move=move, hint=_ABOUT_SAMPLE)
+            panel.text("design", "found.bench", "found.sample", content=_residuals_text)
+            for name, label in _FREE.items():
+                panel.checkbox(label, _is_free(name), "Lets the fit change this number")
+            panel.button("Fit", lambda: session.follow("fit"), _ABOUT_FIT)
+            panel.html("found.bench", content=_summary)
+            about = "Makes the calibrated arm the design; can be undone"
+            fitted = lambda state, found: found.bench and found.bench.fitted(state.design)
+            apply = lambda state: state.replace(design=fitted(state, session.found) or state.design)
+            panel.change("Apply", apply, about, fitted)
+
+
+def _is_free(name: str) -> Attribute:
+    """Whether a fit may change a number; that of the pose before there are data."""
+
+    def write(found: Found, on: bool) -> Found:
+        if found.bench is None:
+            return found
+        free = tuple(each for each in _FREE if (on if each == name else each in found.bench.free))
+        return replace(found, bench=replace(found.bench, free=free))
+
+    read = lambda found: name in (found.bench.free if found.bench else ("pose",))
+    return Attribute(read, write, "found", "found.bench")
+
+
+def _read_poses(session: Session, file: UploadedFile) -> None:
+    arm, before = session.state.design, session.found.bench
+    data = read_measurements(arm, read_table(file.content, file.name))
+    free = ("pose",) if before is None else before.free
+    _pose(session, Bench(data=replace(data, source=file.name), arm=arm, free=free))
+
+
+def _pose(session: Session, bench: Bench) -> None:
+    """Show a pose, and bring the arm to its inputs."""
+    if not bench.fits(session.state.design):
+        allowed = "one with the inputs and markers of the data"
+        raise InvalidInput("design", "another one", allowed, "load the data again")
+    session.update(bench.posed, goes_on=True)
+    session.learn({"bench": bench})
+
+
+def _bench_text(_: StudioState, found: Found) -> list[str]:
+    if (bench := found.bench) is None:
+        return []
+    data = bench.data
+    inputs = ", ".join(name or "none" for name in data.input_names)
+    samples = f"{counted(len(data), 'sample')} of {', '.join(data.marker_names)}"
+    return [f"{data.source}: {samples}; inputs {inputs}"]
+
+
+def _residuals_text(state: StudioState, found: Found) -> list[str]:
+    sample, bench = found.sample, found.bench
+    if sample is None or bench is None:
+        return ["The arm is not at a measured pose: move the slider."]
+    known = zip(bench.data.marker_names, 1e3 * sample.distances, strict=True)
+    each = [f"{name} {d:.3g} mm" if np.isfinite(d) else f"{name} unknown" for name, d in known]
+    inputs, (low, high) = bench.data.inputs[bench.number], state.design.input_bounds.T
+    beyond = bool(((inputs < low) | (inputs > high)).any())
+    note = ". Its inputs are beyond the bounds, at which the arm is drawn" if beyond else ""
+    return [f"predicted − measured: {', '.join(each)}{note}."]
+
+
+def _summary(_: StudioState, found: Found) -> str:
+    if found.bench is None or (result := found.bench.result) is None:
+        return ""
+    report = result.report()
+    printed = [part for part in report.sections if part.rows and part.printed]
+    tables = [markup.table(part.head, part.rows) for part in printed]
+    lines = [*(line for part in report.sections for line in part.points), report.verdict]
+    if not result.fit.converged:
+        lines.append(f"The fit did not converge in {result.fit.evaluations} evaluations.")
+    return "".join([*tables, *map(markup.paragraph, lines)])
+
+
 def _check(given: Given) -> Results:
     """By poses that are found in some milliseconds; by every pose where these miss something."""
     state = given.state
@@ -276,4 +386,48 @@ def _draw_places(check: Check, scene: Scene) -> None:
         add_label(scene.api, f"/needs/label {k}", text, places[k] + [0.0, 0.0, 2.0 * _CROSS])
 
 
-JOBS = (Job("needs", f"{DESIGN} needs", _check, _draw_needs, wanted="needs", makes="check"),)
+def _predict(given: Given) -> Results:
+    """Markers of the pose, while the arm has its inputs."""
+    bench, design = given.found.bench, given.state.design
+    here = bench is not None and bench.posed(given.state).activation == given.state.activation
+    if bench is None or not (here and bench.fits(design)):
+        yield Learned({"sample": None})
+        return
+    arm = bench.fitted(design) or design
+    pose = bench.data.of(np.array([bench.number]))
+    # The inputs of a pose may be beyond the bounds of the design.
+    predicted = MarkerModel.of(free_numbers(arm, ["pose"]), pose).of_arm(arm).places[0]
+    yield Learned({"sample": Sample(pose.places[0], predicted, arm)})
+
+
+def _draw_sample(given: Given) -> None:
+    """Measured and predicted markers, lines between them, and the arm that predicts."""
+    sample, design, scene = given.found.sample, given.state.design, given.scene
+    if sample is None:
+        scene.remove("/sample")
+        return
+    measured, predicted = sample.measured / design.length, sample.predicted / design.length
+    scene.dots("/sample/measured", measured, MARK, _MEASURED)
+    scene.dots("/sample/predicted", predicted, DARK, MARKER)
+    scene.lines("/sample/residuals", np.stack([measured, predicted], axis=1), MARK, 0.005)
+    if sample.arm == design:
+        scene.remove("/sample/arm")
+    else:
+        same = given.state.replace(design=sample.arm).activation
+        scene.draw_arm(sample.arm, same, "/sample/arm")
+
+
+def _fit(given: Given) -> Results:
+    if (bench := given.found.bench) is None:
+        return
+    progress = lambda _: given.check()
+    with no_warnings():
+        result = calibrate(given.state.design, bench.data, free=bench.free, progress=progress)
+    yield Learned({"bench": replace(bench, result=result)})
+
+
+JOBS = (
+    Job("needs", f"{DESIGN} needs", _check, _draw_needs, wanted="needs", makes="check"),
+    Job("sample", "design activation found.bench", _predict, _draw_sample, wanted="found.bench"),
+    Job("fit", "", _fit, doing="calibrating"),
+)

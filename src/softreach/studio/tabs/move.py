@@ -37,10 +37,7 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
 
-_DRAG_HINT = (
-    "Drag the ball on the tip, or along x, y or z by an arrow: the arm follows on its branch of "
-    "solutions."
-)
+_DRAG_HINT = "Drag the ball on the tip, or an arrow: the arm follows on its branch of solutions."
 _KINDS = {"N": "tension", "Pa": "pressure"}  # kinds of inputs by their units
 _MOST = 40  # sliders: a page with hundreds takes minutes to build
 _HERE = "\N{CHECK MARK} "
@@ -75,27 +72,18 @@ def drag(panel: Fields) -> None:
     def place(state: StudioState, found: Found) -> None:
         arm, look, lag = state.design, state.appearance, found.lag
         grasped = look.mouse == "tip" and look.arm and rod_of(arm).box.dimension > 0
+        grasped = grasped and found.sample is None  # a marker may be on the tip
         radius = float(arm.profile.radius(arm.length)) / arm.length
         clear = state.path is not None
         ball.move(found.tip if grasped else None, radius, dark=look.dark, clear=clear)
         ends = None if lag is None else (lag.wanted, lag.dragged.tip / arm.length)
-        ball.show_lag(ends, _gap(state, found))
+        short = lag.dragged.gap if lag is not None else 0.0
+        ball.show_lag(ends, arm.length_unit.rounded(short, digits=".3g") if short else "")
 
-    def text(state: StudioState, found: Found) -> list[str]:
-        gap = _gap(state, found)
-        if gap or state.appearance.mouse != "tip":
-            return [f"This branch ends {gap} short of the pointer."] if gap else []
-        return [_DRAG_HINT]
-
-    follows = "design", "appearance", "path", "found.tip", "found.lag"
+    follows = "design", "appearance", "path", "found.tip", "found.sample", "found.lag"
     panel.follow(*follows, show=place)
-    panel.text("design", "appearance.mouse", "found.lag", content=text)
-
-
-def _gap(state: StudioState, found: Found) -> str:
-    """How far the arm lags behind the pointer; "" where it does not."""
-    short = found.lag.dragged.gap if found.lag is not None else 0.0
-    return state.design.length_unit.rounded(short, digits=".3g") if short else ""
+    hint = lambda state, _: [_DRAG_HINT] * (state.appearance.mouse == "tip")
+    panel.text("appearance.mouse", content=hint)
 
 
 def activation(panel: Fields) -> None:
@@ -164,7 +152,7 @@ def _target(panel: Fields, unit: LengthUnit) -> None:
 
 
 def _solutions(panel: Fields, _: object) -> None:
-    """A button for each solution, or for the nearest; the one that the arm is in is green."""
+    """A button for each solution, or for the nearest; one with a check mark is the present one."""
     answer = panel.session.found.answer
     for row in _shapes(answer) if answer is not None else ():
         text = ", ".join(f"{value:.4g}" for value in row)
@@ -176,7 +164,7 @@ def _solutions(panel: Fields, _: object) -> None:
             is_here = len(scales) == len(row)  # else it is of a design before
             is_here = is_here and bool((np.abs(row - state.activation) <= _NEAR * scales).all())
             label = button.label.removeprefix(_HERE)
-            button.color, button.label = "green" * is_here or None, _HERE * is_here + label
+            button.label = _HERE * is_here + label
 
         panel.follow("design", "activation", show=mark)
 

@@ -1,8 +1,10 @@
-"""Status above all tabs, looks of a tab, and the section beside its scene."""
+"""Status above all tabs, looks of a tab, and the plots beside its scene."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -10,19 +12,19 @@ import numpy as np
 from softreach.studio import markup
 from softreach.studio.captions import clearance_text, legend_text, loaded_share, reach_text
 from softreach.studio.fields import Attribute, Fields, attribute
+from softreach.studio.figures import Picture, swept_parameter
 from softreach.studio.found import Found
-from softreach.studio.markup import Part, Strong
+from softreach.studio.markup import Part, Term
 from softreach.studio.scene.camera import VIEWS
 from softreach.studio.scene.colors import color_names, key_html, shown_color
 from softreach.studio.session import Session
-from softreach.studio.shown_parameters import three_digits
+from softreach.studio.shown_parameters import slider_parameters, three_digits
 from softreach.studio.state import AXES, StudioState
 from softreach.studio.tabs.goals import verdict_text
 from softreach.support.units import UNITS, LengthUnit
 
 _HISTORY_HINT = (
-    "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
-    "reset to what the studio was opened on. The view stays."
+    "Ctrl+Z, Ctrl+Shift+Z; Reset leads to what the studio was opened on. The view stays."
 )
 _NOTE_SECONDS = 12.0
 _CANCEL, _GO_ON = "Cancel", "Compute what is missing"
@@ -36,10 +38,9 @@ _TOGGLES = {
     "half": ("half of the cloud", "Cuts away the half in front of the arm"),
     "dark": ("dark page", "Light on dark"),
 }
-_ABOUT_SECTION = (
-    "The reachable set in the plane of the slice, or y = 0: its boundary, and how many activations "
-    "reach each place; in a window beside the scene, on a phone below this sheet"
-)
+_ABOUT_SECTION = "What is reached in the plane of the slice, or y = 0, and by how many activations"
+_ABOUT_SWEEP = "Volume of designs that differ from this one in this parameter alone"
+_ABOUT_OLD = "The numbers of the present design are not known yet"
 _WIDTH = 380  # pixels
 _NOTHING = np.zeros((1, 1, 4), np.uint8)
 
@@ -85,7 +86,7 @@ def _numbers(state: StudioState, found: Found) -> tuple[list[Part], list[str]]:
     words = "; ".join(reach.notes if reach.fine else ())
     notes: list[Part] = [f"{words[:1].upper()}{words[1:]}."] * bool(words)
     below = legend_text(reach, free=found.free is not None), refusal, notes
-    before = [Strong("of the design before: ")] * (reach.arm != state.design)
+    before = [Term("of the design before: ", _ABOUT_OLD)] * (reach.arm != state.design)
     numbers = [*before, *reach_text(reach, loaded_share(found, state.design))]
     return numbers, [*lines, key_html(found.key), *(markup.paragraph(*parts) for parts in below)]
 
@@ -144,13 +145,17 @@ def _center(panel: Fields, size: tuple[LengthUnit, float]) -> None:
     panel.slider(unit.label("center"), (-end, end), 0.01 * end, at, "Middle of the slab")
 
 
-def section(panel: Fields) -> None:
-    """A check box in the tab, and the section in a window beside the scene."""
+def plots(panel: Fields) -> None:
+    """What is plotted; the plots stand in a window beside the scene."""
     panel.checkbox("section", attribute("appearance.section"), _ABOUT_SECTION)
+    names = lambda state: {each.name: each.label for each in slider_parameters(state.design)}
+    read = lambda state: one.name if (one := swept_parameter(state)) is not None else ""
+    swept = Attribute(read, lambda state, name: state.showing(sweep=name))
+    panel.dropdown("V against", lambda s: {"": "(no plot)"} | names(s), swept, _ABOUT_SWEEP)
     window = panel.gui.add_panel(visible=False)
 
     def place(state: StudioState, _: Found) -> None:
-        shown = state.appearance.section
+        shown = state.appearance.section or bool(state.appearance.sweep)
         if shown and not window.visible:
             window.visible = True
             window.dock_left()  # a page forgets where a hidden window was
@@ -158,19 +163,25 @@ def section(panel: Fields) -> None:
         window.visible = shown
 
     panel.follow("appearance", show=place)
-    with window.add_tab("Figures"), panel.folder("section", "appearance.section"):
+    with window.add_tab("Figures"):
+        _figure(panel, "section", "section")
+        _figure(panel, "V against parameter", "sweep")
+
+
+def _figure(panel: Fields, label: str, name: str) -> None:
+    known: Callable[[Found], Picture | None] = attrgetter(name)
+
+    def draw(_: StudioState, found: Found) -> None:
+        if (picture := known(found)) is not None:
+            image.image, image.visible = picture.image, True
+
+    def text(state: StudioState, found: Found) -> tuple[str, ...]:
+        if (picture := known(found)) is None:
+            return ("computing ...",)
+        before = " · of the design before, computing ..."
+        return (picture.text, before * (picture.arm != state.design))
+
+    with panel.folder(label, f"appearance.{name}"):
         image = panel.gui.add_image(_NOTHING, format="png", visible=False)
-
-        def draw(_: StudioState, found: Found) -> None:
-            if (picture := found.section) is not None:
-                image.image, image.visible = picture.image, True
-
-        panel.follow("found.section", show=draw)
-        panel.text("design", "found.section", content=_section_text)
-
-
-def _section_text(state: StudioState, found: Found) -> tuple[str, ...]:
-    if (picture := found.section) is None:
-        return ("computing ...",)
-    before = " · of the design before, computing ..."
-    return (picture.text, before * (picture.arm != state.design))
+        panel.follow(f"found.{name}", show=draw)
+        panel.text("design", f"found.{name}", content=text)
