@@ -70,12 +70,12 @@ def _asymmetry(arm: Manipulator, seed: int) -> float:
 def misprints(settings: Settings, notes: Notebook) -> dict[str, Any]:
     """Appendix A against its integrals, the inner radius, and what α is measured from."""
     accuracy, facts = settings.accuracy, describe(arm := minimal_trunk())
-    ratio, angle = facts.radius_ratio, facts.helical_angles[1]
+    ratio, angle = arm.section.inner_ratio, facts.helical_angles[1]
     errors = np.array([_errors(ratio, taper, a) for taper in _TAPERS for a in _ANGLES])
     sets = {r: reachable_set(minimal_trunk(radius_ratio=r), accuracy=accuracy) for r in _RATIOS}
     # the right-handed fiber at the base, on the surface in the plane normal to e_R (Appendix C)
     start, end = arm.outline([0.0, 1e-6]).center[:, 1]
-    around, along = facts.base_radius * (end - start), 1e-6 / np.cos(_TAPER)
+    around, along = arm.profile.radius(0.0) * (end - start), 1e-6 / np.cos(_TAPER)
     *both, _, corrected = errors.max(axis=0)
     third = _errors(ratio, _TAPER, angle)[2]
     found: dict[str, Any] = {
