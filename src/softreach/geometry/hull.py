@@ -70,11 +70,6 @@ class Hull:
         vertices, faces = parted(self.vertices, self.faces)
         return Mesh(vertices, faces.astype(np.int64))
 
-    @property
-    def bias(self) -> float | None:
-        """Estimated error of the volume [m³], below zero if it is too small."""
-        return None if self.volume_corrected is None else self.volume - self.volume_corrected
-
     def to_dataset(self) -> xr.Dataset:
         """`vertices` (vertex, axis) [m], `faces` (face, corner) and the numbers as variables."""
         import xarray as xr
