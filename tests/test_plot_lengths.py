@@ -186,13 +186,6 @@ def plot_check(of):
     yield from space(plot.plot_check(check, unit="L"), box.bounds)
 
 
-def plot_compliance(of):
-    """Ellipsoids far smaller than the arm, which lies along one direction."""
-    rest = rest_configuration(of.arm)
-    ax = plot.plot_compliance(of.arm, rest, 1e-3 * np.eye(3), view="side", force=1.0)
-    yield from plane(ax, of.rest)
-
-
 def plot_equilibria(of):
     ax = plot.plot_equilibria(sr.equilibria(of.arm, [0.0, 0.0, 0.0]), view="side")
     yield "z / L", ax.get_ylim(), of.rest[:, 2]

@@ -140,22 +140,6 @@ def test_a_cloud_is_colored_by_compliance_in_ratios_where_these_are_large():
     assert not narrow.key.logarithmic
 
 
-def test_the_ellipse_drawn_is_the_outline_of_where_forces_move_the_tip():
-    plot = pytest.importorskip("softreach.plot")
-    arm = rubber(TRUNK, LOADS["gravity"])
-    found, shapes = tip_compliance(arm, GAMMA[:1]), sr.configuration(arm, GAMMA[:1])
-    for view, columns in (("front", [0, 2]), ("top", [0, 1]), ("back", [0, 2])):
-        ax = plot.plot_compliance(arm, shapes, found, view=view, force=0.1)
-        outline = ax.lines[-1].get_xydata() * arm.length
-        forces = np.random.default_rng(0).normal(size=(4000, 3))
-        forces *= 0.1 / np.linalg.norm(forces, axis=1, keepdims=True)
-        moved = (sr.tip_positions(arm, GAMMA[:1]) + forces @ found[0].T)[:, columns]
-        np.testing.assert_allclose(outline.min(axis=0), moved.min(axis=0), atol=2e-4)
-        np.testing.assert_allclose(outline.max(axis=0), moved.max(axis=0), atol=2e-4)
-    with pytest.raises(InvalidInput, match="a matrix for each configuration"):
-        plot.plot_compliance(arm, shapes, np.repeat(found, 2, axis=0))
-
-
 def test_the_command_line_colors_a_cloud_by_compliance(folder):
     asked = "show lce_arm --n 500 --color compliance --out soft.png"
     assert run(asked.split()) == 0

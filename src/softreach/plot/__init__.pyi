@@ -1,6 +1,6 @@
 # ruff: noqa: I001  (several names a line)
 from .arm import DesignPanel as DesignPanel, plot_arm as plot_arm, plot_check as plot_check
-from .arm import plot_compliance as plot_compliance, plot_designs as plot_designs
+from .arm import plot_designs as plot_designs
 from .arm import plot_equilibria as plot_equilibria, plot_payload_curve as plot_payload_curve
 from .atlas import atlas_figures as atlas_figures, plot_cloud_sheet as plot_cloud_sheet
 from .atlas import plot_hull_sheet as plot_hull_sheet, plot_metric_map as plot_metric_map

@@ -17,12 +17,11 @@ from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.rod.kinematics import rest_configuration
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
-from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
-from softreach.support.arrays import Array, as_floats, as_stations
+from softreach.support.arguments import as_flag, as_given, as_number
+from softreach.support.arrays import Array, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.lazy import Axes, Dataset, Figure
 from softreach.support.palette import BODY, MET, MISSED, bundle_color
-from softreach.support.quantity import round_below
 from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
@@ -49,9 +48,7 @@ _FOLLOWED, _STABLE, _UNSTABLE = "0.05", "#1f4e9e", "0.55"
 _BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
 _ARROW = 26  # length of the arrow of gravity [points]
 _SHORTEST_ARROW = 0.1  # part of a direction in the paper, below which an arrow says nothing
-_LARGEST = 0.2  # L, the longest half axis if the force is not given
 _CORNERS = 120
-_COLOR = "tab:orange"
 
 
 def plot_arm(
@@ -335,64 +332,6 @@ def plot_equilibria(
     return panel.ax
 
 
-def plot_compliance(
-    arm: Manipulator,
-    configuration: Dataset,
-    compliance: ArrayLike,
-    *,
-    ax: Axes | None = None,
-    view: View = "front",
-    force: float | None = None,
-    box: ArrayLike | None = None,
-    unit: style.Unit = None,
-) -> Axes:
-    """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
-
-    They are to scale where the tip yields in proportion to the force.
-
-    Args:
-        arm: The design.
-        configuration: One configuration of that arm or several along `sample`.
-        compliance: That of each, from `tip_compliance` [m/N], shape (3, 3) or (n, 3, 3).
-        ax: Axes to draw in; None for a new figure.
-        view: As in `plot_cloud`.
-        force: Size of the force [N]; None for a round one.
-        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
-        unit: As in `plot_arm`.
-
-    Raises:
-        InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
-        MissingExtra: matplotlib is not installed.
-    """
-    arm = a_manipulator("arm", arm)
-    shapes = shapes_of(a_configuration("configuration", configuration))
-    values = as_floats("compliance", compliance)
-    force = None if force is None else as_number("force", force, POSITIVE)
-    matrices = values if values.ndim == 3 else values[None]
-    if matrices.shape != (len(shapes), 3, 3):
-        allowed = f"of shape (3, 3) or ({len(shapes)}, 3, 3), a matrix for each configuration"
-        raise InvalidInput("compliance.shape", values.shape, allowed)
-    if force is None:  # that keeps the ellipsoids small
-        softest = float(np.linalg.norm(matrices, ord=2, axis=(1, 2)).max())
-        if not 0 < softest < np.inf:
-            raise InvalidInput("compliance", f"{softest:g} m/N at most", "finite, and not zero")
-        force = round_below(_LARGEST * arm.length / softest)
-    counted = style.unit_for(arm.length, unit)
-    tips = counted.of([shape["position"].values[-1] for shape in shapes])
-    axes = counted.of(force * matrices)
-    with style.figure_style(ax):
-        if box is None:
-            surfaces = [arm_points(arm, shape, counted) for shape in shapes]
-            half = np.linalg.norm(axes, axis=2)  # of the boxes around the ellipsoids
-            box = counted.size * bounding_box(*surfaces, tips - half, tips + half)
-        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=False, box=box, unit=counted)
-        for outline in _outlines(tips, axes, view):
-            ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
-            ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
-        ax.set_title(f"tip under {force:g} N in any direction")
-    return ax
-
-
 def plot_payload_curve(
     curve: "PayloadCurve", *, ax: Axes | None = None, largest: "Sequence[LargestPayload]" = ()
 ) -> Axes:
@@ -445,14 +384,3 @@ def _gravity_arrow(panel: Panel, equilibria: "AllEquilibria") -> None:
     look = {"ha": "center", "va": "center", "fontsize": 8, **place}
     arrow = {"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0}
     panel.ax.annotate(word, (0.09, 0.86), tail, arrowprops=arrow, **look)
-
-
-def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
-    """Outlines of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
-    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
-    circle = np.array([np.cos(turn), np.sin(turn)])
-    outlines = []
-    for tip, matrix in zip(tips, axes, strict=True):
-        left, half, _ = np.linalg.svd(on_paper(matrix.T, view).T, full_matrices=False)
-        outlines.append(on_paper(tip, view)[:, None] + (left * half) @ circle)
-    return outlines

@@ -46,12 +46,6 @@ def five_digits(value: float) -> str:
     return f"{float(f'{value:.5g}'):.6g}"
 
 
-def round_below(value: float) -> float:
-    """The largest of 1, 2, 5, 10, ... and of 0.5, 0.2, ... up to a value above 0."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9))
-
-
 def round_above(value: float) -> float:
     """The least of 1, 2, 5, 10, ... and of 0.5, 0.2, ... from a value on; 0 from 0."""
     power = 10.0 ** math.floor(math.log10(value)) if value else 0.0
