@@ -48,7 +48,6 @@ _FOLLOWED, _STABLE, _UNSTABLE = "0.05", "#1f4e9e", "0.55"
 _BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
 _ARROW = 26  # length of the arrow of gravity [points]
 _SHORTEST_ARROW = 0.1  # part of a direction in the paper, below which an arrow says nothing
-_CORNERS = 120
 
 
 def plot_arm(
