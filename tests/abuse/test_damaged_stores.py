@@ -207,7 +207,7 @@ def test_commands_name_what_is_damaged(cloud_files, atlas_files, folder, capsys)
     written(cloud_files, Path("cloud.zarr"), "tip/c/0/0", flipped(cloud_files["tip/c/0/0"]))
     assert "chunk 0/0 of array tip" in refusal_of(["volume", "cloud.zarr"], capsys, folder)
     written(atlas_files, Path("a.zarr"), TIP, flipped(atlas_files[TIP]))
-    assert run(["atlas", "verify", "a.zarr"]) == 2
+    assert run(["atlas", "status", "a.zarr", "--verify"]) == 2
     printed = capsys.readouterr()
     assert "chunk 0/0/0/0 of array tip" in printed.out
     assert printed.err.count("\n") == 1

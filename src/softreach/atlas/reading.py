@@ -105,7 +105,7 @@ class AtlasStatus:
     def __str__(self) -> str:
         counts = ("designs", "done", "todo", "failed", "gaps", "unstable", "damaged")
         rows = [(name, f"{getattr(self, name):,}") for name in counts]
-        verified = "yes" if self.tips_verified else "no: softreach atlas verify"
+        verified = "yes" if self.tips_verified else "no: softreach atlas status --verify"
         rows.append(("tips verified", verified))
         rows += [(f"number {k}", text) for k, text in self.messages.items()][:_MOST_MESSAGES]
         return "\n".join(columns(rows))

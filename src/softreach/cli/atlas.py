@@ -1,9 +1,8 @@
-"""`softreach atlas`: sweeps over designs; build, status, verify, best, figures."""
+"""`softreach atlas`: sweeps over designs; build, status, best."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import App, Parameter
@@ -12,7 +11,7 @@ import softreach as sr
 from softreach.cli import options
 from softreach.cli.console import console, rows_of
 from softreach.cli.options import UNCHANGED, Changes, Whole, design_from, pairs_in, read_as
-from softreach.support.arguments import POSITIVE, as_integer
+from softreach.support.arguments import POSITIVE
 from softreach.support.errors import InvalidInput, NotPossible, counted
 from softreach.support.quantity import read_number
 
@@ -84,31 +83,22 @@ def build(
 
 
 @atlas.command
-def status(store: Store, /, *, json: options.AsJson = False) -> None:
+def status(store: Store, /, *, verify: bool = False, json: options.AsJson = False) -> None:
     """Count the designs that are done, and explain the others.
 
+    The command that built the atlas computes damaged designs again.
+
     Example: softreach atlas status atlas.zarr
+
+    Args:
+        verify: Read all of the atlas and check it.
     """
-    _print(store, sr.atlas.atlas_status(store), json)
-
-
-def _print(store: str, state: sr.atlas.AtlasStatus, json: bool) -> None:
+    state = sr.atlas.verify_atlas(store) if verify else sr.atlas.atlas_status(store)
     if json:
         console.json(asdict(state))
     else:
         console.line("\n  ".join([f"atlas {store}", *str(state).splitlines()]))
-
-
-@atlas.command
-def verify(store: Store, /, *, json: options.AsJson = False) -> None:
-    """Read all of an atlas and check it.
-
-    The command that built it computes damaged designs again.
-
-    Example: softreach atlas verify atlas.zarr
-    """
-    _print(store, state := sr.atlas.verify_atlas(store), json)
-    if state.damaged:
+    if verify and state.damaged:
         many = f"{counted(state.damaged, 'design')} of {store} damaged"
         raise NotPossible(f"{many}: run the command that built the atlas again")
 
@@ -150,37 +140,6 @@ def best(
         first = {name: float(designs[name][0]) for name in command_of(atlas).space.names}
         sr.atlas.atlas_design(atlas, **first).save(out, overwrite=overwrite)
     console.rows(f"best {metric} of {store}", rows_of(designs), json)
-
-
-@atlas.command
-def figures(
-    store: Store,
-    /,
-    *,
-    panels: Whole = 7,
-    out: options.Place = Path("figures"),
-    overwrite: options.Overwrite = False,
-) -> None:
-    """Draw the atlas: sheets, corners, maps, curvature.
-
-    Each figure is written as PNG and PDF.
-
-    Example: softreach atlas figures atlas.zarr --out figures
-
-    Args:
-        panels: Largest number of columns and rows of a sheet.
-        out: Folder for the figures.
-    """
-    from softreach.plot.style import pyplot
-
-    as_integer("panels", panels, 1)
-    for suffix in ("png", "pdf"):  # tried by a name that any of them may have
-        options.check_picture(out / f"clouds.{suffix}", overwrite)
-    for name, figure in sr.plot.atlas_figures(sr.open_atlas(store), panels):
-        for suffix in ("png", "pdf"):
-            sr.plot.save_figure(figure, out / f"{name}.{suffix}", overwrite=overwrite)
-            console.line(f"{out / name}.{suffix}")
-        pyplot().close(figure.get_figure(root=True))
 
 
 def grid_of(base: sr.Manipulator, vary: list[str]) -> sr.DesignSpace:
