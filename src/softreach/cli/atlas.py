@@ -86,8 +86,6 @@ def build(
 def status(store: Store, /, *, verify: bool = False, json: options.AsJson = False) -> None:
     """Count the designs that are done, and explain the others.
 
-    The command that built the atlas computes damaged designs again.
-
     Example: softreach atlas status atlas.zarr
 
     Args:

@@ -323,9 +323,8 @@ def _calibration() -> None:
 def _clearance(arm: sr.Manipulator) -> None:
     import numpy as np
 
-    corners = np.array([2.0, 0.0, 0.0]) + [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    stone = sr.requirements.Mesh(corners, faces)
+    faces = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]])
+    stone = sr.requirements.Mesh(np.eye(4, 3) + [2.0, 0.0, 0.0], faces)
     floor = sr.requirements.HalfSpace((0, 0, -0.1), (0, 0, 1))
     around = tuple(sr.arm.Obstacle(region=each) for each in (stone, floor))
     sr.rod.compute_clearance(arm.replace(surroundings=around), [[-1.0, 0.0, -0.4]])

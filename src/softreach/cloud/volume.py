@@ -139,7 +139,11 @@ def flat_areas(points: np.ndarray, alpha: float) -> tuple[float, float] | None:
 
     Returns:
         None if they lie in no plane, to 2e-6 of their extent.
+
+    Raises:
+        InvalidInput: Points that are no numbers.
     """
+    points = as_floats("points", points)
     size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
     plane = plane_of(points, _FLAT * size) if len(points) > 3 else None
     if plane is None:
