@@ -7,13 +7,12 @@ the same process.
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 import softreach as sr
+from benchmarks.bench_geometry import cpu_seconds
 from softreach.arm import Obstacle
 from softreach.requirements import Box, HalfSpace, Mesh, Tube
 from softreach.workspace import free
@@ -49,17 +48,6 @@ def activations(n: int) -> np.ndarray:
     return np.random.default_rng(0).uniform(low, high, (n, 3))
 
 
-def cpu(work: Callable[[], object], repeat: int = 3) -> float:
-    """The least CPU time of some runs, after one that compiles and builds [s]."""
-    work()
-    starts = []
-    for _ in range(repeat):
-        start = time.process_time()
-        work()
-        starts.append(time.process_time() - start)
-    return min(starts)
-
-
 @pytest.mark.parametrize("name", scenes(1))
 def test_clearance(benchmark, name):
     around, options = scenes(1)[name]
@@ -71,7 +59,7 @@ def test_clearance(benchmark, name):
 def main(n: int = 20_000, subdivisions: int = 6) -> None:
     """Print the table."""
     gamma, trunk = activations(n), sr.designs.minimal_trunk()
-    tip = cpu(lambda: sr.tip_positions(trunk, gamma)) / n
+    tip = cpu_seconds(lambda: sr.tip_positions(trunk, gamma)) / n
     print(f"## Clearance of {n:,} random configurations, minimal trunk\n")
     print(f"A tip alone takes {1e6 * tip:.2f} µs of CPU.\n")
     print("| surroundings | in contact | a configuration [µs of CPU] | over a tip |")
@@ -79,12 +67,12 @@ def main(n: int = 20_000, subdivisions: int = 6) -> None:
     for name, (around, options) in scenes(subdivisions).items():
         arm = trunk.replace(surroundings=around)
         found = sr.rod.compute_clearance(arm, gamma, **options).clearance.values
-        each = cpu(lambda arm=arm, o=options: sr.rod.compute_clearance(arm, gamma, **o)) / n
+        each = cpu_seconds(lambda arm=arm, o=options: sr.rod.compute_clearance(arm, gamma, **o)) / n
         print(
             f"| {name} | {100 * (found < 0).mean():.0f} % | {1e6 * each:.2f} | {each / tip:.0f} |"
         )
     arm = trunk.replace(surroundings=scenes(0)["plane"][0])
-    flood = cpu(lambda: (free.free_grid.cache_clear(), free.free_set(arm, cells=64)), 1)
+    flood = cpu_seconds(lambda: (free.free_grid.cache_clear(), free.free_set(arm, cells=64)))
     print(f"\nThe free set above the plane, flooded on 64³ cells, takes {flood:.1f} s of CPU.")
 
 

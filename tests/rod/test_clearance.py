@@ -249,7 +249,7 @@ def test_a_loaded_arm_has_the_gaps_of_its_equilibria():
     gamma = samples(found, 20)
     z = np.linspace(0.0, arm.length, 401)
     shape = found.whole.shapes(gamma, z, z)
-    radius = arm.profile.radius(z) * shape.extension**-found._poisson
+    radius = arm.profile.radius(z) * shape.extension**-found.poisson
     gaps = [each.region.distance(shape.position.reshape(-1, 3)) for each in (ball, floor)]
     least = (np.min(gaps, axis=0).reshape(20, -1) - radius).min(axis=1)
     slopes = found.with_slopes(gamma[:3])[1]

@@ -144,7 +144,6 @@ def plan(
     """
     from softreach.export.clouds import path_csv
     from softreach.inverse.request import position_in
-    from softreach.support.quantity import numbers_in
 
     arm = design_from(design, changes, unit)
     options.check_output(out, TABLES, overwrite)

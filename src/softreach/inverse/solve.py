@@ -174,7 +174,7 @@ def solve_inverse(
 
 def _free_of(solutions: Solutions, known: PreparedMap, near: ArrayLike, most: int) -> Solutions:
     """The solutions that touch nothing, the nearest first; of families so many at most."""
-    whole = as_tip_map(known.whole.arm, known.whole.tol)  # surroundings are in the world
+    whole = as_tip_map(known.whole.arm, known.whole.tol)  # in postures from rest
     target = np.repeat(np.arange(len(solutions)), solutions.counts)
     preferred = np.broadcast_to(np.asarray(near, float), (len(solutions), whole.box.bundles))
     away = np.linalg.norm((solutions.activations - preferred[target]) / whole.box.scales, axis=1)

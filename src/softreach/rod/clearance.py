@@ -189,7 +189,7 @@ class ClearanceMap:
             shapes = tip_map.shapes(gamma, z, z)
             points, extension = shapes.position, shapes.extension
             tangents = np.ascontiguousarray(shapes.directors[:, :, 2])
-        widths = self._radius / extension**self._poisson
+        widths = self._radius / extension**self.poisson
         points[lost] = np.nan
         return Arms(points, tangents, widths, self._tools(gamma))
 
@@ -200,7 +200,8 @@ class ClearanceMap:
         return np.nan_to_num(self.tip_map.tips(gamma))
 
     @lazy
-    def _poisson(self) -> float:
+    def poisson(self) -> float:
+        """ν of the outermost ring [-], by which the arm thickens: R2 ζ^-ν."""
         rings = self.arm.section.rings
         return max(rings, key=lambda ring: ring.outer_ratio).material.poisson_ratio
 
@@ -354,7 +355,7 @@ class ClearanceMap:
         inputs, rows = self.tip_map.inputs, np.arange(len(gamma))
         inner, of_drives = inputs.with_slopes(gamma)
         zeta = 1.0 + (inner * self._rates[edge]).sum(axis=1)
-        factor = -self._poisson * edges.radius[rows, edge] / zeta
+        factor = -self.poisson * edges.radius[rows, edge] / zeta
         along = (factor[:, None] * self._rates[edge])[:, None]
         out = np.empty((len(gamma), 1, gamma.shape[1]))
         if inputs.are_activations:

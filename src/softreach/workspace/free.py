@@ -99,7 +99,7 @@ class FreeMotions:
         measure, z, eta, curvature = (x.reshape(-1, *x.shape[2:]) for x in rule.nodes(edges))
         weight = _SAFETY * measure * np.tile(WEIGHTS, len(edges) - 1)
         least, most = 1.0 + _least(z, low, high), 1.0 - _least(-z, low, high)
-        bend, poisson = np.linalg.norm(curvature, axis=1), self.clearance._poisson
+        bend, poisson = np.linalg.norm(curvature, axis=1), self.clearance.poisson
         sharpest = bend @ np.maximum(np.abs(low), np.abs(high))
         turn = (1.0 - _least(-eta, low, high))[:, None] * bend + np.abs(eta) * sharpest[:, None]
         turn, stretch = turn * weight[:, None], np.abs(z) * weight[:, None]
